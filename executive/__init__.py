@@ -1,0 +1,1 @@
+"""Executive: from a sentence to a ticking behaviour tree."""

@@ -1,0 +1,1 @@
+"""Plant: the simulated robots and worlds, a Drake Diagram behind the Robot protocol."""

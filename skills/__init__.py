@@ -1,0 +1,1 @@
+"""Skills: what a robot can do, seen only through `skills.robot`."""

@@ -1,0 +1,204 @@
+"""What a skill is made of. Skills, ours and others', import only this module and `skills.robot`.
+
+A skill is a plain object with the life `begin -> step, step, ... -> end`. It never blocks, sleeps or ticks; the
+executive's leaf wraps it once, turns exceptions into failures with cause ERROR and calls `end` on every way out.
+"""
+
+from __future__ import annotations
+
+import enum
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+from skills.robot import Clock, Lease, Pose2D, Robot
+
+ResultT = TypeVar("ResultT")
+ResultT_co = TypeVar("ResultT_co", covariant=True)
+InputsT = TypeVar("InputsT")
+
+
+class Cause(enum.Enum):
+    """Why something did not succeed. Recovery is chosen by it."""
+
+    PRECONDITION = "PRECONDITION"  # it could not begin as things stood
+    PLANNING = "PLANNING"  # no way was found
+    EXECUTION = "EXECUTION"  # the motion did not go as planned
+    POSTCONDITION = "POSTCONDITION"  # it was done, and the look afterwards says no
+    TIMEOUT = "TIMEOUT"  # the robot's clock ran past the limit
+    CANCELLED = "CANCELLED"  # somebody stopped it
+    ERROR = "ERROR"  # a defect: an exception, a hung verb
+
+
+@dataclass(frozen=True)
+class Running:
+    """Not finished; one plain sentence on what goes on, and progress from 0 to 1 where known."""
+
+    message: str
+    progress: float | None = None
+
+
+@dataclass(frozen=True)
+class Succeeded:
+    """Finished well. `outputs` are the skill's output ports by name."""
+
+    message: str
+    outputs: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Failed:
+    """Finished badly: the cause and one plain sentence."""
+
+    cause: Cause
+    message: str
+
+
+Step = Running | Succeeded | Failed
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A kind of thing, perhaps with attributes: "red wrench" is Thing("wrench", ("red",))."""
+
+    name: str
+    attributes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return " ".join((*self.attributes, self.name))
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A flat top where things lie: outline in the world frame as (x, y) corners, height above the floor."""
+
+    name: str
+    polygon_W: tuple[tuple[float, float], ...]
+    height_m: float
+
+
+@dataclass(frozen=True)
+class ObjectObservation:
+    """A thing seen: where, how large, how sure.
+
+    `position_W` is the centre of what was seen, in the world frame (m); `size_m` the extents of its points along the
+    axes of a box that is turned by `yaw_rad` about the vertical; `surface` the name of the surface that it rests on.
+    """
+
+    stamp_s: float
+    thing: Thing
+    position_W: tuple[float, float, float]
+    size_m: tuple[float, float, float]
+    yaw_rad: float
+    score: float
+    surface: str | None = None
+
+
+@dataclass(frozen=True)
+class LocalisationEstimate:
+    """Where the robot is: X_WO corrects odometry, so that X_WB = X_WO @ X_OB. Covariance over x, y (m), yaw (rad)."""
+
+    stamp_s: float
+    X_WO: RigidTransform
+    covariance: NDArray[np.float64]
+    localised: bool
+
+
+class Localiser(Protocol):
+    """Gives the robot's place in the world."""
+
+    def estimate(self) -> LocalisationEstimate:
+        """The latest estimate."""
+
+    def update(self, robot: Robot) -> None:
+        """Take in the robot's newest sensor readings; called by the runner before each tick."""
+
+
+class Costmap(Protocol):
+    """Where the body can go: the surveyed keep-out grid plus what the sensors see now."""
+
+    def clearance_m(self, points_W: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance from each (x, y) row to the nearest obstacle, surveyed or seen."""
+
+    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
+        """Take in the robot's newest sensor readings; called by the runner before each tick."""
+
+
+class Job(Protocol[ResultT_co]):
+    """Work under way in the Worker."""
+
+    def done(self) -> bool:
+        """True once the result may be read."""
+
+    def result(self) -> ResultT_co:
+        """The result; raises what the work raised, or RuntimeError before it is done."""
+
+
+class Worker(Protocol):
+    """Does long work. In lock-step it runs at once and the result appears after `latency_s` on the robot's clock."""
+
+    def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
+        """Start `work`, which takes latency_s on the robot's clock."""
+
+
+class Publish(Protocol):
+    """Writes a message to the event log."""
+
+    def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
+        """Log `message` (JSON-like values; numpy images allowed under key "image") under `topic`."""
+
+
+@dataclass(frozen=True)
+class SkillContext:
+    """All that a skill may touch. `seed` is made of the run's seed and the leaf's path id."""
+
+    robot: Robot
+    lease: Lease
+    clock: Clock
+    worker: Worker
+    localiser: Localiser
+    costmap: Costmap
+    publish: Publish
+    seed: int
+
+    def X_WB(self) -> RigidTransform:
+        """The body's pose in the world, as estimated."""
+        return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB
+
+    def pose(self) -> Pose2D:
+        """The planar part of X_WB."""
+        return Pose2D.from_transform(self.X_WB())
+
+
+class Skill(ABC, Generic[InputsT]):
+    """Base of all skills.
+
+    `Inputs` is a frozen dataclass whose fields are the input ports (defaults allowed); `outputs` names the output
+    ports and their types; `causes` documents which failures it gives and when. `default_timeout_s` counts the
+    robot's clock.
+    """
+
+    name: ClassVar[str]
+    Inputs: ClassVar[type]
+    outputs: ClassVar[Mapping[str, type]] = {}
+    causes: ClassVar[Mapping[Cause, str]] = {}
+    default_timeout_s: ClassVar[float] = 60.0
+
+    def __init__(self, context: SkillContext) -> None:
+        self.context = context
+
+    @abstractmethod
+    def begin(self, inputs: InputsT) -> None:
+        """Start anew: forget all of an earlier attempt. May not command motion that outlives `end`."""
+
+    @abstractmethod
+    def step(self) -> Step:
+        """One tick's work, without blocking."""
+
+    def end(self) -> None:
+        """Clean up on any way out; idempotent. Stops only this skill's own commands (`Robot.stop(only=...)`)."""

@@ -1,0 +1,331 @@
+"""The Robot protocol: all that a skill ever sees of a robot.
+
+The verbs follow the Spot SDK, so that a real robot can stand behind them. Every motion command carries an
+expiry time on the robot's clock: a robot that hears nothing stops by itself. Sense verbs return the latest
+immutable stamped snapshot and never block, `image` excepted (ask for it through the `Worker`).
+
+Frames: `odom` (O) is fixed to the floor where the robot woke up and drifts against the world (W); `body` (B) is
+x forward, y left, z up at the centre of the hips; `hand` (H) is the last arm link; `<source>_camera` (C) is
+z forward, x right, y down; `lidar` (L). `X_AB` is the pose of frame B in frame A. SI units throughout.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NewType, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RollPitchYaw
+
+FloatArray = NDArray[np.float64]
+CommandId = NewType("CommandId", int)
+
+
+@dataclass(frozen=True)
+class Pose2D:
+    """A planar pose: x_m, y_m, yaw_rad (counter-clockwise from x)."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+    def transform(self, z_m: float = 0.0) -> RigidTransform:
+        """The same pose as a RigidTransform at height z_m."""
+        return RigidTransform(RollPitchYaw(0.0, 0.0, self.yaw_rad), [self.x_m, self.y_m, z_m])
+
+    @staticmethod
+    def from_transform(X_AB: RigidTransform) -> Pose2D:
+        """The planar part of X_AB."""
+        p = X_AB.translation()
+        return Pose2D(float(p[0]), float(p[1]), float(RollPitchYaw(X_AB.rotation()).yaw_angle()))
+
+
+@dataclass(frozen=True)
+class ArmCapabilities:
+    """The arm: joint names from the shoulder on, the furthest reach from the first joint, in metres."""
+
+    joint_names: tuple[str, ...]
+    max_reach_m: float
+    stowed_rad: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class GripperCapabilities:
+    """The gripper: 0 is closed, `open_rad` is fully open (a positive jaw angle)."""
+
+    joint_name: str
+    open_rad: float
+    max_opening_m: float
+    max_force_n: float
+    depth_m: float
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a robot is and can do.
+
+    `footprint_m` is the standing outline in the body frame as (x, y) corners; `description` is the robot's URDF
+    text with collision shapes and a free base (link `body`), for kinematics. `arm` or `gripper` is None on a robot
+    without one. `height_range_m` is the range of the body origin above the floor while it walks.
+    """
+
+    footprint_m: tuple[tuple[float, float], ...]
+    max_speed_m_s: float
+    max_turn_rate_rad_s: float
+    standing_height_m: float
+    height_range_m: tuple[float, float]
+    pitch_range_rad: tuple[float, float]
+    arm: ArmCapabilities | None
+    gripper: GripperCapabilities | None
+    camera_sources: tuple[str, ...]
+    description: str
+
+
+@dataclass(frozen=True)
+class FrameTree:
+    """Frames at one instant: child -> (parent, X_parent_child). The root is `odom`."""
+
+    edges: Mapping[str, tuple[str, RigidTransform]]
+
+    def pose(self, child: str, parent: str = "odom") -> RigidTransform:
+        """X_parent_child. Raises KeyError when a frame is unknown."""
+        return self._from_root(parent).inverse() @ self._from_root(child)
+
+    def _from_root(self, frame: str) -> RigidTransform:
+        X = RigidTransform()
+        while frame != "odom":
+            parent, X_PF = self.edges[frame]
+            X = X_PF @ X
+            frame = parent
+        return X
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """Dead reckoning: pose of the body in `odom` (drifts), velocity in the body frame (vx, vy in m/s, wz in rad/s)."""
+
+    stamp_s: float
+    X_OB: RigidTransform
+    velocity: tuple[float, float, float]
+
+    @property
+    def pose(self) -> Pose2D:
+        """The planar part of X_OB."""
+        return Pose2D.from_transform(self.X_OB)
+
+
+@dataclass(frozen=True)
+class Imu:
+    """Angular velocity (rad/s) and specific force (m/s^2), both in the body frame."""
+
+    stamp_s: float
+    angular_velocity_B: tuple[float, float, float]
+    linear_acceleration_B: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One LiDAR revolution: ranges_m[ring, azimuth] with NaN for no return, angles in the lidar frame, X_BL."""
+
+    stamp_s: float
+    ranges_m: NDArray[np.float32]
+    elevations_rad: FloatArray
+    azimuths_rad: FloatArray
+    X_BL: RigidTransform
+    X_OB: RigidTransform
+
+    def points_B(self) -> FloatArray:
+        """The valid returns as an (N, 3) array in the body frame."""
+        ranges = self.ranges_m.astype(np.float64)
+        elevation, azimuth = self.elevations_rad[:, None], self.azimuths_rad[None, :]
+        unit = np.stack(
+            [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation) + 0 * azimuth],
+            axis=-1,
+        )
+        points_L = (unit * ranges[..., None])[np.isfinite(ranges)]
+        return np.asarray(points_L @ self.X_BL.rotation().matrix().T + self.X_BL.translation())
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """Pinhole intrinsics in pixels."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+
+@dataclass(frozen=True)
+class Image:
+    """A picture with depth, taken at `stamp_s` from frame `camera_frame`.
+
+    `colour` is (H, W, 3) uint8 RGB, or None where the camera is grey; `grey` is (H, W) uint8. `depth_m` is float32
+    metres along the optical axis, 0 where there is none; it is registered to the picture by `depth_intrinsics`
+    (same pose, perhaps fewer pixels). `frames` is the frame tree at capture time.
+    """
+
+    stamp_s: float
+    source: str
+    camera_frame: str
+    intrinsics: Intrinsics
+    depth_intrinsics: Intrinsics
+    colour: NDArray[np.uint8] | None
+    grey: NDArray[np.uint8]
+    depth_m: NDArray[np.float32]
+    frames: FrameTree
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joint state by name: position (rad), velocity (rad/s), effort (N m)."""
+
+    stamp_s: float
+    position_rad: Mapping[str, float]
+    velocity_rad_s: Mapping[str, float]
+    effort_nm: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Gripper:
+    """Jaw angle (0 closed), clamp force at the jaw's tip (N), and whether the robot itself believes it holds something."""
+
+    stamp_s: float
+    opening_rad: float
+    force_n: float
+    holding: bool
+
+
+@dataclass(frozen=True)
+class Battery:
+    """State of charge from 0 to 1."""
+
+    stamp_s: float
+    charge: float
+
+
+@dataclass(frozen=True)
+class ArmTrajectory:
+    """Joint positions (K, number of arm joints) at times from the start (K,), interpolated linearly. Raises ValueError."""
+
+    times_s: FloatArray
+    positions_rad: FloatArray
+
+    def __post_init__(self) -> None:
+        if self.times_s.ndim != 1 or self.positions_rad.ndim != 2 or len(self.times_s) != len(self.positions_rad):
+            raise ValueError("ArmTrajectory: times_s must be (K,) and positions_rad (K, joints)")
+        if len(self.times_s) == 0 or np.any(np.diff(self.times_s) <= 0) or not np.all(np.isfinite(self.positions_rad)):
+            raise ValueError("ArmTrajectory: times_s must increase and positions be finite")
+
+
+class CommandState(enum.Enum):
+    """What became of a command."""
+
+    RUNNING = "running"  # accepted and being carried out
+    DONE = "done"  # reached its goal (a drive: its expiry)
+    STOPPED = "stopped"  # replaced, stopped or expired before the goal
+    REFUSED = "refused"  # never started: lease, limits, fault
+
+
+@dataclass(frozen=True)
+class CommandStatus:
+    """State of a command and, when it did not succeed, why."""
+
+    state: CommandState
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Lease:
+    """The right to move a robot. The one with the highest `number` counts."""
+
+    robot_name: str
+    holder: str
+    number: int = field(default=0)
+
+
+class Clock(Protocol):
+    """The robot's time. A plant's clock steps the simulation, a real robot's waits."""
+
+    def now(self) -> float:
+        """Seconds since the clock began."""
+
+    def advance(self, dt_s: float) -> None:
+        """Let dt_s seconds pass."""
+
+
+class Robot(Protocol):
+    """One robot. Motion verbs return at once with a command id; `command_status` tells what became of it."""
+
+    @property
+    def name(self) -> str:
+        """The robot's name, as in "Hey Alice"."""
+
+    def capabilities(self) -> Capabilities:
+        """What the robot is and can do."""
+
+    def odometry(self) -> Odometry:
+        """Latest dead reckoning."""
+
+    def imu(self) -> Imu:
+        """Latest inertial measurement."""
+
+    def scan(self) -> Scan | None:
+        """Latest LiDAR revolution, None before the first."""
+
+    def image(self, source: str) -> Image:
+        """Take a picture now; may block, so call it inside a Worker job. Raises ValueError for an unknown source."""
+
+    def joints(self) -> Joints:
+        """Latest joint state."""
+
+    def gripper(self) -> Gripper:
+        """Latest gripper state."""
+
+    def battery(self) -> Battery:
+        """Latest battery state."""
+
+    def faults(self) -> tuple[str, ...]:
+        """Present faults, empty when well."""
+
+    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Walk at a body-frame velocity (m/s, m/s, rad/s) until the clock reads until_s."""
+
+    def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Hold the body origin at a height above the floor and a pitch (positive looks down)."""
+
+    def sit(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Lower the body to the floor."""
+
+    def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
+        """Follow a joint trajectory; done when its end is reached and the arm is still."""
+
+    def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Move the jaw to an opening with at most force_n at its tip; done when there or when held by a thing.
+
+        The jaw keeps its clamp force after the command's end: what is held stays held.
+        """
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        """Stop all motion, or only the given command if it still runs; the gripper keeps its clamp force."""
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        """What became of a command. Raises KeyError for an id never given."""
+
+    def acquire_lease(self, holder: str) -> Lease:
+        """Take a free lease. Raises LeaseError when another holds it."""
+
+    def take_lease(self, holder: str) -> Lease:
+        """Take the lease from whoever holds it; the robot stops."""
+
+    def return_lease(self, lease: Lease) -> None:
+        """Give the lease back; the robot stops. A lease that was taken away is ignored."""
+
+
+class LeaseError(RuntimeError):
+    """The lease is held by another."""

@@ -1,0 +1,1 @@
+"""Models of robots and things: SDF files, their looks, and the scripts that made them."""

@@ -1,0 +1,1 @@
+"""Builds the object models of `plant/models`: `python -m plant.models.builder`."""

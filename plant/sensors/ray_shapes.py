@@ -1,0 +1,178 @@
+"""The scene's proximity shapes as plain arrays, ready for ray casting.
+
+Every shape is a row: a kind, half extents (3,) along its own axes, and the frame that carries it. Meshes and convex
+hulls stand in by their oriented bounding boxes, half spaces by a very wide box under the surface.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    GeometryId,
+    GeometrySet,
+    HalfSpace,
+    Role,
+    SceneGraphInspector,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
+from pydrake.systems.framework import Context
+
+FloatArray = NDArray[np.float64]
+Row = tuple["ShapeKind", FloatArray, RigidTransform]
+
+HALF_SPACE_HALF_WIDTH_M = 500.0
+
+
+class ShapeKind(enum.IntEnum):
+    """How a row is to be intersected."""
+
+    BOX = 0
+    CYLINDER = 1
+    CAPSULE = 2
+    ELLIPSOID = 3
+
+
+@dataclass(frozen=True)
+class ShapeArrays:
+    """N shapes: kinds (N,), half extents (N, 3), rotations R_FG (N, 3, 3) and positions p_FG (N, 3) in a frame F."""
+
+    kinds: NDArray[np.int64]
+    half_extents_m: FloatArray
+    rotations: FloatArray
+    positions_m: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    @staticmethod
+    def from_rows(rows: list[Row]) -> ShapeArrays:
+        """Stack rows of (kind, half extents, X_FG)."""
+        return ShapeArrays(
+            kinds=np.array([kind for kind, _, _ in rows], dtype=np.int64),
+            half_extents_m=np.array([half for _, half, _ in rows], dtype=np.float64).reshape(-1, 3),
+            rotations=np.array([X.rotation().matrix() for _, _, X in rows], dtype=np.float64).reshape(-1, 3, 3),
+            positions_m=np.array([X.translation() for _, _, X in rows], dtype=np.float64).reshape(-1, 3),
+        )
+
+
+class RayScene:
+    """All proximity shapes of a plant but those of some model instances; poses are refreshed from a context.
+
+    Shapes on anchored bodies are placed once. The others follow their bodies.
+    """
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        inspector: SceneGraphInspector,
+        exclude_instances: Collection[ModelInstanceIndex] = (),
+    ) -> None:
+        """Read the shapes of a finalized plant that is registered with the inspector's scene graph."""
+        self._plant = plant
+        excluded = {int(instance) for instance in exclude_instances}
+        default_context = plant.CreateDefaultContext()
+        anchored: list[Row] = []
+        moving: list[Row] = []
+        self._bodies: list[RigidBody] = []
+        body_slots: list[int] = []
+        for geometry in inspector.GetGeometryIds(GeometrySet(inspector.GetAllGeometryIds()), Role.kProximity):
+            body = plant.GetBodyFromFrameId(inspector.GetFrameId(geometry))
+            if body is None or int(body.model_instance()) in excluded:
+                continue
+            row = _row(inspector, geometry)
+            if plant.IsAnchored(body):
+                X_WF = plant.EvalBodyPoseInWorld(default_context, body)
+                anchored.append((row[0], row[1], X_WF @ row[2]))
+            else:
+                body_slots.append(self._slot(body))
+                moving.append(row)
+        self._anchored = ShapeArrays.from_rows(anchored)
+        self._moving = ShapeArrays.from_rows(moving)
+        self._body_slots = np.array(body_slots, dtype=np.int64)
+
+    def world_shapes(self, plant_context: Context) -> ShapeArrays:
+        """All shapes in the world frame at the context's state."""
+        if not len(self._moving):
+            return self._anchored
+        R_WF, p_WF = self._body_poses(plant_context)
+        R_WF, p_WF = R_WF[self._body_slots], p_WF[self._body_slots]
+        moved_p = np.einsum("nij,nj->ni", R_WF, self._moving.positions_m) + p_WF
+        return ShapeArrays(
+            np.concatenate([self._anchored.kinds, self._moving.kinds]),
+            np.concatenate([self._anchored.half_extents_m, self._moving.half_extents_m]),
+            np.concatenate([self._anchored.rotations, R_WF @ self._moving.rotations]),
+            np.concatenate([self._anchored.positions_m, moved_p]),
+        )
+
+    def _slot(self, body: RigidBody) -> int:
+        """The index of a moving body among those tracked, added when new."""
+        for slot, known in enumerate(self._bodies):
+            if known.index() == body.index():
+                return slot
+        self._bodies.append(body)
+        return len(self._bodies) - 1
+
+    def _body_poses(self, plant_context: Context) -> tuple[FloatArray, FloatArray]:
+        """Rotations (B, 3, 3) and positions (B, 3) of the moving bodies in the world."""
+        matrices = np.array(
+            [self._plant.EvalBodyPoseInWorld(plant_context, body).GetAsMatrix34() for body in self._bodies]
+        )
+        return matrices[:, :, :3], matrices[:, :, 3]
+
+
+def _row(inspector: SceneGraphInspector, geometry: GeometryId) -> Row:
+    """(kind, half extents, X_FG) of one geometry in its frame F. Raises ValueError for an unbounded shape."""
+    shape, X_FG = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
+    maker = _MAKERS.get(type(shape))
+    if maker is not None:
+        kind, half = maker(shape)
+        return kind, np.asarray(half, dtype=np.float64), X_FG
+    if isinstance(shape, HalfSpace):
+        half_width = HALF_SPACE_HALF_WIDTH_M
+        return ShapeKind.BOX, np.array([half_width, half_width, 1.0]), X_FG @ RigidTransform(np.array([0.0, 0.0, -1.0]))
+    box = inspector.GetObbInGeometryFrame(geometry)
+    if box is None:
+        raise ValueError(f"{inspector.GetName(geometry)}: the lidar has no bounding box for a {type(shape).__name__}")
+    return ShapeKind.BOX, np.asarray(box.half_width(), dtype=np.float64), X_FG @ box.pose()
+
+
+def _box(shape: Box) -> tuple[ShapeKind, FloatArray]:
+    return ShapeKind.BOX, np.asarray(shape.size()) / 2.0
+
+
+def _cylinder(shape: Cylinder) -> tuple[ShapeKind, FloatArray]:
+    return ShapeKind.CYLINDER, np.array([shape.radius(), shape.radius(), shape.length() / 2.0])
+
+
+def _capsule(shape: Capsule) -> tuple[ShapeKind, FloatArray]:
+    return ShapeKind.CAPSULE, np.array([shape.radius(), shape.radius(), shape.length() / 2.0 + shape.radius()])
+
+
+def _sphere(shape: Sphere) -> tuple[ShapeKind, FloatArray]:
+    return ShapeKind.ELLIPSOID, np.full(3, shape.radius())
+
+
+def _ellipsoid(shape: Ellipsoid) -> tuple[ShapeKind, FloatArray]:
+    return ShapeKind.ELLIPSOID, np.array([shape.a(), shape.b(), shape.c()])
+
+
+_MAKERS: dict[type[Shape], Callable[..., tuple[ShapeKind, FloatArray]]] = {
+    Box: _box,
+    Cylinder: _cylinder,
+    Capsule: _capsule,
+    Sphere: _sphere,
+    Ellipsoid: _ellipsoid,
+}

@@ -1,14 +1,34 @@
-"""Commands of the form *Take [item] to [goal] and do [task] to [object]*, and their text form."""
+"""Commands of the form *Take [item] to [goal] and do [task] to [object]*, and their text form.
+
+A name of several words stands as it is ("[orange juice]"). Where its words could be read as attributes, a number or
+Nothing, the text form puts the name in quotes ('["red wine"]'), so that every command parses back to itself.
+"""
 
 from __future__ import annotations
 
 import enum
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Final
 
 from skills.api import Thing
 
-__all__ = ["Command", "Task", "Thing", "parse_command"]
+__all__ = ["Command", "Task", "Thing", "is_attribute", "parse_command"]
+
+_ATTRIBUTE: Final = re.compile(
+    r"red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver|golden|dark|bright|light"
+    r"|big|small|large|little|tiny|huge|tall|short|long|wide|thin|thick|heavy|round|square|full|empty|open|closed"
+    r"|clean|dirty|new|old|hot|cold|warm|fresh|wooden|plastic|metal|other|same|left|right|\w{3,}est",
+    re.IGNORECASE,
+)
+_NOTHING: Final = "Nothing"
+_PLURAL: Final = "some"
+_RESERVED: Final = re.compile(r'[\[\]"]|^\s|\s$|\s\s|[^\S ]|^$')
+_NO_ATTRIBUTE: Final = re.compile(rf"\d+|{_PLURAL}|.*\s.*")
+_FORM: Final = re.compile(r"\s*Take \[(.+?)\] to \[(.+?)\] and do \[(.+?)\] to \[(.+?)\]\s*")
+_GOAL: Final = re.compile(r'("[^"]+"|.+?)(?: at ("[^"]+"|.+))?')
+_THING: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+))')
 
 
 class Task(enum.Enum):
@@ -25,6 +45,10 @@ class Command:
 
     `goal` is a place or a person ("start" is where the robot stood when it was spoken to), `goal_at` the place where
     a person is to be found, `verb` the word that was spoken.
+
+    Raises:
+        ValueError: a name holds brackets, quotes or stray blanks, a count is negative, Nothing is counted, or
+            `goal_at` stands without a goal.
     """
 
     item: Thing | None = None
@@ -35,3 +59,133 @@ class Command:
     item_count: int = 1
     object_count: int = 1
     verb: str = ""
+
+    def __post_init__(self) -> None:
+        for name in (self.goal, self.goal_at, *_words(self.item), *_words(self.object)):
+            if name is not None and _RESERVED.search(name):
+                raise ValueError(f"{name!r} cannot be a name in a command")
+        for thing, count in ((self.item, self.item_count), (self.object, self.object_count)):
+            if count < 0 or (thing is None and count != 1):
+                raise ValueError(f"{count} cannot be the count of {thing or _NOTHING}")
+            if any(_NO_ATTRIBUTE.fullmatch(word) for word in _words(thing)[1:]):
+                raise ValueError(f"{thing} has an attribute that is no single word, or a number")
+        if self.goal_at is not None and self.goal is None:
+            raise ValueError(f"a goal is missing at {self.goal_at!r}")
+
+    def __str__(self) -> str:
+        """The text form, for instance "Take [Nothing] to [kitchen] and do [grasp] to [drink]"."""
+        item = _thing_text(self.item, self.item_count)
+        task = _NOTHING if self.task is None else self.task.value
+        target = _thing_text(self.object, self.object_count)
+        return f"Take [{item}] to [{_goal_text(self.goal, self.goal_at)}] and do [{task}] to [{target}]"
+
+    def to_json(self) -> dict[str, Any]:
+        """The command as JSON values: names as text, null for Nothing, whose count is 0."""
+        return {
+            "item": None if self.item is None else str(self.item),
+            "goal": self.goal,
+            "goal_at": self.goal_at,
+            "task": None if self.task is None else self.task.value,
+            "object": None if self.object is None else str(self.object),
+            "item_count": 0 if self.item is None else self.item_count,
+            "object_count": 0 if self.object is None else self.object_count,
+            "verb": self.verb,
+        }
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Command:
+        """The command of such values; keys may be left out. Raises ValueError for an unknown task or a bad name."""
+        item, target, task = values.get("item"), values.get("object"), values.get("task")
+        return cls(
+            item=None if item is None else thing(item),
+            goal=values.get("goal"),
+            goal_at=values.get("goal_at"),
+            task=None if task is None else Task(task),
+            object=None if target is None else thing(target),
+            item_count=1 if item is None else values.get("item_count", 1),
+            object_count=1 if target is None else values.get("object_count", 1),
+            verb=values.get("verb", ""),
+        )
+
+
+def is_attribute(word: str) -> bool:
+    """Whether a leading `word` is read as an attribute of what follows ("red", "biggest")."""
+    return _ATTRIBUTE.fullmatch(word) is not None
+
+
+def thing(text: str) -> Thing:
+    """The words as a Thing: leading attribute words are split off, and the rest is the name."""
+    words = text.split()
+    first = next((n for n, word in enumerate(words) if not is_attribute(word)), len(words) - 1)
+    return Thing(" ".join(words[first:]), tuple(words[:first]))
+
+
+def parse_command(text: str) -> Command:
+    """The command whose text form is `text` (its `verb` is not part of that form).
+
+    Raises:
+        ValueError: the text is no command.
+    """
+    match = _FORM.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} is not of the form 'Take [item] to [goal] and do [task] to [object]'")
+    item, goal, task, target = match.groups()
+    item_thing, item_count = _parse_thing(item)
+    target_thing, target_count = _parse_thing(target)
+    goal_name, goal_at = _parse_goal(goal)
+    return Command(item_thing, goal_name, goal_at, _parse_task(task), target_thing, item_count, target_count)
+
+
+def _words(of: Thing | None) -> tuple[str, ...]:
+    return () if of is None else (of.name, *of.attributes)
+
+
+def _thing_text(of: Thing | None, count: int) -> str:
+    """The words between the brackets; quoted where they would not read back."""
+    if of is None:
+        return _NOTHING
+    number = {0: f"{_PLURAL} ", 1: ""}.get(count, f"{count} ")
+    plain = f"{number}{of}"
+    return plain if _parse_thing(plain) == (of, count) else f'{number}{" ".join((*of.attributes, ""))}"{of.name}"'
+
+
+def _parse_thing(text: str) -> tuple[Thing | None, int]:
+    if text == _NOTHING:
+        return None, 1
+    match = _THING.fullmatch(text)
+    if match is None:
+        raise ValueError(f"[{text}] is no thing")
+    number, attributes, quoted, plain = match.groups()
+    count = 1 if number is None else 0 if number == _PLURAL else int(number)
+    if quoted is not None:
+        return Thing(quoted, tuple((attributes or "").split())), count
+    return thing(" ".join(filter(None, (attributes, plain)))), count
+
+
+def _goal_text(goal: str | None, goal_at: str | None) -> str:
+    if goal is None:
+        return _NOTHING
+    name = _quoted_place(goal)
+    return name if goal_at is None else f"{name} at {_quoted_place(goal_at)}"
+
+
+def _quoted_place(name: str) -> str:
+    return f'"{name}"' if name == _NOTHING or " at " in f" {name} " else name
+
+
+def _parse_goal(text: str) -> tuple[str | None, str | None]:
+    match = _GOAL.fullmatch(text)
+    if text == _NOTHING or match is None:
+        return None, None
+    goal, goal_at = match.groups()
+    return goal.strip('"'), goal_at.strip('"') if goal_at else None
+
+
+def _parse_task(text: str) -> Task | None:
+    if text == _NOTHING:
+        return None
+    try:
+        return Task(text)
+    except ValueError as error:
+        known = ", ".join(task.value for task in Task)
+        raise ValueError(f"[{text}] is no task; known are {known} and {_NOTHING}") from error

@@ -128,6 +128,9 @@ class Costmap(Protocol):
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
         """Take in the robot's newest sensor readings; called by the runner before each tick."""
 
+    def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
+        """Take in (N, 3) points that a camera saw on things in the way, the floor left out."""
+
 
 class Job(Protocol[ResultT_co]):
     """Work under way in the Worker."""

@@ -1,0 +1,48 @@
+"""Compilation of inner loops to machine code, kept on disk between runs, and the loops that several modules share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
+
+
+def compiled(function: FunctionT) -> FunctionT:
+    """Compile at the first call, single-threaded and without reordering of floating point: equal runs stay equal."""
+    return cast(FunctionT, njit(cache=True, nogil=True)(function))
+
+
+@compiled
+def bilinear(field: NDArray[np.float32], u: float, v: float) -> float:
+    """Value of field[row, column] at column u, row v (cell centres at whole numbers); the edge continues outside."""
+    rows, columns = field.shape
+    u = min(max(u, 0.0), columns - 1.0)
+    v = min(max(v, 0.0), rows - 1.0)
+    i, j = min(int(v), rows - 2), min(int(u), columns - 2)
+    a, b = u - j, v - i
+    low = (1.0 - a) * field[i, j] + a * field[i, j + 1]
+    high = (1.0 - a) * field[i + 1, j] + a * field[i + 1, j + 1]
+    return float((1.0 - b) * low + b * high)
+
+
+@compiled
+def distances(
+    field: NDArray[np.float32], resolution_m: float, x0_m: float, y0_m: float, points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Look up (N, 2) points in a distance field (m); outside it, minus the distance to its edge."""
+    rows, columns = field.shape
+    values = np.empty(points.shape[0])
+    for n in range(points.shape[0]):
+        u, v = (points[n, 0] - x0_m) / resolution_m, (points[n, 1] - y0_m) / resolution_m
+        du, dv = max(-u, u - columns, 0.0), max(-v, v - rows, 0.0)
+        if du > 0.0 or dv > 0.0:
+            values[n] = -math.hypot(du, dv) * resolution_m
+        else:
+            values[n] = bilinear(field, u - 0.5, v - 0.5)
+    return values

@@ -1,0 +1,167 @@
+"""Where the body can go: the surveyed keep-out grid and, above it, a layer of what the sensors see now."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.api import LocalisationEstimate
+from skills.estimate.compiled import distances
+from skills.estimate.grid_map import GridMap
+from skills.estimate.planar import compose
+from skills.estimate.scan_points import scan_points, sensor_pose
+from skills.estimate.seen_layer import Beams, clear_cells, mark_cells
+from skills.estimate.self_filter import SelfFilter, in_body_axes
+from skills.robot import Pose2D, Robot, Scan
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CostmapOptions:
+    """Numbers of the layer of seen things.
+
+    A point between the heights counts when it is nearer than max_range_m and farther than `explained_m` from all
+    that the keep-out grid knows. LiDAR cells count once two scans agree; a cell is remembered for `memory_s` unless
+    a beam sees past it. A depth picture must put `min_points_per_cell` points into a cell.
+    """
+
+    heights_m: tuple[float, float] = (0.1, 1.0)
+    max_range_m: float = 4.0
+    azimuths: int = 450
+    explained_m: float = 0.15
+    confirm_s: float = 0.6
+    memory_s: float = 12.0
+    min_points_per_cell: int = 3
+
+
+class LayeredCostmap:
+    """Implements `skills.api.Costmap`. `keepout` is the surveyed grid; its unknown cells count as blocked."""
+
+    def __init__(self, keepout: GridMap, options: CostmapOptions | None = None) -> None:
+        self._keepout = keepout.with_unknown_blocked()
+        self._options = options or CostmapOptions()
+        self._until_s = np.full(keepout.occupied.shape, -math.inf)
+        self._candidate_s = np.full(keepout.occupied.shape, -math.inf)
+        self._height_m = np.zeros(keepout.occupied.shape)
+        self._field: NDArray[np.float32] | None = None
+        self._now_s = -math.inf
+        self._scan_stamp_s = -math.inf
+        self._X_WB: Pose2D | None = None
+        self._filter: SelfFilter | None = None
+
+    @property
+    def keepout(self) -> GridMap:
+        """The surveyed grid."""
+        return self._keepout
+
+    def clearance_m(self, points_W: FloatArray) -> FloatArray:
+        """Distance (m) from each (x, y) row to the nearest obstacle, negative inside one and off the grid."""
+        points = np.ascontiguousarray(points_W, dtype=np.float64)
+        x0_m, y0_m = self._keepout.origin_m
+        return distances(self._combined(), self._keepout.resolution_m, x0_m, y0_m, points)
+
+    def seen_m(self) -> FloatArray:
+        """Centres (x, y) of the cells that are blocked by something seen and not surveyed."""
+        return self._keepout.centres(np.argwhere(self._until_s > self._now_s))
+
+    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
+        """Take in the newest scan, if it is new and the robot knows where it is."""
+        odometry = robot.odometry()
+        X_WO = Pose2D.from_transform(localisation.X_WO)
+        self._pass_time(odometry.stamp_s)
+        self._X_WB = compose(X_WO, odometry.pose)
+        self._filter = self._filter or SelfFilter.of(robot.capabilities())
+        scan = robot.scan()
+        if scan is not None and scan.stamp_s > self._scan_stamp_s and localisation.localised:
+            self._scan_stamp_s = scan.stamp_s
+            self._take_scan(scan, X_WO, self._arm_F(robot, scan), self._filter)
+
+    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
+        """Take in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
+        if self._X_WB is None or self._filter is None or len(points_W) == 0:
+            return
+        own = self._filter.foreign(in_body_axes(points_W, self._X_WB), np.empty((0, 3)))
+        points = self._unexplained(points_W[own])
+        if len(points) == 0:
+            return
+        cells, first, counts = np.unique(self._keepout.cells(points), axis=0, return_index=True, return_counts=True)
+        kept = counts >= self._options.min_points_per_cell
+        rows, columns = cells[kept].T
+        self._until_s[rows, columns] = np.maximum(self._until_s[rows, columns], stamp_s + self._options.memory_s)
+        self._height_m[rows, columns] = points[first[kept], 2]
+        self._field = None
+
+    def _pass_time(self, now_s: float) -> None:
+        """Forget what is too old."""
+        expired = (self._until_s <= now_s) & (self._until_s > self._now_s)
+        self._now_s = now_s
+        if expired.any():
+            self._field = None
+
+    def _arm_F(self, robot: Robot, scan: Scan) -> FloatArray:
+        """The arm's segments in the levelled body frame."""
+        if self._filter is None or self._filter.arm is None:
+            return np.empty((0, 3))
+        rotation, translation = sensor_pose(scan)
+        points_B = self._filter.arm.points_B(robot.joints())
+        points_L = scan.X_BL.inverse().multiply(points_B.T)
+        return np.asarray((rotation @ points_L).T + translation)
+
+    def _take_scan(self, scan: Scan, X_WO: Pose2D, arm_F: FloatArray, self_filter: SelfFilter) -> None:
+        """Clear the cells that beams see past, then mark those that are hit and not explained."""
+        options, grid = self._options, self._keepout
+        X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
+        rotation, translation = sensor_pose(scan)
+        active = np.argwhere(self._until_s > self._now_s)
+        changed = False
+        if len(active):
+            beams = Beams(scan.ranges_m, scan.elevations_rad, scan.azimuths_rad)
+            centres_F = in_body_axes(
+                np.column_stack([grid.centres(active), self._height_m[active[:, 0], active[:, 1]]]), X_WF
+            )
+            gone = active[clear_cells(beams, centres_F, rotation, translation, grid.resolution_m)]
+            self._until_s[gone[:, 0], gone[:, 1]] = -math.inf
+            changed = len(gone) > 0
+        points_F = scan_points(
+            scan, azimuths=options.azimuths, heights_m=options.heights_m, max_range_m=options.max_range_m
+        )
+        points = self._unexplained(_placed(points_F, X_WF))
+        if len(points):
+            points = points[self_filter.foreign(in_body_axes(points, X_WF), arm_F)]
+        changed |= mark_cells(
+            grid.cells(points),
+            points[:, 2],
+            (scan.stamp_s, options.confirm_s, options.memory_s),
+            self._candidate_s,
+            self._until_s,
+            self._height_m,
+        )
+        if changed:
+            self._field = None
+
+    def _unexplained(self, points_W: FloatArray) -> FloatArray:
+        """Those (x, y, z) rows that lie on the grid and away from all that was surveyed."""
+        return np.ascontiguousarray(points_W[self._keepout.distance_m(points_W) > self._options.explained_m])
+
+    def _combined(self) -> NDArray[np.float32]:
+        """The surveyed distance field, lowered around what is seen."""
+        if self._field is None:
+            seen = self._until_s > self._now_s
+            self._field = self._keepout.distance
+            if seen.any():
+                cells = cv2.distanceTransform((~seen).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+                to_seen = (cells - np.float32(0.5)) * np.float32(self._keepout.resolution_m)
+                self._field = np.minimum(self._keepout.distance, to_seen)
+        return self._field
+
+
+def _placed(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:
+    """Points of the levelled body frame in the world, (N, 3)."""
+    c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
+    x, y = points_F[:, 0], points_F[:, 1]
+    return np.column_stack([X_WF.x_m + c * x - s * y, X_WF.y_m + s * x + c * y, points_F[:, 2]])

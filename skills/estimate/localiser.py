@@ -1,0 +1,180 @@
+"""Where the robot is, from matching its LiDAR scans to the surveyed grid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.api import LocalisationEstimate
+from skills.estimate.grid_map import GridMap
+from skills.estimate.matching import Match, MatchOptions, match, score_poses
+from skills.estimate.planar import compose, inverse, relative
+from skills.estimate.scan_points import scan_points
+from skills.robot import Pose2D, Robot, Scan
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LocaliserOptions:
+    """Numbers of the localiser.
+
+    `initial_sigma` is the spread of the given start pose in x, y (m) and yaw (rad). Odometry is expected to err by
+    `drift_per_m` of the way, `yaw_drift_rad_per_m` and `yaw_drift_per_rad` of a turn. Fewer explained points than
+    `lost_share`, for `lost_scans` scans on end, means lost; `found_share` is needed to be found again.
+    """
+
+    height_band_m: tuple[float, float] = (0.7, 1.3)
+    max_range_m: float = 15.0
+    azimuths: int = 200
+    max_points: int = 500
+    min_points: int = 40
+    initial_sigma: tuple[float, float, float] = (0.15, 0.15, 0.1)
+    drift_per_m: float = 0.03
+    yaw_drift_rad_per_m: float = 0.02
+    yaw_drift_per_rad: float = 0.03
+    lost_share: float = 0.4
+    found_share: float = 0.6
+    lost_scans: int = 5
+    search_radius_m: float = 1.5
+    search_every_scans: int = 10
+    matching: MatchOptions = field(default_factory=MatchOptions)
+
+
+class ScanMatchingLocaliser:
+    """Follows the pose by odometry and corrects it with every new scan; implements `skills.api.Localiser`.
+
+    `initial` is X_WB when the localiser first sees the robot. The estimate says `localised` once a scan has agreed
+    with the map, and no longer when several on end do not; it then searches around where it believes to be.
+    """
+
+    def __init__(self, grid: GridMap, initial: Pose2D, options: LocaliserOptions | None = None) -> None:
+        self._grid = grid
+        self._options = options or LocaliserOptions(height_band_m=grid.height_band_m or (0.7, 1.3))
+        self._initial: Pose2D | None = initial
+        self._X_WO = initial
+        self._X_OB: Pose2D | None = None
+        self._covariance = np.diag(np.square(self._options.initial_sigma))
+        self._stamp_s = -math.inf
+        self._poor_scans = 0
+        self._localised = False
+
+    @property
+    def grid(self) -> GridMap:
+        """The surveyed grid that scans are matched to."""
+        return self._grid
+
+    def estimate(self) -> LocalisationEstimate:
+        """The latest estimate; its stamp is that of the scan that it rests on (minus infinity before the first)."""
+        return LocalisationEstimate(self._stamp_s, self._X_WO.transform(), self._covariance.copy(), self._localised)
+
+    def update(self, robot: Robot) -> None:
+        """Take in the newest scan, if it is new."""
+        if self._initial is not None:
+            self._X_WO = compose(self._initial, inverse(robot.odometry().pose))
+            self._initial = None
+        scan = robot.scan()
+        if scan is None or scan.stamp_s <= self._stamp_s:
+            return
+        self._stamp_s = scan.stamp_s
+        self._predict(Pose2D.from_transform(scan.X_OB))
+        points_F = self._points(scan)
+        if len(points_F) < self._options.min_points:
+            return
+        self._correct(points_F)
+        if not self._localised and self._poor_scans > 0 and self._poor_scans % self._options.search_every_scans == 0:
+            self._search(points_F, self._options.search_radius_m)
+
+    def relocalise(self, robot: Robot, radius_m: float | None = None) -> bool:
+        """Search for the pose within radius_m of the present belief, or everywhere (None); True when found.
+
+        Costs a few milliseconds for a small radius and some hundred for a whole flat: call it while standing.
+        """
+        scan = robot.scan()
+        if scan is None:
+            return False
+        self._X_OB = Pose2D.from_transform(scan.X_OB)
+        return self._search(self._points(scan), radius_m)
+
+    def _points(self, scan: Scan) -> FloatArray:
+        """At most max_points returns of a scan, evenly chosen, in the levelled body frame."""
+        options = self._options
+        points = scan_points(
+            scan, azimuths=options.azimuths, heights_m=options.height_band_m, max_range_m=options.max_range_m
+        )
+        if len(points) <= options.max_points:
+            return points
+        return np.ascontiguousarray(points[np.linspace(0, len(points) - 1, options.max_points).astype(np.int64)])
+
+    def _predict(self, X_OB: Pose2D) -> None:
+        """Move the belief along with odometry and let its spread grow."""
+        before, self._X_OB = self._X_OB or X_OB, X_OB
+        step = relative(before, X_OB)
+        distance, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
+        old, new = compose(self._X_WO, before), compose(self._X_WO, X_OB)
+        jacobian = np.array([[1.0, 0.0, old.y_m - new.y_m], [0.0, 1.0, new.x_m - old.x_m], [0.0, 0.0, 1.0]])
+        options = self._options
+        along = 5e-4 + options.drift_per_m * distance
+        yaw = 5e-4 + options.yaw_drift_rad_per_m * distance + options.yaw_drift_per_rad * turn
+        self._covariance = jacobian @ self._covariance @ jacobian.T + np.diag([along**2, along**2, yaw**2])
+
+    def _correct(self, points_F: FloatArray) -> None:
+        """Match the scan from the belief on; poor matches are counted, not believed."""
+        assert self._X_OB is not None
+        prior = compose(self._X_WO, self._X_OB)
+        found = match(self._grid, points_F, prior, self._covariance, self._options.matching)
+        if found.inlier_share < self._options.lost_share:
+            self._poor_scans += 1
+            self._localised = self._localised and self._poor_scans < self._options.lost_scans
+            return
+        if self._localised or found.inlier_share >= self._options.found_share:
+            self._poor_scans = 0
+            self._localised = True
+        else:
+            self._poor_scans += 1
+        self._believe(found)
+
+    def _believe(self, found: Match) -> None:
+        assert self._X_OB is not None
+        self._X_WO = compose(found.pose, inverse(self._X_OB))
+        self._covariance = found.covariance
+
+    def _search(self, points_F: FloatArray, radius_m: float | None) -> bool:
+        """Score many poses, refine the best few, believe the one that explains most."""
+        assert self._X_OB is not None
+        options = self._options
+        if len(points_F) < options.min_points:
+            return False
+        centre = compose(self._X_WO, self._X_OB)
+        poses = candidate_poses(self._grid, centre, radius_m)
+        few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // 120)])
+        best = poses[np.argsort(-score_poses(self._grid, few, poses), kind="stable")[:20]]
+        spread = np.diag([0.2**2, 0.2**2, 0.15**2])
+        matches = [match(self._grid, points_F, Pose2D(*pose), spread, options.matching) for pose in best.tolist()]
+        found = max(matches, key=lambda m: m.inlier_share, default=None)
+        if found is None or found.inlier_share < options.found_share:
+            return False
+        self._believe(found)
+        self._poor_scans, self._localised = 0, True
+        return True
+
+
+def candidate_poses(grid: GridMap, centre: Pose2D, radius_m: float | None) -> FloatArray:
+    """Poses (K, 3) in the open, 0.2 m and 10 degrees apart, within radius_m of a pose, or on the whole grid (None).
+
+    With a radius, headings stay within 60 degrees of the centre's.
+    """
+    low, size = np.array(grid.origin_m), np.array(grid.size_m)
+    high = low + size
+    if radius_m is not None:
+        middle = np.array([centre.x_m, centre.y_m])
+        low, high = np.maximum(low, middle - radius_m), np.minimum(high, middle + radius_m)
+    x, y = (np.arange(low[axis], high[axis] + 0.2, 0.2) for axis in (0, 1))
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    places = places[grid.distance_m(places) > 0.1]
+    turns = np.deg2rad(np.arange(-180.0, 180.0, 10.0) if radius_m is None else np.arange(-60.0, 61.0, 10.0))
+    yaws = centre.yaw_rad + turns
+    return np.column_stack([np.repeat(places, len(yaws), axis=0), np.tile(yaws, len(places))])

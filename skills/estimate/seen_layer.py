@@ -1,0 +1,100 @@
+"""Marking and clearing of the cells that the LiDAR sees blocked."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.estimate.compiled import compiled
+
+FloatArray = NDArray[np.float64]
+
+
+class Beams(NamedTuple):
+    """One whole revolution with evenly spaced azimuths: ranges_m[ring, azimuth] and the angles, as in `Scan`."""
+
+    ranges_m: NDArray[np.float32]
+    elevations_rad: FloatArray
+    azimuths_rad: FloatArray
+
+
+def clear_cells(
+    beams: Beams, centres_F: FloatArray, rotation: FloatArray, translation: FloatArray, cell_m: float
+) -> NDArray[np.bool_]:
+    """Whether the beams see past each place (N, 3) at its height.
+
+    A place counts as free when all beams that could have hit it go on for 0.3 m at least; a place that no beam can hit
+    (too low, too near) is left as it is. `rotation` and `translation` are those of the LiDAR's pose in frame F.
+    """
+    places_L = np.ascontiguousarray((centres_F - translation) @ rotation)
+    ranges = np.ascontiguousarray(beams.ranges_m)
+    return _clear(ranges, beams.elevations_rad, beams.azimuths_rad, places_L, cell_m)
+
+
+@compiled
+def _clear(
+    ranges: NDArray[np.float32],
+    elevations: FloatArray,
+    azimuths: FloatArray,
+    places: FloatArray,
+    cell_m: float,
+) -> NDArray[np.bool_]:
+    """The loop of `clear_cells`."""
+    count = azimuths.shape[0]
+    spacing = azimuths[1] - azimuths[0]
+    ring_gap = abs(elevations[1] - elevations[0])
+    lowest, highest = elevations.min(), elevations.max()
+    free = np.zeros(places.shape[0], dtype=np.bool_)
+    for n in range(places.shape[0]):
+        x, y, z = places[n, 0], places[n, 1], places[n, 2]
+        flat = math.hypot(x, y)
+        reach = math.hypot(flat, z)
+        elevation = math.atan2(z, flat)
+        if not lowest <= elevation <= highest:
+            continue
+        middle = round((math.atan2(y, x) - azimuths[0]) / spacing)
+        half = math.ceil(cell_m / max(flat, 0.3) / abs(spacing))
+        looked, blocked = 0, False
+        for i in range(elevations.shape[0]):
+            if abs(elevations[i] - elevation) > ring_gap:
+                continue
+            for j in range(middle - half, middle + half + 1):
+                r = ranges[i, j % count]
+                if not r > reach + 0.3:
+                    blocked = True
+                looked += 1
+        free[n] = looked > 0 and not blocked
+    return free
+
+
+@compiled
+def mark_cells(
+    cells: NDArray[np.int64],
+    heights: FloatArray,
+    times: tuple[float, float, float],
+    candidate_s: FloatArray,
+    until_s: FloatArray,
+    height_m: FloatArray,
+) -> bool:
+    """Mark hit cells in place; True when any cell became blocked that was not.
+
+    `times` is the scan's stamp, within how long another scan must have hit the cell or a neighbour, and how long a
+    blocked cell is remembered (s).
+    """
+    stamp, confirm, memory = times
+    rows, columns = until_s.shape
+    changed = False
+    for n in range(cells.shape[0]):
+        i, j = cells[n, 0], cells[n, 1]
+        for a in range(max(0, i - 1), min(rows, i + 2)):
+            for b in range(max(0, j - 1), min(columns, j + 2)):
+                if stamp - confirm <= candidate_s[a, b] < stamp:
+                    changed |= until_s[i, j] <= stamp
+                    until_s[i, j] = stamp + memory
+                    height_m[i, j] = heights[n]
+    for n in range(cells.shape[0]):
+        candidate_s[cells[n, 0], cells[n, 1]] = stamp
+    return changed

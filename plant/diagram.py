@@ -1,0 +1,109 @@
+"""Builds the Drake Diagram of a world with its robots, people and loose objects."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydrake.geometry import GeometryId, GeometrySet, MakeRenderEngineVtk, RenderEngineVtkParams, Role, SceneGraph
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import LoadModelDirectives, Parser, ProcessModelDirectives
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from plant.spot.model import SpotModel
+
+RENDERER = "vtk"
+TIME_STEP_S = 0.005
+PACKAGE = "errand"
+
+
+@dataclass(frozen=True)
+class LooseModel:
+    """A model put into the world at the beginning: X_WM is the pose of its base; a fixed one is welded there."""
+
+    name: str
+    path: Path
+    X_WM: RigidTransform
+    fixed: bool = False
+
+
+@dataclass(frozen=True)
+class WorldDiagram:
+    """The finished Diagram and handles to its parts."""
+
+    diagram: Diagram
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    robots: Mapping[str, SpotModel]
+    models: Mapping[str, ModelInstanceIndex]
+
+
+def build_diagram(
+    *,
+    directives: Path | None,
+    models: Sequence[LooseModel],
+    robot_names: Sequence[str],
+    looks: bool = True,
+    carried: bool = True,
+    render: bool = True,
+    time_step_s: float = TIME_STEP_S,
+) -> WorldDiagram:
+    """A Diagram of the directives' world (or an empty one) with models and robots.
+
+    SAP contact at `time_step_s`; positions of the models are defaults of the plant, the robots' are set by the caller.
+    `looks` draws Spot with meshes where they are installed; `render` adds the renderer named `RENDERER`.
+    """
+    if not any(isinstance(each, _MissingMaterials) for each in logging.getLogger("drake").filters):
+        logging.getLogger("drake").addFilter(_MissingMaterials())
+    builder = DiagramBuilder()
+    config = MultibodyPlantConfig(time_step=time_step_s, discrete_contact_approximation="sap")
+    plant, scene_graph = AddMultibodyPlant(config, builder)
+    if render:
+        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams()))
+    parser = Parser(plant)
+    parser.SetAutoRenaming(True)
+    parser.package_map().Add(PACKAGE, str(Path(__file__).parent))
+    if directives is not None:
+        ProcessModelDirectives(LoadModelDirectives(str(directives)), parser)
+    instances = {model.name: _add_model(plant, parser, model) for model in models}
+    robots = {name: SpotModel(plant, name, looks=looks, carried=carried) for name in sorted(robot_names)}
+    plant.Finalize()
+    for model in models:
+        if not model.fixed:
+            (body,) = plant.GetBodyIndices(instances[model.name])[:1]
+            plant.SetDefaultFloatingBaseBodyPose(plant.get_body(body), model.X_WM)
+    filters = scene_graph.collision_filter_manager()
+    floor = GeometrySet(_floor_geometries(plant, scene_graph))
+    for robot in robots.values():
+        robot.filter_collisions(filters, floor)
+    return WorldDiagram(builder.Build(), plant, scene_graph, robots, instances)
+
+
+class _MissingMaterials(logging.Filter):
+    """Drops Drake's warnings on material files that the looks' OBJ files name and do not need: the URDF colours them."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """False for such a warning."""
+        message = record.getMessage()
+        return not ("material" in message and ".mtl" in message)
+
+
+def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> ModelInstanceIndex:
+    instance: ModelInstanceIndex
+    (instance,) = parser.AddModels(str(model.path))
+    plant.RenameModelInstance(instance, model.name)
+    if model.fixed:
+        (body,) = plant.GetBodyIndices(instance)[:1]
+        plant.WeldFrames(plant.world_frame(), plant.get_body(body).body_frame(), model.X_WM)
+    return instance
+
+
+def _floor_geometries(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[GeometryId]:
+    """Collision shapes whose name says that they are floor."""
+    inspector = scene_graph.model_inspector()
+    every = inspector.GetAllGeometryIds(Role.kProximity)
+    return [geometry for geometry in every if "floor" in inspector.GetName(geometry).split("::")[-1]]

@@ -1,0 +1,162 @@
+"""The carrier that bears the body until the legs do: five joints of one degree of freedom with effort limits.
+
+World -> prismatic x -> prismatic y -> revolute yaw -> prismatic height -> revolute pitch -> weld -> body.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    JointActuator,
+    ModelInstanceIndex,
+    PdControllerGains,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    SpatialInertia,
+)
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context
+
+from skills.robot import Pose2D
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CarrierLimits:
+    """What the carrier can do; forces in N, torques in N m."""
+
+    speed_m_s: float = 1.6
+    turn_rate_rad_s: float = 2.0
+    acceleration_m_s2: float = 2.0
+    turn_acceleration_rad_s2: float = 4.0
+    posture_speed_m_s: float = 0.25
+    pitch_rate_rad_s: float = 0.6
+    force_n: float = 250.0
+    torque_nm: float = 120.0
+    lift_n: float = 900.0
+    pitch_torque_nm: float = 250.0
+    lead_m: float = 0.01
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """A planar velocity in the body frame: m/s, m/s, rad/s."""
+
+    vx: float = 0.0
+    vy: float = 0.0
+    wz: float = 0.0
+
+
+_AXES = ("x", "y", "yaw", "height", "pitch")
+_GAINS = {"x": (8e3, 2e3), "y": (8e3, 2e3), "yaw": (2e3, 4e2), "height": (6e4, 3e3), "pitch": (8e3, 4e2)}
+
+
+class Carrier:
+    """Bears one robot's body and drives it to a velocity and a posture with limited force and acceleration."""
+
+    def __init__(self, plant: MultibodyPlant, name: str, body: RigidBody, limits: CarrierLimits | None = None) -> None:
+        """Add the joints to `plant` (before Finalize) and weld `body` to the last of them."""
+        self._plant = plant
+        self._limits = limits or CarrierLimits()
+        self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_carrier")
+        self._joints = self._add_joints(name, body)
+        self._velocity = Velocity()
+        self._target = np.zeros(5)
+        self._posture = np.zeros(2)
+
+    def _add_joints(self, name: str, body: RigidBody) -> Sequence[PrismaticJoint | RevoluteJoint]:
+        directions = {"x": [1, 0, 0], "y": [0, 1, 0], "yaw": [0, 0, 1], "height": [0, 0, 1], "pitch": [0, 1, 0]}
+        efforts = self._efforts()
+        parent = self._plant.world_body()
+        joints = []
+        for axis in _AXES:
+            is_last = axis == _AXES[-1]
+            child = body if is_last else self._plant.AddRigidBody(
+                f"{name}_carrier_{axis}", self.instance, SpatialInertia.SolidSphereWithMass(0.05, 0.05)
+            )
+            kind = RevoluteJoint if axis in ("yaw", "pitch") else PrismaticJoint
+            frame_on_parent = self._plant.AddFrame(
+                FixedOffsetFrame(f"{name}_carrier_{axis}_F", parent.body_frame(), RigidTransform(), self.instance)
+            )
+            frame_on_child = self._plant.AddFrame(
+                FixedOffsetFrame(f"{name}_carrier_{axis}_M", child.body_frame(), RigidTransform(), self.instance)
+            )
+            joint = self._plant.AddJoint(kind(f"{name}_carrier_{axis}", frame_on_parent, frame_on_child, directions[axis]))
+            actuator: JointActuator = self._plant.AddJointActuator(f"{name}_carrier_{axis}", joint, efforts[axis])
+            actuator.set_controller_gains(PdControllerGains(p=_GAINS[axis][0], d=_GAINS[axis][1]))
+            joints.append(joint)
+            parent = child
+        return joints
+
+    def _efforts(self) -> dict[str, float]:
+        limits = self._limits
+        return {
+            "x": limits.force_n,
+            "y": limits.force_n,
+            "yaw": limits.torque_nm,
+            "height": limits.lift_n,
+            "pitch": limits.pitch_torque_nm,
+        }
+
+    @property
+    def velocity(self) -> Velocity:
+        """The velocity that is being commanded now, after the acceleration limit."""
+        return self._velocity
+
+    def place(self, context: Context, pose: Pose2D, height_m: float) -> None:
+        """Set the body's pose at the beginning of a run."""
+        values = (pose.x_m, pose.y_m, pose.yaw_rad, height_m, 0.0)
+        for joint, value in zip(self._joints, values, strict=True):
+            self._plant.SetPositions(context, self._positions_with(context, joint, value))
+        self._target = np.array(values)
+        self._posture = np.array([height_m, 0.0])
+
+    def _positions_with(self, context: Context, joint: PrismaticJoint | RevoluteJoint, value: float) -> FloatArray:
+        positions: FloatArray = self._plant.GetPositions(context)
+        positions[joint.position_start()] = value
+        return positions
+
+    def state(self, positions: FloatArray) -> FloatArray:
+        """(x, y, yaw, height, pitch) out of the plant's positions."""
+        return np.array([positions[joint.position_start()] for joint in self._joints])
+
+    def control(self, context: Context, state: FloatArray, wanted: Velocity, posture: Sequence[float], dt_s: float) -> None:
+        """Command the joints for the next dt_s: ramp to `wanted` (body frame) and to the posture (height, pitch)."""
+        self._velocity = self._ramp(wanted, dt_s)
+        yaw = state[2]
+        c, s = math.cos(yaw), math.sin(yaw)
+        v = self._velocity
+        rates = np.array([c * v.vx - s * v.vy, s * v.vx + c * v.vy, v.wz])
+        lead = np.array([self._limits.lead_m, self._limits.lead_m, self._limits.lead_m])
+        self._target[:3] = np.clip(self._target[:3] + rates * dt_s, state[:3] - lead, state[:3] + lead)
+        steps = np.array([self._limits.posture_speed_m_s, self._limits.pitch_rate_rad_s]) * dt_s
+        move = np.clip(np.asarray(posture) - self._posture, -steps, steps)
+        self._posture = self._posture + move
+        self._target[3:] = self._posture
+        desired = np.concatenate([self._target, rates, move / dt_s])
+        self._plant.get_desired_state_input_port(self.instance).FixValue(context, desired)
+        self._plant.get_actuation_input_port(self.instance).FixValue(context, np.zeros(5))
+
+    def _ramp(self, wanted: Velocity, dt_s: float) -> Velocity:
+        limits, now = self._limits, self._velocity
+        goal = np.array([wanted.vx, wanted.vy])
+        speed = float(np.linalg.norm(goal))
+        if speed > limits.speed_m_s:
+            goal *= limits.speed_m_s / speed
+        change = goal - [now.vx, now.vy]
+        size, most = float(np.linalg.norm(change)), limits.acceleration_m_s2 * dt_s
+        if size > most:
+            change *= most / size
+        turn_goal = float(np.clip(wanted.wz, -limits.turn_rate_rad_s, limits.turn_rate_rad_s))
+        turn_most = limits.turn_acceleration_rad_s2 * dt_s
+        turn = float(np.clip(turn_goal - now.wz, -turn_most, turn_most))
+        return Velocity(now.vx + float(change[0]), now.vy + float(change[1]), now.wz + turn)

@@ -1,0 +1,1 @@
+"""The simulated Spot behind the Robot protocol."""

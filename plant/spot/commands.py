@@ -1,0 +1,79 @@
+"""The robot's command book: ids, states and expiry."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from skills.robot import CommandId, CommandState, CommandStatus
+
+PayloadT = TypeVar("PayloadT")
+
+
+class Part(enum.Enum):
+    """What a command moves; one command at a time each."""
+
+    VELOCITY = "velocity"
+    POSTURE = "posture"
+    ARM = "arm"
+    GRIPPER = "gripper"
+
+
+@dataclass(frozen=True)
+class Active(Generic[PayloadT]):
+    """A command that runs: what it asks for, since when and until when (robot's clock, s)."""
+
+    id: CommandId
+    payload: PayloadT
+    since_s: float
+    until_s: float
+
+
+class CommandBook:
+    """All commands ever given and the running one of each part."""
+
+    def __init__(self) -> None:
+        self._statuses: dict[CommandId, CommandStatus] = {}
+        self._running: dict[Part, Active[object]] = {}
+
+    def begin(self, part: Part, payload: object, now_s: float, until_s: float) -> CommandId:
+        """Start a command in place of the part's running one."""
+        command = self._new_id()
+        self.finish(part, CommandState.STOPPED, f"replaced by command {command}")
+        self._statuses[command] = CommandStatus(CommandState.RUNNING)
+        self._running[part] = Active(command, payload, now_s, until_s)
+        return command
+
+    def refuse(self, reason: str) -> CommandId:
+        """A command that never started."""
+        command = self._new_id()
+        self._statuses[command] = CommandStatus(CommandState.REFUSED, reason)
+        return command
+
+    def note(self, state: CommandState, reason: str = "") -> CommandId:
+        """A command that is over as soon as it is given."""
+        command = self._new_id()
+        self._statuses[command] = CommandStatus(state, reason)
+        return command
+
+    def finish(self, part: Part, state: CommandState, reason: str = "") -> None:
+        """End the part's running command, if any."""
+        active = self._running.pop(part, None)
+        if active is not None:
+            self._statuses[active.id] = CommandStatus(state, reason)
+
+    def running(self, part: Part) -> Active[object] | None:
+        """The part's running command."""
+        return self._running.get(part)
+
+    def part_of(self, command: CommandId) -> Part | None:
+        """The part that runs `command` now, or None."""
+        return next((part for part, active in self._running.items() if active.id == command), None)
+
+    def status(self, command: CommandId) -> CommandStatus:
+        """State of a command. Raises KeyError for an id never given."""
+        return self._statuses[command]
+
+    def _new_id(self) -> CommandId:
+        return CommandId(len(self._statuses) + 1)

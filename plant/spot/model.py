@@ -1,0 +1,123 @@
+"""One Spot inside a MultibodyPlant: the model, its servos' gains, and where its joints stand in the state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import CollisionFilterDeclaration, CollisionFilterManager, GeometryId, GeometrySet
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RevoluteJoint
+from pydrake.systems.framework import Context
+
+from plant.locomotion.carrier import Carrier
+from plant.models.spot.description import (
+    LEGS,
+    LOOKS_PACKAGE,
+    arm_joint_names,
+    leg_joint_names,
+    looks_folder,
+    spot_facts,
+    spot_urdf,
+)
+from skills.robot import Pose2D
+
+FloatArray = NDArray[np.float64]
+JAW = "arm_f1x"
+_LEG_GAINS = (600.0, 12.0)
+_ARM_GAINS = {
+    "arm_sh0": (900.0, 45.0),
+    "arm_sh1": (1500.0, 75.0),
+    "arm_el0": (900.0, 45.0),
+    "arm_el1": (300.0, 12.0),
+    "arm_wr0": (300.0, 12.0),
+    "arm_wr1": (200.0, 6.0),
+    JAW: (60.0, 0.8),
+}
+
+
+class SpotModel:
+    """Spot's bodies, joints and carrier in a plant."""
+
+    def __init__(self, plant: MultibodyPlant, name: str, *, looks: bool, carried: bool = True) -> None:
+        """Add the robot to `plant` (before Finalize); a robot that is not carried keeps its free base."""
+        self.plant = plant
+        self.name = name
+        parser = Parser(plant)
+        parser.SetAutoRenaming(True)
+        meshes = looks_folder() if looks else None
+        if meshes is not None:
+            parser.package_map().Add(LOOKS_PACKAGE, str(meshes))
+        (self.instance,) = parser.AddModelsFromString(spot_urdf(looks=meshes is not None), "urdf")
+        plant.RenameModelInstance(self.instance, name)
+        self.body = plant.GetBodyByName("body", self.instance)
+        self.carrier = Carrier(plant, name, self.body) if carried else None
+        for joint, (p, d) in self._gains().items():
+            plant.GetJointActuatorByName(joint, self.instance).set_controller_gains(PdControllerGains(p=p, d=d))
+
+    def _gains(self) -> Mapping[str, tuple[float, float]]:
+        legs = {joint: _LEG_GAINS for leg in LEGS for joint in leg_joint_names(leg)}
+        return {**legs, **_ARM_GAINS}
+
+    def index(self) -> JointIndex:
+        """Where the joints stand in the plant's state and in the instance's actuation; after Finalize."""
+        return JointIndex(self.plant, self.instance)
+
+    def instances(self) -> tuple[ModelInstanceIndex, ...]:
+        """The model instances that make up this robot."""
+        return (self.instance,) if self.carrier is None else (self.instance, self.carrier.instance)
+
+    def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
+        """Let links of this robot pass each other, and its legs the floor while it is carried."""
+        filters.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(self.geometries())))
+        if self.carrier is not None:
+            legs = [geometry for leg in LEGS for geometry in self.geometries(leg)]
+            filters.Apply(CollisionFilterDeclaration().ExcludeBetween(GeometrySet(legs), floor))
+
+    def geometries(self, prefix: str = "") -> list[GeometryId]:
+        """Collision geometries of the links whose names begin with `prefix`."""
+        found: list[GeometryId] = []
+        for index in self.plant.GetBodyIndices(self.instance):
+            body = self.plant.get_body(index)
+            if body.name().startswith(prefix):
+                found.extend(self.plant.GetCollisionGeometriesForBody(body))
+        return found
+
+    def place(self, context: Context, pose: Pose2D) -> None:
+        """Set the robot standing at a pose with its arm stowed."""
+        facts = spot_facts()
+        for leg in LEGS:
+            for joint in leg_joint_names(leg):
+                self._joint(joint).set_angle(context, facts["legs"]["standing"][joint[-2:]])
+        for joint, angle in facts["stowed"].items():
+            self._joint(joint).set_angle(context, angle)
+        height = facts["capabilities"]["standing_height"]
+        if self.carrier is not None:
+            self.carrier.place(context, pose, height)
+        else:
+            self.plant.SetFreeBodyPose(context, self.body, pose.transform(height))
+
+    def _joint(self, name: str) -> RevoluteJoint:
+        joint: RevoluteJoint = self.plant.GetJointByName(name, self.instance)
+        return joint
+
+
+class JointIndex:
+    """Index arrays of a Spot's joints: into the plant's positions and velocities, in the order of its actuators."""
+
+    def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
+        actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices(instance)]
+        joints = [actuator.joint() for actuator in actuators]
+        self.names = tuple(joint.name() for joint in joints)
+        self.positions = np.array([joint.position_start() for joint in joints])
+        self.velocities = np.array([joint.velocity_start() for joint in joints])
+        self.efforts = np.array([actuator.effort_limit() for actuator in actuators])
+        self.lower = np.array([joint.position_lower_limits()[0] for joint in joints])
+        self.upper = np.array([joint.position_upper_limits()[0] for joint in joints])
+        self.arm = np.array([self.names.index(name) for name in arm_joint_names()])
+        self.jaw = self.names.index(JAW)
+        self.legs = np.array([[self.names.index(joint) for joint in leg_joint_names(leg)] for leg in LEGS])
+        self.jaw_gain = _ARM_GAINS[JAW][0]
+

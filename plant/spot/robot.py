@@ -1,0 +1,377 @@
+"""The simulated Spot behind the Robot protocol."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context
+
+from plant.locomotion.carrier import Velocity
+from plant.locomotion.trot import BodyMotion, Trot
+from plant.models.spot.description import LEGS, spot_facts, spot_urdf
+from plant.spot.commands import CommandBook, Part
+from plant.spot.leases import LeaseDesk
+from plant.spot.model import JAW, SpotModel
+from plant.spot.sensing import SpotSensors
+from plant.spot.servos import JawGoal, LegServos, arm_set_point, jaw_set_point
+from skills.robot import (
+    ArmCapabilities,
+    ArmTrajectory,
+    Battery,
+    Capabilities,
+    CommandId,
+    CommandState,
+    CommandStatus,
+    Gripper,
+    GripperCapabilities,
+    Image,
+    Imu,
+    Joints,
+    Lease,
+    Odometry,
+    Scan,
+)
+
+FloatArray = NDArray[np.float64]
+_ARM_ARRIVED_RAD = 0.03
+_ARM_STILL_RAD_S = 0.06
+_MAX_ARM_RATE_RAD_S = 4.0
+_TRAJECTORY_START_RAD = 0.25
+_JAW_ARRIVED_RAD = 0.03
+_JAW_STALL_RAD_S = 0.03
+_JAW_STALL_S = 0.25
+_JAW_HELD_FORCE_N = 20.0
+
+
+class SpotRobot:
+    """One Spot: takes commands under a lease and turns them into set points of the plant's servos."""
+
+    def __init__(self, model: SpotModel, sensors: SpotSensors, context: Context) -> None:
+        """Take over the robot as it stands in the plant's `context` at time 0."""
+        self._model = model
+        self._sensors = sensors
+        self._context = context
+        self._index = model.index()
+        self._book = CommandBook()
+        self._desk = LeaseDesk(model.name)
+        self._now_s = 0.0
+        positions = self._positions()
+        joints = positions[self._index.positions]
+        self._arm_hold = joints[self._index.arm]
+        self._arm_rate = np.zeros(len(self._arm_hold))
+        self._jaw_goal = JawGoal(max(0.0, -float(joints[self._index.jaw])), 20.0)
+        self._jaw_still_s = 0.0
+        self._posture = (float(spot_facts()["capabilities"]["standing_height"]), 0.0)
+        self._leg_servos = LegServos(self._index, joints[self._index.legs])
+        self._trot = Trot(nominal_footholds())
+        self._trot.reset(self._motion())
+        self._capabilities = spot_capabilities()
+
+    # -- know and sense -------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self._model.name
+
+    def capabilities(self) -> Capabilities:
+        """What this Spot is and can do."""
+        return self._capabilities
+
+    def odometry(self) -> Odometry:
+        """Latest dead reckoning."""
+        return self._sensors.odometry()
+
+    def imu(self) -> Imu:
+        """Latest inertial measurement."""
+        return self._sensors.imu()
+
+    def scan(self) -> Scan | None:
+        """Latest LiDAR revolution, None before the first."""
+        return self._sensors.scan()
+
+    def image(self, source: str) -> Image:
+        """Take a picture now. Raises ValueError for an unknown source."""
+        return self._sensors.image(source)
+
+    def joints(self) -> Joints:
+        """Latest joint state."""
+        return self._sensors.joints()
+
+    def gripper(self) -> Gripper:
+        """Latest gripper state; `holding` means that the jaw pushes and does not move, well before it is closed."""
+        return self._sensors.gripper(self._holding())
+
+    def battery(self) -> Battery:
+        """Latest battery state."""
+        return self._sensors.battery()
+
+    def faults(self) -> tuple[str, ...]:
+        """Present faults, empty when well."""
+        return ()
+
+    # -- act ------------------------------------------------------------------------------------------------------
+
+    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Walk at a body-frame velocity until the clock reads until_s."""
+        if not all(math.isfinite(value) for value in (vx, vy, wz)):
+            return self._book.refuse(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
+        if self._posture[0] < spot_facts()["capabilities"]["height_range"][0] - 0.02:
+            return self._book.refuse("drive: the robot sits; stand up first")
+        return self._begin(Part.VELOCITY, Velocity(vx, vy, wz), until_s, lease)
+
+    def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Hold the body origin at a height above the floor and a pitch."""
+        low, high = self._capabilities.height_range_m
+        least, most = self._capabilities.pitch_range_rad
+        if not (low <= height_m <= high and least <= pitch_rad <= most):
+            return self._book.refuse(
+                f"stand: height {height_m:.2f} m must lie in [{low}, {high}] and pitch {pitch_rad:.2f} in [{least}, {most}]"
+            )
+        return self._begin(Part.POSTURE, (height_m, pitch_rad), until_s, lease)
+
+    def sit(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Lower the body to the floor; driving stops."""
+        command = self._begin(Part.POSTURE, (spot_facts()["capabilities"]["sitting_height"], 0.0), until_s, lease)
+        if self._book.status(command).state is CommandState.RUNNING:
+            self._book.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down")
+        return command
+
+    def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
+        """Follow a joint trajectory; done when its end is reached and the arm is still."""
+        reason = self._trajectory_refusal(trajectory)
+        return self._book.refuse(reason) if reason else self._begin(Part.ARM, trajectory, until_s, lease)
+
+    def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Move the jaw to an opening with at most force_n at its tip; the force stays after the command's end."""
+        gripper = spot_facts()["gripper"]
+        if not (0.0 <= opening_rad <= gripper["open"] and 0.0 < force_n <= gripper["max_force"]):
+            return self._book.refuse(
+                f"set_gripper: opening {opening_rad:.2f} rad must lie in [0, {gripper['open']}] "
+                f"and force {force_n:.0f} N in (0, {gripper['max_force']}]"
+            )
+        command = self._begin(Part.GRIPPER, JawGoal(opening_rad, force_n), until_s, lease)
+        if self._book.status(command).state is CommandState.RUNNING:
+            self._jaw_goal = JawGoal(opening_rad, force_n)
+            self._jaw_still_s = 0.0
+        return command
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        """Stop all motion, or only the given command if it still runs."""
+        refusal = self._desk.refusal(lease)
+        if refusal:
+            return self._book.refuse(f"stop: {refusal}")
+        part = self._book.part_of(only) if only is not None else None
+        for candidate in Part if only is None else ([part] if part else []):
+            self._halt(candidate, "stopped by command")
+        return self._book.note(CommandState.DONE)
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        """What became of a command. Raises KeyError for an id never given."""
+        return self._book.status(command)
+
+    # -- own ------------------------------------------------------------------------------------------------------
+
+    def acquire_lease(self, holder: str) -> Lease:
+        """Take a free lease. Raises LeaseError when another holds it."""
+        return self._desk.acquire(holder)
+
+    def take_lease(self, holder: str) -> Lease:
+        """Take the lease from whoever holds it; the robot stops."""
+        self._halt_all("the lease was taken by " + repr(holder))
+        return self._desk.take(holder)
+
+    def return_lease(self, lease: Lease) -> None:
+        """Give the lease back; the robot stops. A lease that was taken away is ignored."""
+        if self._desk.give_back(lease):
+            self._halt_all("the lease was returned")
+
+    # -- called by the simulation ---------------------------------------------------------------------------------
+
+    def control(self, now_s: float, dt_s: float) -> None:
+        """Command all servos for the next dt_s of simulated time."""
+        self._now_s = now_s
+        self._expire()
+        plant, positions = self._model.plant, self._positions()
+        joints = positions[self._index.positions]
+        rates = plant.GetVelocities(self._context)[self._index.velocities]
+        self._follow_up(joints, rates, dt_s)
+        desired, desired_rates = joints.copy(), np.zeros(len(joints))
+        desired[self._index.arm], desired_rates[self._index.arm] = self._arm_hold, self._arm_rate
+        desired[self._index.jaw] = jaw_set_point(
+            self._jaw_goal,
+            float(joints[self._index.jaw]),
+            self._index.jaw_gain,
+            spot_facts()["gripper"]["tip_radius"],
+        )
+        self._drive_body(positions, dt_s)
+        legs, leg_rates = self._legs(dt_s)
+        desired[self._index.legs], desired_rates[self._index.legs] = legs, leg_rates
+        gravity = -plant.CalcGravityGeneralizedForces(self._context)[self._index.velocities]
+        instance = self._model.instance
+        plant.get_desired_state_input_port(instance).FixValue(self._context, np.concatenate([desired, desired_rates]))
+        feed_forward = np.clip(gravity, -self._index.efforts, self._index.efforts)
+        plant.get_actuation_input_port(instance).FixValue(self._context, feed_forward)
+
+    def sense(self, now_s: float) -> None:
+        """Take new sensor readings."""
+        self._now_s = now_s
+        self._sensors.update(now_s)
+
+    # -- inside ---------------------------------------------------------------------------------------------------
+
+    def _begin(self, part: Part, payload: object, until_s: float, lease: Lease) -> CommandId:
+        refusal = self._desk.refusal(lease)
+        if refusal:
+            return self._book.refuse(f"{part.value}: {refusal}")
+        if until_s <= self._now_s:
+            return self._book.refuse(f"{part.value}: expires at {until_s:.2f} s, and it is {self._now_s:.2f} s already")
+        return self._book.begin(part, payload, self._now_s, until_s)
+
+    def _trajectory_refusal(self, trajectory: ArmTrajectory) -> str | None:
+        positions = trajectory.positions_rad
+        if positions.shape[1] != len(self._index.arm):
+            return f"move_arm: {positions.shape[1]} joints given, the arm has {len(self._index.arm)}"
+        lower, upper = self._index.lower[self._index.arm] - 1e-3, self._index.upper[self._index.arm] + 1e-3
+        if np.any(positions < lower) or np.any(positions > upper):
+            return "move_arm: the trajectory leaves the joint limits"
+        if np.any(np.abs(positions[0] - self._arm_hold) > _TRAJECTORY_START_RAD):
+            return "move_arm: the trajectory begins away from where the arm is"
+        rates = np.abs(np.diff(positions, axis=0)) / np.diff(trajectory.times_s)[:, None]
+        if rates.size and rates.max() > _MAX_ARM_RATE_RAD_S:
+            return f"move_arm: a joint would move at {rates.max():.1f} rad/s; at most {_MAX_ARM_RATE_RAD_S} is allowed"
+        return None
+
+    def _halt_all(self, reason: str) -> None:
+        for part in Part:
+            self._halt(part, reason)
+
+    def _halt(self, part: Part, reason: str) -> None:
+        if part is Part.ARM and self._book.running(part) is not None:
+            joints = self._positions()[self._index.positions]
+            self._arm_hold, self._arm_rate = joints[self._index.arm], np.zeros(len(self._index.arm))
+        self._book.finish(part, CommandState.STOPPED, reason)
+
+    def _expire(self) -> None:
+        for part in Part:
+            active = self._book.running(part)
+            if active is None or self._now_s < active.until_s - 1e-9:
+                continue
+            if part is Part.VELOCITY:
+                self._book.finish(part, CommandState.DONE)
+            else:
+                self._halt(part, "expired before it was done")
+
+    def _follow_up(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> None:
+        self._follow_arm(joints, rates)
+        self._follow_jaw(joints, rates, dt_s)
+        posture = self._book.running(Part.POSTURE)
+        if posture is not None and isinstance(posture.payload, tuple):
+            self._posture = posture.payload
+            height, pitch = self._carrier_state()[3:]
+            if abs(height - self._posture[0]) < 0.01 and abs(pitch - self._posture[1]) < 0.02:
+                self._book.finish(Part.POSTURE, CommandState.DONE)
+
+    def _follow_arm(self, joints: FloatArray, rates: FloatArray) -> None:
+        active = self._book.running(Part.ARM)
+        self._arm_rate = np.zeros(len(self._index.arm))
+        if active is None or not isinstance(active.payload, ArmTrajectory):
+            return
+        trajectory, elapsed = active.payload, self._now_s - active.since_s
+        self._arm_hold, self._arm_rate = arm_set_point(trajectory, elapsed)
+        if elapsed < trajectory.times_s[-1]:
+            return
+        off = np.abs(joints[self._index.arm] - trajectory.positions_rad[-1]).max()
+        if off < _ARM_ARRIVED_RAD and np.abs(rates[self._index.arm]).max() < _ARM_STILL_RAD_S:
+            self._book.finish(Part.ARM, CommandState.DONE)
+
+    def _follow_jaw(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> None:
+        opening, rate = -float(joints[self._index.jaw]), abs(float(rates[self._index.jaw]))
+        self._jaw_still_s = self._jaw_still_s + dt_s if rate < _JAW_STALL_RAD_S else 0.0
+        if self._book.running(Part.GRIPPER) is None:
+            return
+        arrived = abs(opening - self._jaw_goal.opening_rad) < _JAW_ARRIVED_RAD
+        if arrived or self._jaw_still_s > _JAW_STALL_S:
+            self._book.finish(Part.GRIPPER, CommandState.DONE, "" if arrived else "stopped by a thing in the jaw")
+
+    def _holding(self) -> bool:
+        opening = -float(self._positions()[self._index.positions[self._index.jaw]])
+        pushes = opening - self._jaw_goal.opening_rad > 2 * _JAW_ARRIVED_RAD
+        return pushes and self._jaw_still_s > _JAW_STALL_S
+
+    def _drive_body(self, positions: FloatArray, dt_s: float) -> None:
+        carrier = self._model.carrier
+        if carrier is None:
+            return
+        active = self._book.running(Part.VELOCITY)
+        wanted = active.payload if active is not None and isinstance(active.payload, Velocity) else Velocity()
+        carrier.control(self._context, carrier.state(positions), wanted, self._posture, dt_s)
+
+    def _legs(self, dt_s: float) -> tuple[FloatArray, FloatArray]:
+        motion = self._motion()
+        feet_W = self._trot.step(motion, dt_s)
+        x, y, yaw = motion.ahead(dt_s)
+        X_WB = self._model.plant.EvalBodyPoseInWorld(self._context, self._model.body)
+        ahead = BodyMotion(x, y, yaw, 0.0, 0.0, 0.0)
+        X_WB_ahead = _moved(X_WB, motion, ahead)
+        return self._leg_servos.set_points(X_WB_ahead, feet_W, dt_s)
+
+    def _motion(self) -> BodyMotion:
+        x, y, yaw = self._carrier_state()[:3]
+        carrier = self._model.carrier
+        velocity = carrier.velocity if carrier is not None else Velocity()
+        return BodyMotion(float(x), float(y), float(yaw), velocity.vx, velocity.vy, velocity.wz)
+
+    def _carrier_state(self) -> FloatArray:
+        carrier = self._model.carrier
+        return carrier.state(self._positions()) if carrier is not None else np.zeros(5)
+
+    def _positions(self) -> FloatArray:
+        positions: FloatArray = self._model.plant.GetPositions(self._context)
+        return positions
+
+
+def _moved(X_WB: RigidTransform, before: BodyMotion, after: BodyMotion) -> RigidTransform:
+    """The body's pose after the planar motion from `before` to `after`, at the same height and tilt."""
+    X_WP = RigidTransform(_planar(before))
+    X_WQ = RigidTransform(_planar(after))
+    return X_WQ @ X_WP.inverse() @ X_WB
+
+
+def _planar(motion: BodyMotion) -> RigidTransform:
+    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+    return RigidTransform(np.array([[c, -s, 0, motion.x_m], [s, c, 0, motion.y_m], [0, 0, 1, 0], [0, 0, 0, 1]]))
+
+
+def nominal_footholds() -> FloatArray:
+    """Resting places of the feet in the body frame, (4, 2), ordered as LEGS."""
+    facts = spot_facts()["legs"]
+    x = facts["hip"]["offset"][0]
+    y = facts["hip"]["offset"][1] + facts["upper_leg"]["offset"][1]
+    signs: dict[str, Any] = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
+    return np.array([[sx * x, sy * y] for sx, sy in (signs[leg] for leg in LEGS)], dtype=np.float64)
+
+
+def spot_capabilities() -> Capabilities:
+    """Spot's capabilities, from the facts."""
+    facts = spot_facts()
+    body, gripper = facts["capabilities"], facts["gripper"]
+    arm_names = tuple(part["link"] for part in facts["arm"][:-1])
+    return Capabilities(
+        footprint_m=tuple((float(x), float(y)) for x, y in body["footprint"]),
+        max_speed_m_s=body["max_speed"],
+        max_turn_rate_rad_s=body["max_turn_rate"],
+        standing_height_m=body["standing_height"],
+        height_range_m=tuple(body["height_range"]),
+        pitch_range_rad=tuple(body["pitch_range"]),
+        arm=ArmCapabilities(arm_names, body["max_reach"], tuple(facts["stowed"][name] for name in arm_names)),
+        gripper=GripperCapabilities(
+            JAW, gripper["open"], gripper["max_opening"], gripper["max_force"], gripper["depth"]
+        ),
+        camera_sources=("hand", "frontleft", "frontright", "left", "right", "back"),
+        description=spot_urdf(),
+    )

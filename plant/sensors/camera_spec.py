@@ -1,0 +1,124 @@
+"""Where a robot's cameras sit and what they see: typed, read from a YAML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    RenderCameraCore,
+)
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.systems.sensors import CameraInfo
+
+from skills.robot import Intrinsics
+
+FAR_M = 40.0
+NEAR_M = 0.05
+
+
+class CameraSpec(BaseModel):
+    """One camera. The pose is in `link`: camera z forward, x right, y down; intrinsics are those of the full picture.
+
+    `picture_shrink` and `depth_shrink` divide the pixels of the picture and of the depth, which share the pose.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    link: str
+    colour: bool
+    rpy_deg: tuple[float, float, float]
+    xyz_m: tuple[float, float, float]
+    width: int = Field(gt=0)
+    height: int = Field(gt=0)
+    fx: float = Field(gt=0)
+    fy: float = Field(gt=0)
+    cx: float
+    cy: float
+    picture_shrink: int = Field(default=1, ge=1)
+    depth_shrink: int = Field(default=1, ge=1)
+    depth_range_m: tuple[float, float] = (0.3, 4.0)
+
+    @field_validator("depth_range_m")
+    @classmethod
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if not NEAR_M <= value[0] < value[1] <= FAR_M:
+            raise ValueError(f"must be two increasing distances between {NEAR_M} and {FAR_M}")
+        return value
+
+    @property
+    def frame(self) -> str:
+        """The camera's name in the frame tree."""
+        return f"{self.name}_camera"
+
+    def X_link_camera(self) -> RigidTransform:
+        """The camera's pose in its link."""
+        return RigidTransform(RollPitchYaw(np.radians(self.rpy_deg)), np.array(self.xyz_m))
+
+    def intrinsics(self) -> Intrinsics:
+        """Intrinsics of the picture."""
+        return self._shrunk(self.picture_shrink)
+
+    def depth_intrinsics(self) -> Intrinsics:
+        """Intrinsics of the depth."""
+        return self._shrunk(self.depth_shrink)
+
+    def _shrunk(self, factor: int) -> Intrinsics:
+        """The same view with 1 / factor of the pixels on each side."""
+        return Intrinsics(
+            width=self.width // factor,
+            height=self.height // factor,
+            fx=self.fx / factor,
+            fy=self.fy / factor,
+            cx=(self.cx + 0.5) / factor - 0.5,
+            cy=(self.cy + 0.5) / factor - 0.5,
+        )
+
+
+def load_cameras(path: Path) -> dict[str, CameraSpec]:
+    """Camera specs by name, in the file's order. Raises ValueError that names the file, the camera and the field."""
+    entries = yaml.safe_load(path.read_text(encoding="utf-8"))
+    if not isinstance(entries, dict):
+        raise ValueError(f"{path}: must be a mapping from camera names to their data")
+    return {name: _spec(path, name, entry) for name, entry in entries.items()}
+
+
+def _spec(path: Path, name: str, entry: object) -> CameraSpec:
+    if not isinstance(entry, dict):
+        raise ValueError(f"{path}: camera {name}: must be a mapping")
+    try:
+        return CameraSpec(name=name, **entry)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ValueError(f"{path}: camera {name}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def colour_render_camera(
+    intrinsics: Intrinsics, renderer: str, *, near_m: float = NEAR_M, far_m: float = FAR_M
+) -> ColorRenderCamera:
+    """Drake's colour camera with these intrinsics; what is nearer or farther is cut away."""
+    return ColorRenderCamera(_core(intrinsics, renderer, near_m, far_m), False)
+
+
+def depth_render_camera(intrinsics: Intrinsics, renderer: str, range_m: tuple[float, float]) -> DepthRenderCamera:
+    """Drake's depth camera with these intrinsics and this range."""
+    return DepthRenderCamera(_core(intrinsics, renderer, NEAR_M / 2.0, range_m[1] + 1.0), DepthRange(*range_m))
+
+
+def _core(intrinsics: Intrinsics, renderer: str, near_m: float, far_m: float) -> RenderCameraCore:
+    info = CameraInfo(  # the renderer counts the principal point from the pixel's corner, Intrinsics from its centre
+        width=intrinsics.width,
+        height=intrinsics.height,
+        focal_x=intrinsics.fx,
+        focal_y=intrinsics.fy,
+        center_x=intrinsics.cx + 0.5,
+        center_y=intrinsics.cy + 0.5,
+    )
+    return RenderCameraCore(renderer, info, ClippingRange(near_m, far_m), RigidTransform())

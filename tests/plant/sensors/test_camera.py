@@ -1,0 +1,197 @@
+"""Cameras see what is in front of them, as noisily as real ones, from where Spot's cameras sit."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.geometry import Box, Cylinder, MakeRenderEngineVtk, RenderEngineVtkParams
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.tree import SpatialInertia
+from pydrake.systems.framework import DiagramBuilder
+
+from plant.sensors.camera import Camera
+from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
+from plant.sensors.camera_spec import load_cameras
+from skills.robot import FrameTree, Intrinsics
+
+CAMERAS = Path(__file__).parents[3] / "plant" / "models" / "spot" / "cameras.yaml"
+HEIGHT_M = 0.52
+QUIET = DepthNoise(sigma_m=0.0, sigma_per_m=0.0, speck=0.0, dark=-1.0, shiny=256.0)
+BODY_BOX_CENTRES_B = {  # where a box stands, in the body frame, for each body camera to look at
+    "frontleft": (1.3, -0.4, -0.42),
+    "frontright": (1.3, 0.4, -0.42),
+    "left": (-0.16, 1.5, -0.3),
+    "right": (-0.17, -1.5, -0.3),
+    "back": (-1.8, -0.04, -0.3),
+}
+
+
+class Scene:
+    """A floor, a coloured box, and a body whose cameras look at them."""
+
+    def __init__(self, box_centre_B):
+        builder = DiagramBuilder()
+        self.plant, self.scene_graph = AddMultibodyPlantSceneGraph(builder, 0.01)
+        self.scene_graph.AddRenderer("vtk", MakeRenderEngineVtk(RenderEngineVtkParams()))
+        world = self.plant.world_body()
+        X_WG = RigidTransform([0, 0, -0.05])
+        self.plant.RegisterVisualGeometry(world, X_WG, Box(20, 20, 0.1), "floor", np.array([0.6, 0.6, 0.5, 1]))
+        X_WG = RigidTransform(np.add(box_centre_B, [0, 0, HEIGHT_M]))
+        self.plant.RegisterVisualGeometry(world, X_WG, Box(0.2, 0.2, 0.2), "box", np.array([0.9, 0.1, 0.1, 1]))
+        self.body = self.plant.AddRigidBody("body", SpatialInertia.SolidSphereWithMass(1.0, 0.1))
+        self.plant.Finalize()
+        diagram = builder.Build()
+        self.root = diagram.CreateDefaultContext()
+        self.plant.SetFloatingBaseBodyPoseInWorldFrame(
+            self.plant.GetMyContextFromRoot(self.root), self.body, RigidTransform([0, 0, HEIGHT_M])
+        )
+        self.query = self.scene_graph.get_query_output_port().Eval(self.scene_graph.GetMyContextFromRoot(self.root))
+        self.diagram = diagram
+
+    def camera(self, name, seed=0, **noise):
+        frame = self.plant.GetBodyFrameIdOrThrow(self.body.index())
+        return Camera(load_cameras(CAMERAS)[name], frame, np.random.default_rng(seed), **noise)
+
+    def take(self, name, **noise):
+        return self.camera(name, **noise).take(self.query, 2.0, FrameTree({}))
+
+
+def points_B(image, spec):
+    """Depth points in the link frame, (N, 3), and the grey level of each."""
+    k = image.depth_intrinsics
+    v, u = np.nonzero(image.depth_m)
+    z = image.depth_m[v, u].astype(float)
+    points_C = np.stack([(u - k.cx) / k.fx * z, (v - k.cy) / k.fy * z, z])
+    return (spec.X_link_camera() @ points_C).T
+
+
+@pytest.mark.parametrize("name", list(BODY_BOX_CENTRES_B))
+def test_body_camera_depth_lands_on_the_box_and_the_floor(name):
+    centre = np.array(BODY_BOX_CENTRES_B[name])
+    scene = Scene(centre)
+    spec = load_cameras(CAMERAS)[name]
+    points = points_B(scene.take(name, depth_noise=QUIET), spec)
+    on_floor = np.abs(points[:, 2] + HEIGHT_M) < 0.01
+    off_box = np.max(np.abs(points - centre), axis=1) - 0.1
+    assert on_floor.sum() > 500
+    assert (np.abs(off_box) < 0.01).sum() > 80
+    assert np.mean(on_floor | (np.abs(off_box) < 0.02)) > 0.99
+
+
+def test_body_cameras_look_where_their_names_say():
+    views = {name: spec.X_link_camera().rotation().matrix()[:, 2] for name, spec in load_cameras(CAMERAS).items()}
+    for name in ("frontleft", "frontright", "hand"):
+        assert views[name][0] > 0.3
+    assert views["left"][1] > 0.9
+    assert views["right"][1] < -0.9
+    assert views["back"][0] < -0.9
+    assert all(axis[2] < -0.2 for name, axis in views.items() if name != "hand")
+
+
+def test_front_cameras_see_crosswise():
+    """Frontleft looks to the right and frontright to the left, as on Spot."""
+    views = {name: spec.X_link_camera().rotation().matrix()[:, 2] for name, spec in load_cameras(CAMERAS).items()}
+    assert views["frontleft"][1] < 0.0 < views["frontright"][1]
+
+
+def test_hand_camera_gives_colour_and_full_depth():
+    scene = Scene((1.0, 0.0, -0.1))
+    image = scene.take("hand")
+    assert image.colour.shape == (480, 640, 3)
+    assert image.depth_m.shape == (480, 640)
+    assert image.depth_m.dtype == np.float32
+    assert (image.source, image.camera_frame, image.stamp_s) == ("hand", "hand_camera", 2.0)
+    reddest = image.colour[..., 0].astype(int) - image.colour[..., 1]
+    box_depth = image.depth_m[(reddest > 100) & (image.depth_m > 0)]
+    assert np.median(box_depth) == pytest.approx(0.9 - 0.138, abs=0.05)
+
+
+def test_body_camera_is_grey_with_registered_smaller_depth():
+    image = Scene((1.3, 0.2, -0.4)).take("frontleft")
+    assert image.colour is None
+    assert image.grey.shape == (image.intrinsics.height, image.intrinsics.width)
+    assert image.depth_m.shape == (image.depth_intrinsics.height, image.depth_intrinsics.width)
+    corner = (image.intrinsics.cx + 0.5) / image.intrinsics.fx
+    assert corner == pytest.approx((image.depth_intrinsics.cx + 0.5) / image.depth_intrinsics.fx)
+
+
+def test_same_seed_gives_the_same_picture_and_another_seed_another():
+    scene = Scene((1.0, 0.0, -0.1))
+    first, second, other = scene.take("hand", seed=5), scene.take("hand", seed=5), scene.take("hand", seed=6)
+    np.testing.assert_array_equal(first.colour, second.colour)
+    np.testing.assert_array_equal(first.depth_m, second.depth_m)
+    assert (first.colour != other.colour).any()
+
+
+def depth_degrader(seed=0, **noise):
+    intrinsics = Intrinsics(320, 240, 280.0, 280.0, 160.0, 120.0)
+    return DepthDegrader(np.random.default_rng(seed), intrinsics, (0.3, 4.0), DepthNoise(**noise))
+
+
+GREY = np.full((240, 320), 120, dtype=np.uint8)
+
+
+def plane(z_m):
+    return np.full((240, 320), z_m, dtype=np.float32)
+
+
+@pytest.mark.parametrize("z_m", [0.5, 1.5, 3.0])
+def test_depth_noise_grows_with_the_square_of_distance(z_m):
+    depth = depth_degrader().depth(plane(z_m), GREY)
+    spread = np.std(depth[depth > 0] - z_m)
+    assert spread == pytest.approx(0.0015 + 0.0012 * z_m**2, rel=0.1)
+
+
+@pytest.mark.parametrize("z_m", [0.1, 0.29, 4.2, np.inf, 0.0])
+def test_depth_out_of_range_is_none(z_m):
+    assert not depth_degrader().depth(plane(z_m), GREY).any()
+
+
+def test_depth_is_in_whole_millimetres():
+    depth = depth_degrader().depth(plane(1.2), GREY)
+    np.testing.assert_allclose(depth * 1000, np.round(depth * 1000), atol=1e-3)
+
+
+def test_depth_has_holes_at_edges():
+    clean = plane(1.0)
+    clean[:, 160:] = 2.0
+    depth = depth_degrader().depth(clean, GREY)
+    assert 0.4 < np.mean(depth[:, 159:161] == 0) < 0.8
+    assert np.mean(depth[:, :150] == 0) < 0.01
+
+
+def test_depth_is_lost_at_grazing_angles_only():
+    slope = np.linspace(0.0, 1.0, 320, dtype=np.float32)[None, :].repeat(240, axis=0)
+    gentle = depth_degrader().depth((1.0 + slope).astype(np.float32), GREY)
+    assert np.mean(gentle[:, 5:-5] == 0) < 0.01
+    steep = depth_degrader().depth((1.0 + 16.0 * slope).astype(np.float32), GREY)
+    assert np.mean(steep[:, 4:8] == 0) > 0.99
+
+
+def test_depth_has_patches_missing_on_black():
+    black = np.full_like(GREY, 5)
+    depth = depth_degrader().depth(plane(1.0), black)
+    assert 0.2 < np.mean(depth == 0) < 0.8
+    assert np.mean(depth_degrader().depth(plane(1.0), GREY) == 0) < 0.01
+
+
+def test_picture_noise_grains_and_darkens_the_corners():
+    degrade = PictureDegrader(np.random.default_rng(0), 240, 320, PictureNoise())
+    noisy = degrade.colour(np.full((240, 320, 3), 200, dtype=np.uint8)).astype(float)
+    assert np.std(noisy[110:130, 150:170]) == pytest.approx(2.5, rel=0.15)
+    assert noisy[:20, :20].mean() < noisy[110:130, 150:170].mean() - 15
+
+
+def test_unknown_camera_key_is_refused_with_file_and_field(tmp_path):
+    path = tmp_path / "cameras.yaml"
+    path.write_text(CAMERAS.read_text().replace("colour: true", "color: true"))
+    with pytest.raises(ValueError, match=r"cameras\.yaml: camera hand: colou?r"):
+        load_cameras(path)
+
+
+def test_reversed_depth_range_is_refused(tmp_path):
+    path = tmp_path / "cameras.yaml"
+    path.write_text(CAMERAS.read_text().replace("[0.2, 4.0]", "[4.0, 0.2]"))
+    with pytest.raises(ValueError, match="hand: depth_range_m"):
+        load_cameras(path)

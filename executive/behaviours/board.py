@@ -1,0 +1,63 @@
+"""The blackboard of one run: immutable values under keys that begin with the robot's name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+
+class Board:
+    """A blackboard for one robot in one run. Keys read `alice/fetch-drink/start`; values are immutable."""
+
+    def __init__(self, robot_name: str) -> None:
+        self._prefix = f"{robot_name.lower()}/"
+        self._values: dict[str, Any] = {}
+
+    def put(self, key: str, value: Any) -> None:
+        """Store a value. Raises ValueError for a key with a dot or without the robot's name in front."""
+        if "." in key or not key.startswith(self._prefix):
+            raise ValueError(f"blackboard key '{key}': must begin with '{self._prefix}' and hold no dot")
+        self._values[key] = value
+
+    def get(self, key: str) -> Any:
+        """The value under `key`. Raises KeyError with a plain sentence when nothing wrote it yet."""
+        if key not in self._values:
+            raise KeyError(f"nothing was written to the blackboard under '{key}' yet")
+        return self._values[key]
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._values
+
+    def values(self) -> Mapping[str, Any]:
+        """A copy of all values."""
+        return dict(self._values)
+
+
+class Binding(Protocol):
+    """Where an input port gets its value from."""
+
+    def read(self, board: Board) -> Any:
+        """The value now. Raises KeyError when it is not there yet."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A port bound to a fixed value."""
+
+    value: Any
+
+    def read(self, board: Board) -> Any:
+        """The fixed value."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class FromBoard:
+    """A port bound to a blackboard key."""
+
+    key: str
+
+    def read(self, board: Board) -> Any:
+        """The value under the key. Raises KeyError when nothing wrote it yet."""
+        return board.get(self.key)

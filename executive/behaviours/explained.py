@@ -1,0 +1,37 @@
+"""What every node of ours carries beside its status: a stable path id, a cause and one sentence."""
+
+from __future__ import annotations
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from skills.api import Cause
+
+
+class Explained:
+    """Mixin for behaviours. `cause` is None unless the node failed or was cancelled; `message` is one sentence."""
+
+    path_id: str
+    cause: Cause | None
+    message: str
+
+    def clear_explanation(self) -> None:
+        """Forget cause and message."""
+        self.cause, self.message = None, ""
+
+    def explain_cancelled(self) -> None:
+        """Say that the node was stopped from outside, and while doing what."""
+        self.cause = Cause.CANCELLED
+        self.message = f"stopped while: {self.message}" if self.message else "stopped"
+
+
+def cause_of(node: Behaviour) -> Cause:
+    """The node's cause; EXECUTION for a foreign node that carries none."""
+    cause = node.cause if isinstance(node, Explained) else None
+    return cause or Cause.EXECUTION
+
+
+def message_of(node: Behaviour) -> str:
+    """The node's sentence; for a foreign node its feedback message, else its name and status."""
+    message = node.message if isinstance(node, Explained) else node.feedback_message
+    return message or f"{node.name} {'failed' if node.status == Status.FAILURE else 'goes on'}"

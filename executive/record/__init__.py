@@ -1,0 +1,1 @@
+"""The event log: written as MCAP while a mission runs, read back afterwards."""

@@ -1,0 +1,55 @@
+"""Reads an event log back, one that a kill cut off included."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader
+
+from executive.errors import InputError
+from executive.record.schemas import WALL
+
+
+@dataclass(frozen=True)
+class Event:
+    """One message: topic, the robot's clock in seconds, and its values."""
+
+    topic: str
+    stamp_s: float
+    data: dict[str, Any]
+
+
+def read_events(path: Path) -> tuple[Event, ...]:
+    """All events in the order in which they were written; of a log that was cut off, those before the cut.
+
+    Raises:
+        InputError: there is no such file, or it is no event log.
+    """
+    try:
+        with path.open("rb") as file:
+            return tuple(_events(NonSeekingReader(file)))
+    except OSError as error:
+        raise InputError(f"cannot read it ({error.strerror})", mend="name a log that exists", file=path) from error
+    except McapError as error:
+        raise InputError("it is no event log", mend="name a log.mcap that a run has written", file=path) from error
+
+
+def comparable_events(path: Path) -> tuple[Event, ...]:
+    """The events without wall times: equal for two runs of the same command and seed."""
+    return tuple(event for event in read_events(path) if event.topic != WALL)
+
+
+def _events(reader: NonSeekingReader) -> Iterator[Event]:
+    count = 0
+    try:
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            count += 1
+            yield Event(channel.topic, message.log_time / 1e9, json.loads(message.data))
+    except McapError:
+        if count == 0:
+            raise

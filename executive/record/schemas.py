@@ -1,0 +1,109 @@
+"""The topics of the event log and their JSON schemas; images and poses use the schemas that Foxglove draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final
+
+from executive.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
+
+TREE: Final = "tree"
+TRANSITIONS: Final = "transitions"
+POSE: Final = "pose"
+OUTCOME: Final = "outcome"
+RUN: Final = "run"
+WALL: Final = "wall"
+
+
+@dataclass(frozen=True)
+class Schema:
+    """A named JSON schema."""
+
+    name: str
+    properties: Mapping[str, Any]
+
+    def json(self) -> dict[str, Any]:
+        """The schema itself."""
+        return {"type": "object", "title": self.name, "properties": dict(self.properties)}
+
+
+def _fields(kind: str, *names: str) -> dict[str, Any]:
+    return {name: {"type": kind} for name in names}
+
+
+_STAMP: Final = {"type": "object", "properties": _fields("integer", "sec", "nsec")}
+_VECTOR: Final = {"type": "object", "properties": _fields("number", "x", "y", "z")}
+_TURN: Final = {"type": "object", "properties": _fields("number", "x", "y", "z", "w")}
+_NUMBERS: Final = {"type": "array", "items": {"type": "integer"}}
+_NODE: Final = _fields("string", "robot", "node")
+
+IMAGE_SCHEMA: Final = Schema(
+    "foxglove.CompressedImage",
+    {
+        "timestamp": _STAMP,
+        **_fields("string", "frame_id", "format"),
+        "data": {"type": "string", "contentEncoding": "base64"},
+    },
+)
+ANY_SCHEMA: Final = Schema("errand.Message", {})
+
+SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType(
+    {
+        RUN: Schema(
+            "errand.Run",
+            {
+                **_fields("string", "world"),
+                **_fields("integer", "seed"),
+                "commands": {"type": "array", "items": {"type": "string"}},
+                "versions": {"type": "object"},
+            },
+        ),
+        TREE: Schema("errand.Tree", {**_fields("string", "robot"), "root": {"type": "object"}}),
+        TRANSITIONS: Schema(
+            "errand.Transition",
+            {**_NODE, **_fields("string", "from", "to", "cause", "message"), **_fields("number", "t")},
+        ),
+        POSE: Schema(
+            "foxglove.PoseInFrame",
+            {
+                "timestamp": _STAMP,
+                **_fields("string", "frame_id", "robot"),
+                "pose": {"type": "object", "properties": {"position": _VECTOR, "orientation": _TURN}},
+            },
+        ),
+        OUTCOME: Schema(
+            "errand.Outcome",
+            {**_fields("string", "robot", "outcome", "cause", "message"), **_fields("integer", "ticks")},
+        ),
+        WALL: Schema("errand.Wall", {**_fields("number", "wall_time_s"), **_fields("integer", "overruns")}),
+        TASK_TOPIC: Schema(
+            "errand.TaskMessage",
+            {
+                **_fields("number", "stamp", "goal_x", "goal_y"),
+                **_fields("integer", "sequence", "mission_count", "task_count", "cmd_type"),
+                **_fields("string", "robot_name"),
+                **dict.fromkeys(("item_type", "item_count", "obj_type", "obj_count"), _NUMBERS),
+            },
+        ),
+        DETECT_TOPIC: Schema(
+            "errand.ObjectToDetect",
+            {**_fields("number", "stamp"), **_fields("integer", "sequence"), "class_ids": _NUMBERS},
+        ),
+        DESTINATION_TOPIC: Schema(
+            "errand.ObjectDestination",
+            {
+                **_fields("integer", "sequence", "message_id", "class_id"),
+                **_fields("string", "class_name"),
+                **_fields("number", "stamp", "goal_x", "goal_y", "goal_z"),
+                **_fields("number", "distance_from_robot_x", "distance_from_robot_y", "distance_from_robot_z"),
+            },
+        ),
+    }
+)
+
+
+def schema_of(topic: str, message: Mapping[str, Any]) -> Schema:
+    """The schema of a topic; pictures have theirs wherever they come, other topics an open one."""
+    return IMAGE_SCHEMA if message.get("format") == "jpeg" else SCHEMAS.get(topic, ANY_SCHEMA)

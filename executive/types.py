@@ -1,0 +1,50 @@
+"""Checks of values and types against type hints, for the ports of skills."""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Mapping
+from typing import Any, Union
+
+
+def conforms(value: Any, hint: Any) -> bool:
+    """True when `value` is of the type that `hint` names; an int passes as a float, parameters are checked."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if hint is Any:
+        return True
+    if origin in (Union, types.UnionType):
+        return any(conforms(value, option) for option in arguments)
+    if origin is tuple:
+        return isinstance(value, tuple) and _tuple_conforms(value, arguments)
+    if hint is float:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    if hint is None or hint is type(None):
+        return value is None
+    return isinstance(value, origin or hint)
+
+
+def _tuple_conforms(value: tuple[Any, ...], arguments: tuple[Any, ...]) -> bool:
+    if len(arguments) == 2 and arguments[1] is Ellipsis:
+        return all(conforms(item, arguments[0]) for item in value)
+    return len(value) == len(arguments) and all(map(conforms, value, arguments))
+
+
+def assignable(source: Any, target: Any) -> bool:
+    """True when every value of type `source` may go into a port of type `target`."""
+    if target is Any or source == target or (source is int and target is float):
+        return True
+    if typing.get_origin(target) in (Union, types.UnionType):
+        return any(assignable(source, option) for option in typing.get_args(target))
+    plain = isinstance(source, type) and isinstance(target, type)
+    return plain and issubclass(source, target)
+
+
+def describe_type(hint: Any) -> str:
+    """A type hint as a user reads it."""
+    return hint.__name__ if isinstance(hint, type) and not typing.get_args(hint) else str(hint).replace("typing.", "")
+
+
+def field_types(record: type) -> Mapping[str, Any]:
+    """The resolved type hints of a dataclass, by field name."""
+    return typing.get_type_hints(record)

@@ -31,7 +31,7 @@ class PictureNoise:
 
 @dataclass(frozen=True)
 class DepthNoise:
-    """Depth errors: sigma = `sigma_m` + `sigma_per_m` z^2; holes at edges, at grazing angles, and on dark or shiny spots.
+    """Depth errors: sigma = `sigma_m` + `sigma_per_m` z^2; holes at edges, grazing angles, dark and shiny spots.
 
     A step between neighbours above `edge_m` + `edge_share` z is an edge, of which `edge_loss` is lost; surfaces whose
     normal is within asin(`grazing`) of being square to the ray are lost; `dark` and `shiny` are grey values beyond

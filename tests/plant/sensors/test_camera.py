@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.geometry import Box, Cylinder, MakeRenderEngineVtk, RenderEngineVtkParams
+from pydrake.geometry import Box, MakeRenderEngineVtk, RenderEngineVtkParams
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia

@@ -1,0 +1,57 @@
+"""What a gripper feels: jaw angle, clamp force, and whether something is between the jaws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from skills.robot import Gripper
+
+
+@dataclass(frozen=True)
+class GripperNoise:
+    """Noise of the readings, and when the robot believes that it holds something.
+
+    It does when the read force is at least `holding_force_n` with the jaw wider than `closed_rad` for
+    `holding_after_s` on end; the belief ends as soon as one of both is no longer so for that time.
+    """
+
+    opening_rad: float = 0.003
+    force_n: float = 0.8
+    force_share: float = 0.03
+    holding_force_n: float = 4.0
+    closed_rad: float = 0.04
+    holding_after_s: float = 0.15
+
+
+class GripperModel:
+    """The gripper of one robot."""
+
+    def __init__(self, rng: np.random.Generator, noise: GripperNoise | None = None) -> None:
+        """Start empty. A share of the force error is systematic and drawn here."""
+        self._rng, self._noise = rng, noise or GripperNoise()
+        self._force_scale = 1.0 + float(rng.normal(0.0, self._noise.force_share))
+        self._holding = False
+        self._changing_since_s: float | None = None
+
+    def update(self, stamp_s: float, opening_rad: float, force_n: float) -> Gripper:
+        """Reading at stamp_s from the true jaw angle (0 closed, positive open) and clamp force at the tip.
+
+        `force_n` is what the jaw presses with, 0 while it moves freely.
+        """
+        opening = opening_rad + float(self._rng.normal(0.0, self._noise.opening_rad))
+        force = max(0.0, force_n * self._force_scale + float(self._rng.normal(0.0, self._noise.force_n)))
+        gripped = force >= self._noise.holding_force_n and opening > self._noise.closed_rad
+        self._settle(stamp_s, gripped)
+        return Gripper(stamp_s, max(0.0, opening), force, self._holding)
+
+    def _settle(self, stamp_s: float, gripped: bool) -> None:
+        """Change the belief once the readings have said so for long enough."""
+        if gripped == self._holding:
+            self._changing_since_s = None
+            return
+        if self._changing_since_s is None:
+            self._changing_since_s = stamp_s
+        if stamp_s - self._changing_since_s >= self._noise.holding_after_s:
+            self._holding, self._changing_since_s = gripped, None

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
@@ -22,7 +23,6 @@ from pydrake.multibody.tree import (
     RigidBody,
     SpatialInertia,
 )
-from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from skills.robot import Pose2D
@@ -80,8 +80,12 @@ class Carrier:
         joints = []
         for axis in _AXES:
             is_last = axis == _AXES[-1]
-            child = body if is_last else self._plant.AddRigidBody(
-                f"{name}_carrier_{axis}", self.instance, SpatialInertia.SolidSphereWithMass(0.05, 0.05)
+            child = (
+                body
+                if is_last
+                else self._plant.AddRigidBody(
+                    f"{name}_carrier_{axis}", self.instance, SpatialInertia.SolidSphereWithMass(0.05, 0.05)
+                )
             )
             kind = RevoluteJoint if axis in ("yaw", "pitch") else PrismaticJoint
             frame_on_parent = self._plant.AddFrame(
@@ -90,7 +94,9 @@ class Carrier:
             frame_on_child = self._plant.AddFrame(
                 FixedOffsetFrame(f"{name}_carrier_{axis}_M", child.body_frame(), RigidTransform(), self.instance)
             )
-            joint = self._plant.AddJoint(kind(f"{name}_carrier_{axis}", frame_on_parent, frame_on_child, directions[axis]))
+            joint = self._plant.AddJoint(
+                kind(f"{name}_carrier_{axis}", frame_on_parent, frame_on_child, directions[axis])
+            )
             actuator: JointActuator = self._plant.AddJointActuator(f"{name}_carrier_{axis}", joint, efforts[axis])
             actuator.set_controller_gains(PdControllerGains(p=_GAINS[axis][0], d=_GAINS[axis][1]))
             joints.append(joint)
@@ -129,7 +135,9 @@ class Carrier:
         """(x, y, yaw, height, pitch) out of the plant's positions."""
         return np.array([positions[joint.position_start()] for joint in self._joints])
 
-    def control(self, context: Context, state: FloatArray, wanted: Velocity, posture: Sequence[float], dt_s: float) -> None:
+    def control(
+        self, context: Context, state: FloatArray, wanted: Velocity, posture: Sequence[float], dt_s: float
+    ) -> None:
         """Command the joints for the next dt_s: ramp to `wanted` (body frame) and to the posture (height, pitch)."""
         self._velocity = self._ramp(wanted, dt_s)
         yaw = state[2]

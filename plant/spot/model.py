@@ -120,4 +120,3 @@ class JointIndex:
         self.jaw = self.names.index(JAW)
         self.legs = np.array([[self.names.index(joint) for joint in leg_joint_names(leg)] for leg in LEGS])
         self.jaw_gain = _ARM_GAINS[JAW][0]
-

@@ -312,6 +312,8 @@ class SpotRobot:
         carrier.control(self._context, carrier.state(positions), wanted, self._posture, dt_s)
 
     def _legs(self, dt_s: float) -> tuple[FloatArray, FloatArray]:
+        if self._model.carrier is None:
+            return self._leg_servos.rest_rad, np.zeros_like(self._leg_servos.rest_rad)
         motion = self._motion()
         feet_W = self._trot.step(motion, dt_s)
         x, y, yaw = motion.ahead(dt_s)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from plant.spot.model import SpotModel

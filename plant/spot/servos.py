@@ -49,6 +49,7 @@ class LegServos:
         """`rest_rad`: (4, 3) joint angles at the beginning."""
         self._index = index
         self._kinematics = [LegKinematics.of(leg) for leg in LEGS]
+        self.rest_rad = rest_rad.copy()
         self._last = rest_rad.copy()
 
     def set_points(self, X_WB: RigidTransform, feet_W: FloatArray, dt_s: float) -> tuple[FloatArray, FloatArray]:

@@ -142,9 +142,7 @@ def _add_shape(element: ElementTree.Element, shape: Mapping[str, Any]) -> Elemen
     return element
 
 
-def _add_collision(
-    link: ElementTree.Element, name: str, shape: Mapping[str, Any], friction: float | None
-) -> None:
+def _add_collision(link: ElementTree.Element, name: str, shape: Mapping[str, Any], friction: float | None) -> None:
     collision = _add_shape(ElementTree.SubElement(link, "collision", name=name), shape)
     if friction is not None:
         properties = ElementTree.SubElement(collision, "drake:proximity_properties")
@@ -176,11 +174,15 @@ def _add_joint(robot: ElementTree.Element, name: str, parent: str, child: str, p
 def _add_lidar(robot: ElementTree.Element, lidar: Mapping[str, Any]) -> None:
     radius, height, mass = lidar["radius"], lidar["height"], lidar["mass"]
     around, along = mass * (3 * radius**2 + height**2) / 12, mass * radius**2 / 2
+    mast = lidar["mast"]
     part = {
         "mass": mass,
         "com": (0, 0, 0),
         "inertia": {"ixx": around, "iyy": around, "izz": along},
-        "collision": [{"cylinder": (radius, height), "xyz": (0, 0, 0)}],
+        "collision": [
+            {"cylinder": (radius, height), "xyz": (0, 0, 0)},
+            {"box": mast, "xyz": (0, 0, -(height + mast[2]) / 2)},
+        ],
     }
     _add_link(robot, "lidar", part, looks=False)
     joint = ElementTree.SubElement(robot, "joint", name="lidar_mount", type="fixed")

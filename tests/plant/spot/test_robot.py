@@ -1,0 +1,157 @@
+"""The Robot protocol as the simulated Spot keeps it."""
+
+import numpy as np
+import pytest
+
+from plant.diagram import build_diagram
+from plant.simulation import Engine
+from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
+
+
+@pytest.fixture
+def engine():
+    world = build_diagram(directives=None, models=[], robot_names=["Alice"], looks=False, render=False)
+    return Engine(world, {"Alice": Pose2D(0.5, 0.2, 0.0)})
+
+
+@pytest.fixture
+def spot(engine):
+    return engine.robots["Alice"]
+
+
+@pytest.fixture
+def lease(spot):
+    return spot.acquire_lease("test")
+
+
+def truth(engine):
+    """(x, y, yaw, height, pitch) of the carrier."""
+    model = engine.world.robots["Alice"]
+    return model.carrier.state(engine.world.plant.GetPositions(engine.context))
+
+
+def arm_to(spot, offset_rad, seconds):
+    start = np.array([spot.joints().position_rad[name] for name in spot.capabilities().arm.joint_names])
+    start[1] = max(start[1], -3.14)
+    goal = start.copy()
+    goal[1] += offset_rad
+    return ArmTrajectory(np.array([0.0, seconds]), np.array([start, goal]))
+
+
+def test_drive_moves_the_body_at_the_commanded_velocity(engine, spot, lease):
+    command = spot.drive(0.6, 0.0, 0.0, until_s=2.0, lease=lease)
+    engine.advance(1.5)
+    assert spot.command_status(command).state is CommandState.RUNNING
+    x0 = truth(engine)[0]
+    engine.advance(0.4)
+    assert (truth(engine)[0] - x0) / 0.4 == pytest.approx(0.6, abs=0.02)
+
+
+def test_a_drive_that_expires_stops_the_robot(engine, spot, lease):
+    command = spot.drive(0.8, 0.0, 0.0, until_s=0.5, lease=lease)
+    engine.advance(1.5)
+    assert spot.command_status(command).state is CommandState.DONE
+    before = truth(engine)
+    engine.advance(1.0)
+    np.testing.assert_allclose(truth(engine), before, atol=1e-3)
+
+
+def test_speed_and_acceleration_are_limited(engine, spot, lease):
+    spot.drive(5.0, 0.0, 0.0, until_s=10.0, lease=lease)
+    engine.advance(0.2)
+    assert truth(engine)[0] - 0.5 < 0.5 * 2.0 * 0.2**2 + 0.01
+    engine.advance(2.0)
+    x0 = truth(engine)[0]
+    engine.advance(0.5)
+    assert (truth(engine)[0] - x0) / 0.5 <= 1.6 + 0.01
+
+
+def test_stop_only_stops_the_command_it_names(engine, spot, lease):
+    old = spot.drive(0.3, 0.0, 0.0, until_s=5.0, lease=lease)
+    new = spot.drive(0.6, 0.0, 0.0, until_s=5.0, lease=lease)
+    spot.stop(lease=lease, only=old)
+    engine.advance(0.1)
+    assert spot.command_status(old).state is CommandState.STOPPED
+    assert spot.command_status(new).state is CommandState.RUNNING
+
+
+def test_a_second_holder_is_refused_until_it_takes_the_lease(engine, spot, lease):
+    with pytest.raises(LeaseError, match="'test'"):
+        spot.acquire_lease("other")
+    spot.drive(0.5, 0, 0, until_s=9.0, lease=lease)
+    other = spot.take_lease("other")
+    engine.advance(1.0)
+    refused = spot.drive(0.5, 0, 0, until_s=9.0, lease=lease)
+    assert spot.command_status(refused).state is CommandState.REFUSED
+    assert "other" in spot.command_status(refused).reason
+    assert truth(engine)[0] == pytest.approx(0.5, abs=0.01)
+    assert spot.command_status(spot.stop(lease=other)).state is CommandState.DONE
+
+
+def test_a_returned_lease_stops_the_robot_and_frees_it(engine, spot, lease):
+    drive = spot.drive(0.5, 0, 0, until_s=9.0, lease=lease)
+    spot.return_lease(lease)
+    assert spot.command_status(drive).state is CommandState.STOPPED
+    assert spot.acquire_lease("next").holder == "next"
+
+
+def test_move_arm_is_done_when_the_arm_has_arrived(engine, spot, lease):
+    trajectory = arm_to(spot, 0.8, 1.5)
+    command = spot.move_arm(trajectory, until_s=5.0, lease=lease)
+    engine.advance(1.0)
+    assert spot.command_status(command).state is CommandState.RUNNING
+    engine.advance(1.5)
+    assert spot.command_status(command).state is CommandState.DONE
+    assert spot.joints().position_rad["arm_sh1"] == pytest.approx(trajectory.positions_rad[-1][1], abs=0.02)
+
+
+def test_an_arm_command_that_expires_leaves_the_arm_where_it_is(engine, spot, lease):
+    command = spot.move_arm(arm_to(spot, 1.5, 3.0), until_s=1.0, lease=lease)
+    engine.advance(1.5)
+    assert spot.command_status(command).state is CommandState.STOPPED
+    held = spot.joints().position_rad["arm_sh1"]
+    engine.advance(1.0)
+    assert spot.joints().position_rad["arm_sh1"] == pytest.approx(held, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("offset_rad", "seconds", "word"), [(4.0, 10.0, "joint limits"), (1.5, 0.1, "rad/s"), (-1.0, 5.0, "joint limits")]
+)
+def test_impossible_arm_trajectories_are_refused(spot, lease, offset_rad, seconds, word):
+    command = spot.move_arm(arm_to(spot, offset_rad, seconds), until_s=20.0, lease=lease)
+    assert spot.command_status(command).state is CommandState.REFUSED
+    assert word in spot.command_status(command).reason
+
+
+def test_gripper_opens_and_closes_and_holds_nothing(engine, spot, lease):
+    spot.set_gripper(1.0, 30.0, until_s=5.0, lease=lease)
+    engine.advance(2.0)
+    assert spot.gripper().opening_rad == pytest.approx(1.0, abs=0.05)
+    closing = spot.set_gripper(0.0, 30.0, until_s=10.0, lease=lease)
+    engine.advance(3.0)
+    assert spot.command_status(closing).state is CommandState.DONE
+    assert spot.gripper().opening_rad == pytest.approx(0.0, abs=0.05)
+    assert not spot.gripper().holding
+
+
+def test_stand_changes_height_and_pitch_and_sit_refuses_to_drive(engine, spot, lease):
+    stand = spot.stand(0.45, 0.2, until_s=4.0, lease=lease)
+    engine.advance(2.0)
+    assert spot.command_status(stand).state is CommandState.DONE
+    np.testing.assert_allclose(truth(engine)[3:], [0.45, 0.2], atol=0.02)
+    sit = spot.sit(until_s=9.0, lease=lease)
+    engine.advance(3.0)
+    assert spot.command_status(sit).state is CommandState.DONE
+    refused = spot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)
+    assert "sits" in spot.command_status(refused).reason
+
+
+def test_a_command_that_has_expired_already_is_refused(engine, spot, lease):
+    engine.advance(1.0)
+    command = spot.drive(0.5, 0.0, 0.0, until_s=0.5, lease=lease)
+    assert "expires" in spot.command_status(command).reason
+
+
+def test_unknown_command_ids_raise(spot):
+    with pytest.raises(KeyError):
+        spot.command_status(999)

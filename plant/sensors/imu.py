@@ -35,7 +35,7 @@ class ImuModel:
         self._last: tuple[float, FloatArray] | None = None
 
     def update(self, stamp_s: float, X_WB: RigidTransform, w_WB_W: FloatArray, v_WB_W: FloatArray) -> Imu:
-        """Reading at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in the world."""
+        """Reading at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
         acceleration_W = self._acceleration(stamp_s, np.asarray(v_WB_W, dtype=np.float64))
         R_BW = X_WB.rotation().matrix().T
         rates = R_BW @ w_WB_W + self._gyro_bias + self._rng.normal(0.0, self._noise.gyro_rad_s, 3)

@@ -57,7 +57,7 @@ class OdometryModel:
         self._last: _Last | None = None
 
     def update(self, stamp_s: float, X_WB: RigidTransform, w_WB_W: FloatArray, v_WB_W: FloatArray) -> Odometry:
-        """Reading at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in the world."""
+        """Reading at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
         true = Pose2D.from_transform(X_WB)
         if self._last is None:
             estimate = Pose2D(0.0, 0.0, 0.0)

@@ -16,8 +16,8 @@ VERB_LIMIT_S = 2.0
 IMAGE_LIMIT_S = 20.0  # `image` may block by contract
 
 
-class VerbHung(BaseException):  # noqa: N818  (like KeyboardInterrupt: no skill may swallow it)
-    """A verb of the Robot protocol did not come back in time."""
+class VerbHung(BaseException):
+    """A verb of the Robot protocol did not come back in time. Like KeyboardInterrupt, no skill may swallow it."""
 
 
 class _Watched:

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 class Board:
     """A blackboard for one robot in one run. Keys read `alice/fetch-drink/start`; values are immutable."""
 
-    def __init__(self, robot_name: str) -> None:
-        self._prefix = f"{robot_name.lower()}/"
+    def __init__(self, prefix: str) -> None:
+        self._prefix = f"{prefix}/"
         self._values: dict[str, Any] = {}
 
     def put(self, key: str, value: Any) -> None:

@@ -36,7 +36,7 @@ class EventLog:
         self.path = path
         self._clock = clock
         self._file: BinaryIO = path.open("wb")
-        self._writer = Writer(self._file, use_chunking=True)
+        self._writer: Any = Writer(self._file)
         self._writer.start(profile="", library="errand")
         self._channels: dict[tuple[str, str], int] = {}
         self._schemas: dict[str, int] = {}

@@ -1,0 +1,1 @@
+"""Views of a tree: text, SVG and JSON, before, while and after it runs."""

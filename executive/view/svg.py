@@ -1,0 +1,145 @@
+"""The tree as an SVG picture: from left to right, one row for each leaf, states by colour, symbol and line."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from html import escape
+from types import MappingProxyType
+from typing import Final
+
+from executive.view.looks import Look, Looks, look_of
+from executive.view.model import NodeView
+from executive.view.text import note_of
+
+BOX_W: Final = 216
+BOX_H: Final = 40
+NOTE_LINE_H: Final = 13
+COLUMN_GAP: Final = 34
+ROW_GAP: Final = 10
+MARGIN: Final = 20
+TITLE_H: Final = 34
+LEGEND_H: Final = 34
+NOTE_CHARS: Final = 36
+NOTE_LINES: Final = 3
+NAME_CHARS: Final = 27
+FONT: Final = "DejaVu Sans, Helvetica, Arial, sans-serif"
+DASHES: Final[Mapping[str, str]] = MappingProxyType({"not run": "2 3", "running": "7 3", "cancelled": "9 3 2 3"})
+SYMBOLS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "not run": '<circle r="5" fill="none"/>',
+        "running": '<path d="M-4,-6 L6,0 L-4,6 Z" fill="currentColor"/>',
+        "success": '<path d="M-6,0 L-2,5 L6,-5" fill="none" stroke-width="2.6"/>',
+        "failure": '<path d="M-5,-5 L5,5 M-5,5 L5,-5" fill="none" stroke-width="2.6"/>',
+        "cancelled": '<circle r="6" fill="none"/><path d="M-4,4 L4,-4" fill="none"/>',
+    }
+)
+
+
+@dataclass(frozen=True)
+class _Box:
+    """A node with its place: the left upper corner, height, and the boxes of its children."""
+
+    node: NodeView
+    x: float
+    y: float
+    height: float
+    note: tuple[str, ...]
+    children: tuple[_Box, ...]
+
+    @property
+    def middle(self) -> float:
+        return self.y + self.height / 2
+
+    def walk(self) -> Iterator[_Box]:
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+
+def to_svg(root: NodeView, *, title: str = "") -> str:
+    """The tree as a whole SVG document, with a legend; notes are cut to three lines and stand whole in the tooltip."""
+    box, bottom = _laid_out(root, MARGIN, MARGIN + TITLE_H)
+    boxes = list(box.walk())
+    width = max(b.x for b in boxes) + BOX_W + MARGIN
+    height = bottom + LEGEND_H + MARGIN
+    body = [*(edge for b in boxes for edge in _edges(b)), *map(_drawn, boxes)]
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}" '
+        f'viewBox="0 0 {width:g} {height:g}" font-family="{FONT}">'
+        f'<rect width="100%" height="100%" fill="#ffffff"/>'
+        f'<text x="{MARGIN}" y="{MARGIN + 14}" font-size="16" font-weight="bold">{escape(title or root.name)}</text>'
+    )
+    return "\n".join([head, *body, _legend(height - MARGIN - 6), "</svg>", ""])
+
+
+def _laid_out(node: NodeView, x: float, y: float) -> tuple[_Box, float]:
+    """The node's box with all below it, beginning at height y, and where the next one may begin."""
+    note = _wrapped(note_of(node))
+    height = BOX_H + NOTE_LINE_H * len(note) + (4 if note else 0)
+    children: list[_Box] = []
+    below = y
+    for child in node.children:
+        box, below = _laid_out(child, x + BOX_W + COLUMN_GAP, below)
+        children.append(box)
+    if not children:
+        return _Box(node, x, y, height, note, ()), y + height + ROW_GAP
+    middle = (children[0].middle + children[-1].middle) / 2
+    top = max(y, middle - height / 2)
+    return _Box(node, x, top, height, note, tuple(children)), max(below, top + height + ROW_GAP)
+
+
+def _wrapped(note: str) -> tuple[str, ...]:
+    return tuple(textwrap.wrap(note, NOTE_CHARS, max_lines=NOTE_LINES, placeholder=" …"))
+
+
+def _edges(box: _Box) -> Iterator[str]:
+    start, bend = box.x + BOX_W, box.x + BOX_W + COLUMN_GAP / 2
+    for child in box.children:
+        look = look_of(child.node.state)
+        yield (
+            f'<path d="M{start:g},{box.middle:g} H{bend:g} V{child.middle:g} H{child.x:g}" fill="none" '
+            f'stroke="{look.line}" stroke-width="1.4"/>'
+        )
+
+
+def _drawn(box: _Box) -> str:
+    node, look = box.node, look_of(box.node.state)
+    tooltip = "\n".join(filter(None, (node.path_id, look.word, note_of(node))))
+    name = textwrap.shorten(node.name, NAME_CHARS, placeholder="…")
+    rows = "".join(
+        f'<text x="12" y="{BOX_H + 8 + n * NOTE_LINE_H}" font-size="10.5" fill="{look.line}">{escape(row)}</text>'
+        for n, row in enumerate(box.note)
+    )
+    return (
+        f'<g transform="translate({box.x:g},{box.y:g})" data-id="{escape(node.path_id)}"><title>{escape(tooltip)}</title>'
+        f"{_frame(look, box.height)}{_symbol(look, 20, 20)}"
+        f'<text x="38" y="15" font-size="9" letter-spacing="0.8" fill="#57606a">{escape(node.kind.upper())}</text>'
+        f'<text x="38" y="31" font-size="12.5" fill="#1f2328">{escape(name)}</text>{rows}</g>'
+    )
+
+
+def _frame(look: Look, height: float) -> str:
+    dash = f' stroke-dasharray="{DASHES[look.word]}"' if look.word in DASHES else ""
+    thickness = 2.4 if look.word == "failure" else 1.4
+    return (
+        f'<rect width="{BOX_W}" height="{height:g}" rx="6" fill="{look.fill}" stroke="{look.line}" '
+        f'stroke-width="{thickness}"{dash}/>'
+    )
+
+
+def _symbol(look: Look, x: float, y: float) -> str:
+    return (
+        f'<g transform="translate({x:g},{y:g})" stroke="{look.line}" color="{look.line}" stroke-width="1.8" '
+        f'stroke-linecap="round" stroke-linejoin="round">{SYMBOLS[look.word]}</g>'
+    )
+
+
+def _legend(y: float) -> str:
+    entries = [look.value for look in Looks]
+    return "".join(
+        f'{_symbol(look, MARGIN + 8 + n * 105, y - 4)}<text x="{MARGIN + 22 + n * 105}" y="{y:g}" font-size="11" '
+        f'fill="#57606a">{look.word}</text>'
+        for n, look in enumerate(entries)
+    )

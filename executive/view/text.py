@@ -1,0 +1,83 @@
+"""The tree as lines of text, plain or coloured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from py_trees.common import Status
+from rich.text import Text
+
+from executive.view.looks import Look, look_of
+from executive.view.model import NodeView
+
+
+@dataclass(frozen=True)
+class Line:
+    """One node as a line: the branches before it, its look, what it is, and a note on its state."""
+
+    branches: str
+    look: Look
+    kind: str
+    name: str
+    note: str
+
+
+def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
+    """The tree as plain lines."""
+    return "\n".join(
+        f"{line.branches}{line.look.ascii if ascii_only else line.look.symbol} {_label(line)}{_dashed(line.note)}"
+        for line in lines(root, ascii_only=ascii_only)
+    )
+
+
+def to_rich(root: NodeView, *, collapsed: bool = True) -> Text:
+    """The tree with colours, for a terminal; collapsed: nodes below what is done or not begun are not shown."""
+    text = Text(no_wrap=True, overflow="ellipsis")
+    for n, line in enumerate(lines(root, collapsed=collapsed)):
+        text.append("\n" if n else "")
+        text.append(line.branches, style="dim")
+        text.append(f"{line.look.symbol} ", style=line.look.style)
+        text.append(_label(line), style=line.look.style)
+        text.append(_dashed(line.note), style="italic")
+    return text
+
+
+def lines(root: NodeView, *, ascii_only: bool = False, collapsed: bool = False) -> Iterator[Line]:
+    """One line for each node, parents first."""
+    pieces = ("|-- ", "`-- ", "|   ", "    ") if ascii_only else ("├─ ", "└─ ", "│  ", "   ")
+    return _lines(root, "", "", pieces, collapsed)
+
+
+def _lines(node: NodeView, own: str, below: str, pieces: tuple[str, str, str, str], collapsed: bool) -> Iterator[Line]:
+    branch, last_branch, bar, blank = pieces
+    hidden = collapsed and _closed(node)
+    note = note_of(node)
+    if hidden and node.children:
+        note = " ".join(filter(None, (note, f"({sum(1 for _ in node.walk()) - 1} nodes)")))
+    yield Line(own, look_of(node.state), node.kind, node.name, note)
+    for child in () if hidden else node.children:
+        last = child is node.children[-1]
+        yield from _lines(
+            child, below + (last_branch if last else branch), below + (blank if last else bar), pieces, collapsed
+        )
+
+
+def note_of(node: NodeView) -> str:
+    """Cause and sentence; the sentence only where it is not a child's already."""
+    state = node.state
+    told = state.message and all(state.message != child.state.message for child in node.children)
+    sentence = state.message if told and (state.cause is not None or not node.children or node.kind == "retry") else ""
+    return ": ".join(filter(None, (state.cause.value if state.cause else "", sentence)))
+
+
+def _closed(node: NodeView) -> bool:
+    return node.state.status in (Status.SUCCESS, Status.INVALID) and node.state.cause is None
+
+
+def _label(line: Line) -> str:
+    return line.name if line.kind == "skill" else f"{line.kind} {line.name}"
+
+
+def _dashed(note: str) -> str:
+    return f" - {note}" if note else ""

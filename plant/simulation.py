@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from plant.diagram import WorldDiagram
+from plant.diagram import RENDERER, WorldDiagram
+from plant.spot.model import SpotModel
 from plant.spot.robot import SpotRobot
 from plant.spot.sensing import SpotSensors
 from skills.robot import Pose2D, Robot
@@ -18,8 +19,8 @@ CONTROL_PERIOD_S = 0.01
 class Engine:
     """A Diagram in motion with the robots in it; implements the Clock protocol."""
 
-    def __init__(self, world: WorldDiagram, starts: Mapping[str, Pose2D]) -> None:
-        """`starts`: where each robot stands at time 0, in the world frame."""
+    def __init__(self, world: WorldDiagram, starts: Mapping[str, Pose2D], *, seed: int = 0) -> None:
+        """`starts`: where each robot stands at time 0, in the world frame; `seed` gives the sensors' noise."""
         self.world = world
         self._simulator = Simulator(world.diagram)
         self.root_context: Context = self._simulator.get_mutable_context()
@@ -27,13 +28,17 @@ class Engine:
         for name, pose in starts.items():
             world.robots[name].place(self.context, pose)
         self._spots = {
-            name: SpotRobot(model, SpotSensors(model, self.context), self.context)
+            name: SpotRobot(model, self._sensors(model, seed), self.context)
             for name, model in sorted(world.robots.items())
         }
         self._steps = 0
         self._observers: list[Callable[[float], None]] = []
         self._command_robots()
         self._simulator.Initialize()
+
+    def _sensors(self, model: SpotModel, seed: int) -> SpotSensors:
+        scene_graph = self.world.scene_graph
+        return SpotSensors(model, scene_graph, self.root_context, self.context, seed=seed, renderer=RENDERER)
 
     @property
     def robots(self) -> Mapping[str, Robot]:

@@ -44,7 +44,6 @@ _TRAJECTORY_START_RAD = 0.25
 _JAW_ARRIVED_RAD = 0.03
 _JAW_STALL_RAD_S = 0.03
 _JAW_STALL_S = 0.25
-_JAW_HELD_FORCE_N = 20.0
 
 
 class SpotRobot:
@@ -103,8 +102,8 @@ class SpotRobot:
         return self._sensors.joints()
 
     def gripper(self) -> Gripper:
-        """Latest gripper state; `holding` means that the jaw pushes and does not move, well before it is closed."""
-        return self._sensors.gripper(self._holding())
+        """Latest gripper state."""
+        return self._sensors.gripper()
 
     def battery(self) -> Battery:
         """Latest battery state."""
@@ -297,11 +296,6 @@ class SpotRobot:
         arrived = abs(opening - self._jaw_goal.opening_rad) < _JAW_ARRIVED_RAD
         if arrived or self._jaw_still_s > _JAW_STALL_S:
             self._book.finish(Part.GRIPPER, CommandState.DONE, "" if arrived else "stopped by a thing in the jaw")
-
-    def _holding(self) -> bool:
-        opening = -float(self._positions()[self._index.positions[self._index.jaw]])
-        pushes = opening - self._jaw_goal.opening_rad > 2 * _JAW_ARRIVED_RAD
-        return pushes and self._jaw_still_s > _JAW_STALL_S
 
     def _drive_body(self, positions: FloatArray, dt_s: float) -> None:
         carrier = self._model.carrier

@@ -2,43 +2,153 @@
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import FrameId, QueryObject, SceneGraph
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
+from plant.models.spot.description import arm_joint_names, spot_facts
+from plant.sensors.battery import BatteryModel, BatterySpec
+from plant.sensors.camera import Camera
+from plant.sensors.camera_spec import load_cameras
+from plant.sensors.gripper import GripperModel
+from plant.sensors.imu import ImuModel
+from plant.sensors.joints import JointModel
+from plant.sensors.lidar import Lidar
+from plant.sensors.odometry import OdometryModel
 from plant.spot.model import SpotModel
-from skills.robot import Battery, Gripper, Image, Imu, Joints, Odometry, Scan
+from skills.robot import Battery, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
+
+FloatArray = NDArray[np.float64]
+CAMERAS = Path(__file__).parents[1] / "models" / "spot" / "cameras.yaml"
+HAND_LINK = "arm_wr1"
+_FRAME_OF_LINK = {"body": "body", HAND_LINK: "hand"}
+_LIDAR_PERIOD_S = 0.1
+_JAW_MOVES_RAD_S = 0.05
 
 
 class SpotSensors:
-    def __init__(self, model: SpotModel, context: Context) -> None:
-        self._model, self._context = model, context
+    """All sensors of one Spot. Pictures are taken when asked for, all else at `update`."""
+
+    def __init__(
+        self, model: SpotModel, scene_graph: SceneGraph, root_context: Context, context: Context, *, seed: int, renderer: str
+    ) -> None:
+        """`context` is the plant's part of `root_context`. The seed and the robot's name give the noise."""
+        self._model, self._scene_graph = model, scene_graph
+        self._root_context, self._context = root_context, context
         self._index = model.index()
+        self._kinematics = model.plant.CreateDefaultContext()
+        rngs = _generators(seed, model.name)
+        body = spot_facts()["capabilities"]
+        self._odometry_model = OdometryModel(next(rngs))
+        self._imu_model = ImuModel(next(rngs))
+        self._joint_model = JointModel(next(rngs), self._index.names)
+        self._gripper_model = GripperModel(next(rngs))
+        self._battery_model = BatteryModel(next(rngs), spec=BatterySpec(runtime_s=body["runtime"]))
+        self._lidar = self._make_lidar(next(rngs))
+        self._cameras = {
+            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=renderer)
+            for name, spec in load_cameras(CAMERAS).items()
+        }
+        self._scan: Scan | None = None
         self.update(0.0)
 
-    def update(self, now_s: float) -> None:
+    def _make_lidar(self, rng: np.random.Generator) -> Lidar:
+        plant, X_BL = self._model.plant, RigidTransform(spot_facts()["lidar"]["xyz"])
+        inspector = self._scene_graph.model_inspector()
+        return Lidar(plant, inspector, self._model.body, X_BL, rng, unseen=self._model.instances())
+
+    def _link_frame(self, link: str) -> FrameId:
         plant = self._model.plant
-        self._now = now_s
-        X = plant.EvalBodyPoseInWorld(self._context, self._model.body)
-        self._odometry = Odometry(now_s, X, (0.0, 0.0, 0.0))
+        return plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(link, self._model.instance).index())
+
+    def update(self, now_s: float) -> None:
+        """Take new readings of all but the cameras."""
+        plant, index = self._model.plant, self._index
+        self._now_s = now_s
+        X_WB = plant.EvalBodyPoseInWorld(self._context, self._model.body)
+        motion = plant.EvalBodySpatialVelocityInWorld(self._context, self._model.body)
+        self._odometry = self._odometry_model.update(now_s, X_WB, motion.rotational(), motion.translational())
+        self._imu = self._imu_model.update(now_s, X_WB, motion.rotational(), motion.translational())
+        positions = plant.GetPositions(self._context)[index.positions]
+        rates = plant.GetVelocities(self._context)[index.velocities]
+        efforts = plant.get_net_actuation_output_port(self._model.instance).Eval(self._context)
+        self._joints = self._joint_model.update(now_s, positions, rates, efforts)
+        self._gripper = self._gripper_model.update(
+            now_s, -float(positions[index.jaw]), self._clamp_force_n(rates, efforts)
+        )
+        load = min(1.0, float(np.linalg.norm(motion.translational())) + float(np.abs(rates[index.arm]).sum()) / 4.0)
+        self._battery = self._battery_model.update(now_s, load)
+        if self._scan is None or now_s - self._scan.stamp_s >= _LIDAR_PERIOD_S - 1e-6:
+            self._scan = self._lidar.scan(self._context, now_s, self._odometry.X_OB)
+
+    def _clamp_force_n(self, rates: FloatArray, efforts: FloatArray) -> float:
+        """Force at the jaw's tip from its motor's torque, 0 while the jaw moves."""
+        if abs(float(rates[self._index.jaw])) > _JAW_MOVES_RAD_S:
+            return 0.0
+        return max(0.0, float(efforts[self._index.jaw])) / float(spot_facts()["gripper"]["tip_radius"])
 
     def odometry(self) -> Odometry:
+        """Latest dead reckoning."""
         return self._odometry
 
     def imu(self) -> Imu:
-        raise NotImplementedError
+        """Latest inertial measurement."""
+        return self._imu
 
     def scan(self) -> Scan | None:
-        return None
-
-    def image(self, source: str) -> Image:
-        raise NotImplementedError
+        """Latest LiDAR revolution."""
+        return self._scan
 
     def joints(self) -> Joints:
-        p = self._model.plant.GetPositions(self._context)[self._index.positions]
-        v = self._model.plant.GetVelocities(self._context)[self._index.velocities]
-        return Joints(self._now, dict(zip(self._index.names, p)), dict(zip(self._index.names, v)), {})
+        """Latest joint state."""
+        return self._joints
 
-    def gripper(self, holding: bool) -> Gripper:
-        return Gripper(self._now, -self.joints().position_rad["arm_f1x"], 0.0, holding)
+    def gripper(self) -> Gripper:
+        """Latest gripper state."""
+        return self._gripper
 
     def battery(self) -> Battery:
-        return Battery(self._now, 1.0)
+        """Latest battery state."""
+        return self._battery
+
+    def image(self, source: str) -> Image:
+        """Take a picture now. Raises ValueError for an unknown source."""
+        if source not in self._cameras:
+            raise ValueError(f"{self._model.name} has no camera {source!r}; it has {', '.join(self._cameras)}")
+        query: QueryObject = self._scene_graph.get_query_output_port().Eval(
+            self._scene_graph.GetMyContextFromRoot(self._root_context)
+        )
+        return self._cameras[source].take(query, self._now_s, self._frames())
+
+    def _frames(self) -> FrameTree:
+        """The frame tree from odometry and joint encoders."""
+        edges = {
+            "body": ("odom", self._odometry.X_OB),
+            "hand": ("body", self._X_BHand()),
+            "lidar": ("body", RigidTransform(spot_facts()["lidar"]["xyz"])),
+        }
+        for camera in self._cameras.values():
+            edges[camera.spec.frame] = (_FRAME_OF_LINK[camera.spec.link], camera.spec.X_link_camera())
+        return FrameTree(edges)
+
+    def _X_BHand(self) -> RigidTransform:
+        plant = self._model.plant
+        for name in arm_joint_names():
+            plant.GetJointByName(name, self._model.instance).set_angle(self._kinematics, self._joints.position_rad[name])
+        hand = plant.GetBodyByName(HAND_LINK, self._model.instance).body_frame()
+        X_BHand: RigidTransform = plant.CalcRelativeTransform(self._kinematics, self._model.body.body_frame(), hand)
+        return X_BHand
+
+
+def _generators(seed: int, robot_name: str) -> Iterator[np.random.Generator]:
+    """Independent generators, the same for the same seed and name."""
+    sequence = np.random.SeedSequence([seed, zlib.crc32(robot_name.encode())])
+    while True:
+        (child,) = sequence.spawn(1)
+        yield np.random.default_rng(child)

@@ -34,8 +34,10 @@ class ArmShape:
 
     def points_B(self, joints: Joints) -> FloatArray:
         """The arm's joints in order and the tip beyond the hand, (joints + 1, 3) in the body frame."""
+        q = self._plant.GetPositions(self._context)
         for name, joint in zip(self._names, self._joints, strict=True):
-            joint.SetPositions(self._context, np.array([joints.position_rad[name]]))
+            q[joint.position_start()] = joints.position_rad[name]
+        self._plant.SetPositions(self._context, q)
         poses = [joint.frame_on_child().CalcPose(self._context, self._body) for joint in self._joints]
         tip = poses[-1] @ np.array([self.HAND_LENGTH_M, 0.0, 0.0])
         return np.array([*(pose.translation() for pose in poses), tip])

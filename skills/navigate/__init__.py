@@ -1,0 +1,1 @@
+"""Going to a place: a planned path, followed with checks."""

@@ -1,0 +1,182 @@
+"""Following of a path by a base that moves and turns in any direction, with brakes for what comes into the way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.api import Costmap
+from skills.estimate.planar import wrap
+from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m
+from skills.navigate.path import TURN_M_PER_RAD, Path
+from skills.robot import Pose2D
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FollowerOptions:
+    """Numbers of the follower: speeds (m/s, rad/s), accelerations (m/s^2, rad/s^2), gain (1/s).
+
+    `lead_s` looks ahead for the base's lag; closer than `touch_m` counts as in the way, looked for `look_m` ahead;
+    between `near_m` and `wide_m` of clearance the speed falls from full to near_speed_m_s.
+    """
+
+    max_speed_m_s: float = 0.8
+    backward_m_s: float = 0.35
+    lateral_m_s: float = 0.3
+    turn_rad_s: float = 0.9
+    acceleration_m_s2: float = 0.8
+    braking_m_s2: float = 0.5
+    turn_acceleration_rad_s2: float = 2.5
+    gain: float = 1.6
+    lead_s: float = 0.2
+    touch_m: float = 0.02
+    look_m: float = 1.6
+    near_m: float = 0.08
+    wide_m: float = 0.3
+    near_speed_m_s: float = 0.3
+    creep_m_s: float = 0.04
+    lost_path_m: float = 0.35
+    period_s: float = 0.05
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One tick's answer: a body-frame velocity, the way still to go (m, turns included), how far off the path (m).
+
+    `blocked_at` is the world (x, y) of what stands in the way ahead, None when the way is clear.
+    """
+
+    velocity: tuple[float, float, float]
+    remaining_m: float
+    off_path_m: float
+    blocked_at: tuple[float, float] | None
+
+
+class PathFollower:
+    """Follows one path. Hold one per path; `command` is to be called once a tick."""
+
+    def __init__(self, path: Path, footprint: Footprint, options: FollowerOptions | None = None) -> None:
+        self._options = options or FollowerOptions()
+        self._path = path
+        self._footprint = footprint
+        self._progress = path.progress_m()
+        self._limits = speed_limits(path, self._progress, self._options)
+        self._index = 0
+
+    @property
+    def length_m(self) -> float:
+        """The whole way, turns included."""
+        return float(self._progress[-1])
+
+    def command(self, pose: Pose2D, velocity: tuple[float, float, float], last: FloatArray, costmap: Costmap) -> Drive:
+        """The velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,)."""
+        here = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
+        off_path_m = self._project(here)
+        along = float(self._progress[self._index])
+        free_m, blocked_at = self._free_way(costmap, here)
+        speed = min(float(self._limits[self._index]), math.sqrt(2.0 * self._options.braking_m_s2 * free_m))
+        wanted = self._wanted(here, along, speed) if free_m > 0.0 else np.zeros(3)
+        limited = self._slew(self._clip(wanted), last)
+        safe = self._brake(limited, here, costmap)
+        remaining = self.length_m - along
+        return Drive((float(safe[0]), float(safe[1]), float(safe[2])), remaining, off_path_m, blocked_at)
+
+    def _project(self, here: FloatArray) -> float:
+        """Move the index to the nearest pose of the path a little behind or ahead; returns the distance to it (m)."""
+        first, last = max(0, self._index - 3), min(len(self._progress), self._index + 25)
+        delta = self._path.poses[first:last] - here
+        turns = (delta[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+        off = np.sqrt(delta[:, 0] ** 2 + delta[:, 1] ** 2 + (TURN_M_PER_RAD * turns) ** 2)
+        best = int(np.argmin(off))
+        self._index = first + best
+        return float(np.hypot(delta[best, 0], delta[best, 1]))
+
+    def _at(self, along: float) -> FloatArray:
+        """The path's pose at a progress."""
+        poses = self._path.poses
+        return np.array([np.interp(along, self._progress, poses[:, axis]) for axis in range(3)])
+
+    def _wanted(self, here: FloatArray, along: float, speed: float) -> FloatArray:
+        """Body-frame velocity: along the path, and back to it."""
+        options = self._options
+        lead = max(speed * options.lead_s, 0.01)
+        target, after = self._at(along), self._at(along + lead)
+        forward = (after - target) / lead * speed
+        error = target - here
+        error[2] = wrap(error[2])
+        world = forward + options.gain * error
+        if self.length_m - along < 0.02:
+            world = options.gain * error
+        midway = here[2] + 0.5 * world[2] * options.period_s
+        c, s = math.cos(midway), math.sin(midway)
+        return np.array([c * world[0] + s * world[1], -s * world[0] + c * world[1], world[2]])
+
+    def _clip(self, velocity: FloatArray) -> FloatArray:
+        """Scale down to the speed limits, keeping the direction."""
+        options = self._options
+        ahead = options.max_speed_m_s if velocity[0] >= 0.0 else options.backward_m_s
+        share = np.abs(velocity) / np.array([ahead, options.lateral_m_s, options.turn_rad_s])
+        return np.asarray(velocity / max(1.0, float(np.max(share))))
+
+    def _slew(self, velocity: FloatArray, last: FloatArray) -> FloatArray:
+        """Keep to the accelerations; slowing down may be twice as quick."""
+        options = self._options
+        most = np.array([options.acceleration_m_s2, options.acceleration_m_s2, options.turn_acceleration_rad_s2])
+        most = most * options.period_s * np.where(np.abs(velocity) < np.abs(last), 2.0, 1.0)
+        return np.asarray(last + np.clip(velocity - last, -most, most))
+
+    def _free_way(self, costmap: Costmap, here: FloatArray) -> tuple[float, tuple[float, float] | None]:
+        """Way (m) that is free ahead, less a reserve, and the place of the first thing in it."""
+        options = self._options
+        end = int(np.searchsorted(self._progress, self._progress[self._index] + options.look_m))
+        poses = self._path.poses[self._index : end + 1 : 2]
+        clearance = footprint_clearance_m(costmap, self._footprint, poses)
+        now = float(footprint_clearance_m(costmap, self._footprint, here[None, :])[0])
+        blocked = np.flatnonzero(clearance < min(options.touch_m, now - 0.02))
+        if len(blocked) == 0:
+            return options.look_m, None
+        first = int(blocked[0])
+        way = self._progress[self._index + 2 * first] - self._progress[self._index]
+        return max(0.0, float(way) - 0.1), self._culprit(costmap, poses[first])
+
+    def _culprit(self, costmap: Costmap, pose: FloatArray) -> tuple[float, float]:
+        """Where on the outline at a pose something is touched."""
+        centres = disc_centres(self._footprint, pose[None, :])[0]
+        worst = int(np.argmin(costmap.clearance_m(centres) - self._footprint.discs[:, 2]))
+        return float(centres[worst, 0]), float(centres[worst, 1])
+
+    def _brake(self, velocity: FloatArray, here: FloatArray, costmap: Costmap) -> FloatArray:
+        """Stop when the next half second would bring the outline into something that it is not in already."""
+        c, s = math.cos(here[2]), math.sin(here[2])
+        world = np.array([c * velocity[0] - s * velocity[1], s * velocity[0] + c * velocity[1], velocity[2]])
+        ahead = here + np.array([[0.0], [0.25], [0.5]]) * world
+        clearance = footprint_clearance_m(costmap, self._footprint, ahead)
+        if clearance[1:].min() < min(0.0, float(clearance[0]) - 0.005):
+            return np.zeros(3)
+        return velocity
+
+
+def speed_limits(path: Path, progress_m: FloatArray, options: FollowerOptions) -> FloatArray:
+    """Speed along the path (m/s of progress) at each pose: by direction, by clearance, and in time for what comes."""
+    steps = np.diff(path.poses, axis=0)
+    ways = np.maximum(np.diff(progress_m), 1e-9)
+    yaw = path.poses[:-1, 2]
+    ahead = (np.cos(yaw) * steps[:, 0] + np.sin(yaw) * steps[:, 1]) / ways
+    aside = np.abs(-np.sin(yaw) * steps[:, 0] + np.cos(yaw) * steps[:, 1]) / ways
+    turn = np.abs(steps[:, 2]) / ways
+    open_share = np.clip((path.clearance_m - options.near_m) / (options.wide_m - options.near_m), 0.0, 1.0)[:-1]
+    by_clearance = options.near_speed_m_s + open_share * max(0.0, options.max_speed_m_s - options.near_speed_m_s)
+    lengthwise = np.where(ahead >= 0.0, options.max_speed_m_s, options.backward_m_s) / np.maximum(np.abs(ahead), 1e-6)
+    sideways = options.lateral_m_s / np.maximum(aside, 1e-6)
+    turning = 0.85 * options.turn_rad_s / np.maximum(turn, 1e-6)
+    shift = np.maximum(np.hypot(ahead, aside), 1e-6)
+    limits = np.minimum.reduce([lengthwise, sideways, turning, by_clearance / shift])
+    limits = np.append(limits, options.creep_m_s)
+    for n in range(len(limits) - 2, -1, -1):
+        limits[n] = min(limits[n], math.sqrt(limits[n + 1] ** 2 + 2.0 * options.braking_m_s2 * ways[n]))
+    return np.asarray(limits)

@@ -1,0 +1,112 @@
+"""The robot's standing outline, covered by discs, and its clearance from what a costmap knows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.api import Costmap
+from skills.estimate.compiled import bilinear, compiled
+from skills.robot import Capabilities, Pose2D
+
+FloatArray = NDArray[np.float64]
+
+SAFE_MARGIN_M = 0.06
+"""The clearance (m) that a standing or driven pose should keep: map and tracking errors fit into it."""
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """An upright rectangle in the body frame, as discs: rows of x, y, radius (m).
+
+    The discs lie inside of the outline, radius 0 at the corners, so the clearance of all of them is that of the
+    rectangle, within about a centimetre.
+    """
+
+    discs: FloatArray
+    length_m: float
+    width_m: float
+
+    @staticmethod
+    def of(capabilities: Capabilities) -> Footprint:
+        """The footprint that a robot says it has."""
+        return Footprint.rectangle(capabilities.footprint_m)
+
+    @staticmethod
+    def rectangle(corners: Sequence[tuple[float, float]]) -> Footprint:
+        """The bounding rectangle of outline corners (x, y)."""
+        low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+        length, width = (float(v) for v in high - low)
+        middle, long_axis = (low + high) / 2.0, 0 if length >= width else 1
+        radius = min(length, width) / 2.0
+        small = 0.3 * radius
+        reach = max(length, width) / 2.0 - radius
+        row = np.linspace(-reach, reach, max(2, math.ceil(2.0 * reach / (0.6 * radius)) + 1))
+        discs = [(t, 0.0, radius) if long_axis == 0 else (0.0, t, radius) for t in row]
+        signs = [(sx, sy) for sx in (-1.0, 1.0) for sy in (-1.0, 1.0)]
+        discs += [(sx * (length / 2.0 - small), sy * (width / 2.0 - small), small) for sx, sy in signs]
+        discs += [(sx * length / 2.0, sy * width / 2.0, 0.0) for sx, sy in signs]
+        return Footprint(np.array(discs) + np.array([*middle, 0.0]), length, width)
+
+    @property
+    def inscribed_m(self) -> float:
+        """Radius (m) of the largest disc inside."""
+        return min(self.length_m, self.width_m) / 2.0
+
+    @property
+    def circumscribed_m(self) -> float:
+        """Distance (m) from the body's origin to the farthest corner."""
+        return float(np.max(np.hypot(self.discs[:, 0], self.discs[:, 1]) + self.discs[:, 2]))
+
+
+def pose_array(poses: Sequence[Pose2D]) -> FloatArray:
+    """Poses as rows x, y, yaw."""
+    return np.array([(p.x_m, p.y_m, p.yaw_rad) for p in poses], dtype=np.float64).reshape(-1, 3)
+
+
+def disc_centres(footprint: Footprint, poses: FloatArray) -> FloatArray:
+    """World (x, y) of all discs at (N, 3) poses: (N, discs, 2)."""
+    c, s = np.cos(poses[:, 2:3]), np.sin(poses[:, 2:3])
+    x, y = footprint.discs[:, 0], footprint.discs[:, 1]
+    return np.stack([poses[:, 0:1] + c * x - s * y, poses[:, 1:2] + s * x + c * y], axis=-1)
+
+
+def footprint_clearance_m(costmap: Costmap, footprint: Footprint, poses: FloatArray) -> FloatArray:
+    """Distance (m) from the outline to the nearest obstacle at (N, 3) poses x, y, yaw; negative when it is touched."""
+    centres = disc_centres(footprint, poses)
+    clearance = costmap.clearance_m(centres.reshape(-1, 2)).reshape(centres.shape[:2])
+    return np.asarray(np.min(clearance - footprint.discs[:, 2], axis=1))
+
+
+def footprint_clear(costmap: Costmap, footprint: Footprint, pose: Pose2D, margin_m: float = SAFE_MARGIN_M) -> bool:
+    """Whether the robot can stand at a pose with at least margin_m to everything."""
+    return bool(footprint_clearance_m(costmap, footprint, pose_array([pose]))[0] >= margin_m)
+
+
+@compiled
+def clearance_at(
+    field: NDArray[np.float32],
+    frame: tuple[float, float, float],
+    discs: FloatArray,
+    x: float,
+    y: float,
+    yaw: float,
+) -> float:
+    """Clearance of the discs at one pose in a sampled field.
+
+    `frame` is the field's resolution and the x, y of the centre of field[0, 0]; off the field it is -1.
+    """
+    c, s = math.cos(yaw), math.sin(yaw)
+    rows, columns = field.shape
+    least = 1e9
+    for n in range(discs.shape[0]):
+        u = (x + c * discs[n, 0] - s * discs[n, 1] - frame[1]) / frame[0]
+        v = (y + s * discs[n, 0] + c * discs[n, 1] - frame[2]) / frame[0]
+        if not (0.0 <= u <= columns - 1.0 and 0.0 <= v <= rows - 1.0):
+            return -1.0
+        least = min(least, bilinear(field, u, v) - discs[n, 2])
+    return least

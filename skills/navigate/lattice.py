@@ -1,0 +1,211 @@
+"""A* over a lattice of places and headings, deterministic and compiled."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.estimate.compiled import compiled
+from skills.navigate.footprint import clearance_at
+from skills.navigate.motion_cost import Weights, motion_seconds, nearness
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Frame = tuple[float, float, float]
+
+
+class Lattice(NamedTuple):
+    """Places at (x0_m + column * cell_m, y0_m + row * cell_m), headings at yaw0_rad + k * 2 pi / headings."""
+
+    x0_m: float
+    y0_m: float
+    cell_m: float
+    yaw0_rad: float
+    rows: int
+    columns: int
+    headings: int
+
+
+class Space(NamedTuple):
+    """What poses are checked against: a sampled clearance field, its frame (see `clearance_at`), the robot's discs."""
+
+    field: NDArray[np.float32]
+    frame: Frame
+    discs: FloatArray
+    weights: Weights
+
+
+class Needs(NamedTuple):
+    """Clearance wanted: margin_m, or escape_margin_m within escape_m of the start (x, y)."""
+
+    margin_m: float
+    escape_margin_m: float
+    escape_m: float
+    x_m: float
+    y_m: float
+
+
+def lattice_moves(headings: int) -> IntArray:
+    """Moves (M, 3): columns, rows, headings. Sixteen directions, each also with a turn to either side, and turns."""
+    flat = [(1, 0), (1, 1), (2, 1), (1, 2)]
+    steps = {(sx * a, sy * b) for dx, dy in flat for a, b in ((dx, dy), (dy, dx)) for sx in (1, -1) for sy in (1, -1)}
+    moves = [(dx, dy, turn) for dx, dy in sorted(steps) for turn in (0, -1, 1)]
+    return np.array([*moves, (0, 0, -1), (0, 0, 1)], dtype=np.int64)
+
+
+@compiled
+def cost_to_go(space: Space, lattice: Lattice, goal_row: int, goal_column: int, inscribed_m: float) -> FloatArray:
+    """Least seconds from each place to the goal for a disc of the inscribed radius; infinite where there is no way."""
+    field, frame, _, weights = space
+    rows, columns = lattice.rows, lattice.columns
+    factor = np.full((rows, columns), np.inf)
+    for i in range(rows):
+        for j in range(columns):
+            u = int(round((lattice.x0_m + j * lattice.cell_m - frame[1]) / frame[0]))
+            v = int(round((lattice.y0_m + i * lattice.cell_m - frame[2]) / frame[0]))
+            if 0 <= v < field.shape[0] and 0 <= u < field.shape[1] and field[v, u] > inscribed_m - frame[0]:
+                factor[i, j] = nearness(field[v, u] - inscribed_m + frame[0], weights)
+    cost = np.full((rows, columns), np.inf)
+    cost[goal_row, goal_column] = 0.0
+    heap = [(0.0, goal_row * columns + goal_column)]
+    while len(heap) > 0:
+        here, index = heapq.heappop(heap)
+        i, j = index // columns, index % columns
+        if here > cost[i, j]:
+            continue
+        for a in range(max(0, i - 1), min(rows, i + 2)):
+            for b in range(max(0, j - 1), min(columns, j + 2)):
+                way = math.hypot(a - i, b - j) * lattice.cell_m / weights[0]
+                new = here + way * factor[a, b]
+                if new < cost[a, b]:
+                    cost[a, b] = new
+                    heapq.heappush(heap, (new, a * columns + b))
+    return cost
+
+
+@compiled
+def search(
+    space: Space,
+    lattice: Lattice,
+    moves: IntArray,
+    to_go: FloatArray,
+    seeds: FloatArray,
+    final: FloatArray,
+    goal_row: int,
+    goal_column: int,
+    needs: Needs,
+    greed: float,
+) -> IntArray:
+    """State indices from a seed to the goal's place, empty when there is no way.
+
+    A state's index is (row * columns + column) * headings + heading. `seeds` are rows of state index and cost so far;
+    `final` is the cost of the last turn at the goal from each heading, infinite where it cannot be.
+    """
+    states = lattice.rows * lattice.columns * lattice.headings
+    cost = np.full(states + 1, np.inf)
+    parent = np.full(states + 1, -1, dtype=np.int64)
+    closed = np.zeros(states + 1, dtype=np.bool_)
+    clear = np.full(states, np.nan, dtype=np.float32)
+    heap = [(0.0, np.int64(0)) for _ in range(0)]
+    for n in range(seeds.shape[0]):
+        index = np.int64(seeds[n, 0])
+        cost[index] = seeds[n, 1]
+        heapq.heappush(heap, (seeds[n, 1] + greed * _ahead(to_go, lattice, index), index))
+    goal_cell = goal_row * lattice.columns + goal_column
+    while len(heap) > 0:
+        _, index = heapq.heappop(heap)
+        if index == states:
+            break
+        if closed[index]:
+            continue
+        closed[index] = True
+        cell, k = index // lattice.headings, index % lattice.headings
+        if cell == goal_cell and cost[index] + final[k] < cost[states]:
+            cost[states], parent[states] = cost[index] + final[k], index
+            heapq.heappush(heap, (cost[states], np.int64(states)))
+        _expand(space, lattice, moves, to_go, needs, greed, index, cost, parent, closed, clear, heap)
+    return _trace(parent, states)
+
+
+@compiled
+def _expand(space, lattice, moves, to_go, needs, greed, index, cost, parent, closed, clear, heap):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Relax all moves from a state."""
+    headings, columns = lattice.headings, lattice.columns
+    cell, k = index // headings, index % headings
+    i, j = cell // columns, cell % columns
+    turn = 2.0 * math.pi / headings
+    here, there = np.empty(3), np.empty(3)
+    here[0], here[1] = lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m
+    here[2] = lattice.yaw0_rad + k * turn
+    near = math.hypot(here[0] - needs.x_m, here[1] - needs.y_m) < needs.escape_m
+    need = needs.escape_margin_m if near else needs.margin_m
+    for n in range(moves.shape[0]):
+        a, b = i + moves[n, 1], j + moves[n, 0]
+        if not (0 <= a < lattice.rows and 0 <= b < columns) or not to_go[a, b] < np.inf:
+            continue
+        new = (a * columns + b) * headings + (k + moves[n, 2]) % headings
+        if closed[new]:
+            continue
+        there[0], there[1] = lattice.x0_m + b * lattice.cell_m, lattice.y0_m + a * lattice.cell_m
+        there[2] = here[2] + moves[n, 2] * turn
+        least = motion_seconds(
+            there[0] - here[0], there[1] - here[1], there[2] - here[2], 0.5 * (here[2] + there[2]), space.weights
+        )
+        if cost[index] + least >= cost[new]:
+            continue
+        total = cost[index] + _move_cost(space, clear, here, there, new, need, least)
+        if total < cost[new]:
+            cost[new], parent[new] = total, index
+            heapq.heappush(heap, (total + greed * to_go[a, b], new))
+
+
+@compiled
+def _move_cost(
+    space: Space,
+    clear: NDArray[np.float32],
+    here: FloatArray,
+    there: FloatArray,
+    new: int,
+    need: float,
+    seconds: float,
+) -> float:
+    """Cost of one move, checked at its end (kept in `clear`) and in between."""
+    if math.isnan(clear[new]):
+        clear[new] = clearance_at(space.field, space.frame, space.discs, there[0], there[1], there[2])
+    if clear[new] < need:
+        return math.inf
+    way = math.hypot(there[0] - here[0], there[1] - here[1]) + 0.6 * abs(there[2] - here[2])
+    steps = math.ceil(way / 0.12)
+    if clear[new] < need + way:
+        for n in range(1, steps):
+            t = n / steps
+            pose = here + t * (there - here)
+            if clearance_at(space.field, space.frame, space.discs, pose[0], pose[1], pose[2]) < need:
+                return math.inf
+    return seconds * nearness(clear[new], space.weights)
+
+
+@compiled
+def _ahead(to_go: FloatArray, lattice: Lattice, index: int) -> float:
+    """The cost to go from a state's place."""
+    cell = index // lattice.headings
+    return float(to_go[cell // lattice.columns, cell % lattice.columns])
+
+
+@compiled
+def _trace(parent: IntArray, last: int) -> IntArray:
+    """The states from the seed to the one before `last`."""
+    count, index = 0, parent[last]
+    while index >= 0:
+        count += 1
+        index = parent[index]
+    states = np.empty(count, dtype=np.int64)
+    index = parent[last]
+    for n in range(count):
+        states[count - 1 - n] = index
+        index = parent[index]
+    return states

@@ -1,0 +1,52 @@
+"""A planned path: closely spaced poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.robot import Pose2D
+
+FloatArray = NDArray[np.float64]
+
+TURN_M_PER_RAD = 0.4
+"""A turn of one radian counts as so many metres of progress along a path."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """Poses (N, 3) x, y (m), yaw (rad, continuous, not wrapped) in the world frame, at most some centimetres apart.
+
+    `clearance_m` (N,) is the footprint's clearance that the planner saw at each.
+    """
+
+    poses: FloatArray
+    clearance_m: FloatArray
+
+    def __post_init__(self) -> None:
+        if self.poses.ndim != 2 or self.poses.shape[1] != 3 or len(self.poses) < 1:
+            raise ValueError("Path: poses must be (N, 3) with at least one row")
+
+    @property
+    def start(self) -> Pose2D:
+        """The first pose."""
+        return Pose2D(*self.poses[0].tolist())
+
+    @property
+    def goal(self) -> Pose2D:
+        """The last pose."""
+        return Pose2D(*self.poses[-1].tolist())
+
+    def progress_m(self) -> FloatArray:
+        """Way up to each pose (N,), turns included by TURN_M_PER_RAD."""
+        steps = np.diff(self.poses, axis=0)
+        ways = np.hypot(steps[:, 0], steps[:, 1]) + TURN_M_PER_RAD * np.abs(steps[:, 2])
+        return np.concatenate([[0.0], np.cumsum(ways)])
+
+
+def path_length(path: Path) -> float:
+    """Metres travelled along a path, turns left out."""
+    steps = np.diff(path.poses[:, :2], axis=0)
+    return float(np.sum(np.hypot(steps[:, 0], steps[:, 1])))

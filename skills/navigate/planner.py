@@ -1,0 +1,206 @@
+"""Planning of a way for the whole footprint, over place and heading."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.api import Costmap
+from skills.estimate.planar import wrap
+from skills.navigate.footprint import Footprint, clearance_at
+from skills.navigate.lattice import Lattice, Needs, Space, cost_to_go, lattice_moves, search
+from skills.navigate.motion_cost import PlannerOptions, segment_cost
+from skills.navigate.path import Path
+from skills.navigate.smoothing import clearances, densify, relax, shortcut
+from skills.robot import Pose2D
+
+FloatArray = NDArray[np.float64]
+
+FIELD_CELL_M = 0.05
+
+
+class PlanningError(RuntimeError):
+    """No way was found; the text is one sentence that says why."""
+
+
+class NoWayError(PlanningError):
+    """Start and goal are free, but nothing that the robot fits through joins them."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A costmap sampled around start and goal, with all that a plan needs: a snapshot, safe to plan in a thread."""
+
+    space: Space
+    footprint: Footprint
+    start: Pose2D
+    goal: Pose2D
+    options: PlannerOptions
+
+
+def plan_path(
+    costmap: Costmap, footprint: Footprint, start: Pose2D, goal: Pose2D, options: PlannerOptions | None = None
+) -> Path:
+    """The cheapest way from start to goal that the footprint can go. Raises PlanningError.
+
+    The path begins and ends exactly at start and goal. A start that is a little in collision may be left.
+    """
+    used = options or PlannerOptions()
+    try:
+        return solve(problem_of(costmap, footprint, start, goal, used))
+    except NoWayError:
+        return solve(problem_of(costmap, footprint, start, goal, used, margin_m=8.0))
+
+
+def problem_of(
+    costmap: Costmap,
+    footprint: Footprint,
+    start: Pose2D,
+    goal: Pose2D,
+    options: PlannerOptions,
+    margin_m: float = 3.0,
+) -> Problem:
+    """Sample the costmap on the box around start and goal, margin_m wider to all sides."""
+    low = np.minimum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) - margin_m
+    high = np.maximum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) + margin_m
+    xs, ys = (np.arange(low[axis], high[axis] + FIELD_CELL_M, FIELD_CELL_M) for axis in (0, 1))
+    points = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
+    field = costmap.clearance_m(points).reshape(len(ys), len(xs)).astype(np.float32)
+    frame = (FIELD_CELL_M, float(low[0]), float(low[1]))
+    space = Space(np.ascontiguousarray(field), frame, footprint.discs, options.weights())
+    return Problem(space, footprint, start, goal, options)
+
+
+def solve(problem: Problem) -> Path:
+    """The cheapest way, smoothed. Raises PlanningError."""
+    needs = _needs(problem)
+    _check_goal(problem)
+    for yaw0_rad in (0.0, problem.goal.yaw_rad):
+        rough = _search(problem, needs, yaw0_rad)
+        if rough is not None:
+            return _smooth(problem, rough, needs)
+    raise NoWayError(
+        f"There is no way from {_place(problem.start)} to {_place(problem.goal)} that the robot fits through."
+    )
+
+
+def _place(pose: Pose2D) -> str:
+    return f"({pose.x_m:.2f}, {pose.y_m:.2f})"
+
+
+def _clearance(problem: Problem, pose: Pose2D) -> float:
+    space = problem.space
+    return clearance_at(space.field, space.frame, space.discs, pose.x_m, pose.y_m, pose.yaw_rad)
+
+
+def _needs(problem: Problem) -> Needs:
+    """The clearance wanted; around a blocked start, what the start itself has."""
+    options, clearance = problem.options, _clearance(problem, problem.start)
+    if clearance < -options.deepest_start_m:
+        raise PlanningError(f"The robot stands in something at {_place(problem.start)}, so no way can begin there.")
+    escape = min(options.margin_m, clearance - 0.015)
+    return Needs(options.margin_m, escape, options.escape_m, problem.start.x_m, problem.start.y_m)
+
+
+def _check_goal(problem: Problem) -> None:
+    clearance = _clearance(problem, problem.goal)
+    if clearance < problem.options.margin_m:
+        raise PlanningError(
+            f"The goal {_place(problem.goal)} is blocked: the robot would have {clearance:.2f} m to the nearest thing "
+            f"there and needs {problem.options.margin_m:.2f} m."
+        )
+
+
+def _lattice(problem: Problem, yaw0_rad: float) -> tuple[Lattice, int, int]:
+    """The lattice with the goal on one of its places, over the whole field; the goal's row and column."""
+    cell, (resolution, x0, y0) = problem.options.cell_m, problem.space.frame
+    rows, columns = problem.space.field.shape
+    row, column = int((problem.goal.y_m - y0) / cell), int((problem.goal.x_m - x0) / cell)
+    above = int((y0 + (rows - 1) * resolution - problem.goal.y_m) / cell)
+    beside = int((x0 + (columns - 1) * resolution - problem.goal.x_m) / cell)
+    corner = (problem.goal.x_m - column * cell, problem.goal.y_m - row * cell)
+    shape = (row + above + 1, column + beside + 1)
+    return Lattice(*corner, cell, yaw0_rad, *shape, problem.options.headings), row, column
+
+
+def _segment(problem: Problem, a: FloatArray, b: FloatArray, need: float) -> float:
+    space = problem.space
+    return segment_cost(space.field, space.frame, space.discs, a, b, need, space.weights)
+
+
+def _seeds(problem: Problem, lattice: Lattice, needs: Needs) -> FloatArray:
+    """Lattice states next to the start that it can be left to: rows of state index and cost."""
+    start = np.array([problem.start.x_m, problem.start.y_m, problem.start.yaw_rad])
+    turn = 2.0 * math.pi / lattice.headings
+    column, row = (start[0] - lattice.x0_m) / lattice.cell_m, (start[1] - lattice.y0_m) / lattice.cell_m
+    k = math.floor((start[2] - lattice.yaw0_rad) / turn)
+    seeds = []
+    for i in (math.floor(row), math.floor(row) + 1):
+        for j in (math.floor(column), math.floor(column) + 1):
+            for heading in (k, k + 1):
+                yaw = lattice.yaw0_rad + heading * turn
+                pose = np.array([lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m, yaw])
+                cost = _segment(problem, start, pose, needs.escape_margin_m)
+                if math.isfinite(cost):
+                    seeds.append(
+                        (float((i * lattice.columns + j) * lattice.headings + heading % lattice.headings), cost)
+                    )
+    return np.array(seeds, dtype=np.float64).reshape(-1, 2)
+
+
+def _final_turns(problem: Problem, lattice: Lattice) -> FloatArray:
+    """Cost of turning at the goal from each heading to the goal's; infinite beyond one heading's width."""
+    goal = np.array([problem.goal.x_m, problem.goal.y_m, problem.goal.yaw_rad])
+    turn = 2.0 * math.pi / lattice.headings
+    costs = np.full(lattice.headings, np.inf)
+    for k in range(lattice.headings):
+        off = wrap(lattice.yaw0_rad + k * turn - problem.goal.yaw_rad)
+        if abs(off) < turn:
+            costs[k] = _segment(problem, goal + np.array([0.0, 0.0, off]), goal, problem.options.margin_m)
+    return costs
+
+
+@lru_cache(maxsize=4)
+def _moves(headings: int) -> NDArray[np.int64]:
+    return lattice_moves(headings)
+
+
+def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | None:
+    """Lattice poses from start to goal with continuous yaw, None when there is no way."""
+    lattice, row, column = _lattice(problem, yaw0_rad)
+    seeds, final = _seeds(problem, lattice, needs), _final_turns(problem, lattice)
+    to_go = cost_to_go(problem.space, lattice, row, column, problem.footprint.inscribed_m)
+    states = search(
+        problem.space,
+        lattice,
+        _moves(lattice.headings),
+        to_go,
+        seeds,
+        final,
+        row,
+        column,
+        needs,
+        problem.options.greed,
+    )
+    if len(states) == 0:
+        return None
+    cells, k = np.divmod(states, lattice.headings)
+    i, j = np.divmod(cells, lattice.columns)
+    x, y = lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m
+    yaw = lattice.yaw0_rad + k * (2.0 * math.pi / lattice.headings)
+    ends = [(p.x_m, p.y_m, p.yaw_rad) for p in (problem.start, problem.goal)]
+    poses = np.vstack([ends[0], np.column_stack([x, y, yaw]), ends[1]])
+    poses[:, 2] = np.unwrap(poses[:, 2])
+    return np.ascontiguousarray(poses)
+
+
+def _smooth(problem: Problem, rough: FloatArray, needs: Needs) -> Path:
+    """Shortcut, fill in and relax."""
+    knots = shortcut(problem.space, rough, needs, 25)
+    band = relax(problem.space, densify(knots), 60, problem.options.margin_m, 0.25)
+    poses = densify(band)
+    return Path(poses, clearances(problem.space, poses))

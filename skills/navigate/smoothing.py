@@ -1,0 +1,111 @@
+"""From the lattice's steps to a smooth path: shortcuts, then relaxation like an elastic band, always checked."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.estimate.compiled import compiled
+from skills.navigate.footprint import clearance_at
+from skills.navigate.lattice import Needs, Space
+from skills.navigate.motion_cost import segment_cost
+
+FloatArray = NDArray[np.float64]
+
+
+@compiled
+def shortcut(space: Space, poses: FloatArray, needs: Needs, window: int) -> FloatArray:
+    """The cheapest choice of (N, 3) poses to go through in straight lines, skipping at most `window` at a time.
+
+    The first and the last are kept; yaws must be continuous.
+    """
+    count = poses.shape[0]
+    best = np.full(count, np.inf)
+    came = np.full(count, -1, dtype=np.int64)
+    best[0] = 0.0
+    for j in range(1, count):
+        for i in range(max(0, j - window), j):
+            near = math.hypot(poses[i, 0] - needs.x_m, poses[i, 1] - needs.y_m) < needs.escape_m
+            need = needs.escape_margin_m if near else needs.margin_m
+            cost = segment_cost(space.field, space.frame, space.discs, poses[i], poses[j], need, space.weights)
+            if j - i == 1:
+                cost = min(cost, 1e6)
+            if best[i] + cost < best[j]:
+                best[j], came[j] = best[i] + cost, i
+    kept = np.zeros(count, dtype=np.bool_)
+    j = count - 1
+    while j >= 0:
+        kept[j] = True
+        j = came[j]
+    return poses[kept]
+
+
+def densify(poses: FloatArray, step_m: float = 0.06) -> FloatArray:
+    """The same way with poses at most step_m apart (a radian counting 0.6 m)."""
+    pieces = [poses[:1]]
+    for a, b in zip(poses[:-1], poses[1:], strict=True):
+        way = math.hypot(b[0] - a[0], b[1] - a[1]) + 0.6 * abs(b[2] - a[2])
+        shares = np.linspace(0.0, 1.0, max(1, math.ceil(way / step_m)) + 1)[1:]
+        pieces.append(a + shares[:, None] * (b - a))
+    return np.ascontiguousarray(np.concatenate(pieces))
+
+
+@compiled
+def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m: float) -> FloatArray:
+    """Pull poses to the middle of their neighbours, turn them along the way and push them from what is nearer than wide_m.
+
+    The ends stay. A pose moves only where its clearance stays above margin_m or does not get worse.
+    """
+    poses = poses.copy()
+    count = poses.shape[0]
+    clearance = np.empty(count)
+    for n in range(count):
+        clearance[n] = clearance_at(space.field, space.frame, space.discs, poses[n, 0], poses[n, 1], poses[n, 2])
+    for _ in range(rounds):
+        for n in range(1, count - 1):
+            x = 0.5 * poses[n, 0] + 0.25 * (poses[n - 1, 0] + poses[n + 1, 0])
+            y = 0.5 * poses[n, 1] + 0.25 * (poses[n - 1, 1] + poses[n + 1, 1])
+            yaw = 0.5 * poses[n, 2] + 0.25 * (poses[n - 1, 2] + poses[n + 1, 2])
+            yaw += 0.1 * _off_course(poses, n, yaw)
+            if clearance[n] < wide_m:
+                gx, gy = _uphill(space, x, y, yaw)
+                push = 0.02 * (wide_m - clearance[n]) / wide_m
+                x, y = x + push * gx, y + push * gy
+            new = clearance_at(space.field, space.frame, space.discs, x, y, yaw)
+            if new >= min(margin_m, clearance[n]):
+                poses[n, 0], poses[n, 1], poses[n, 2], clearance[n] = x, y, yaw, new
+    return poses
+
+
+@compiled
+def _off_course(poses: FloatArray, n: int, yaw: float) -> float:
+    """How far the way's direction at a pose lies from yaw; 0 where it does not go roughly ahead."""
+    first, last = max(0, n - 2), min(poses.shape[0] - 1, n + 2)
+    dx, dy = poses[last, 0] - poses[first, 0], poses[last, 1] - poses[first, 1]
+    if math.hypot(dx, dy) < 0.1:
+        return 0.0
+    off = (math.atan2(dy, dx) - yaw + math.pi) % (2.0 * math.pi) - math.pi
+    return off if abs(off) < 0.8 else 0.0
+
+
+@compiled
+def _uphill(space: Space, x: float, y: float, yaw: float) -> tuple[float, float]:
+    """Direction in which the clearance grows, length up to 1."""
+    h = 0.03
+    gx = clearance_at(space.field, space.frame, space.discs, x + h, y, yaw)
+    gx -= clearance_at(space.field, space.frame, space.discs, x - h, y, yaw)
+    gy = clearance_at(space.field, space.frame, space.discs, x, y + h, yaw)
+    gy -= clearance_at(space.field, space.frame, space.discs, x, y - h, yaw)
+    size = max(math.hypot(gx, gy), 2.0 * h)
+    return gx / size, gy / size
+
+
+@compiled
+def clearances(space: Space, poses: FloatArray) -> FloatArray:
+    """Clearance (m) of the footprint at each of (N, 3) poses."""
+    values = np.empty(poses.shape[0])
+    for n in range(poses.shape[0]):
+        values[n] = clearance_at(space.field, space.frame, space.discs, poses[n, 0], poses[n, 1], poses[n, 2])
+    return values

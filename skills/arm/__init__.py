@@ -1,0 +1,1 @@
+"""Arm kinematics, collision checks and motion planning, shared by the manipulation skills."""

@@ -1,0 +1,141 @@
+"""Base of the skills that move the arm: planned motions, pictures, stowing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import Cause, InputsT, SkillContext
+from skills.arm.collision import ArmScene, Box
+from skills.arm.kinematics import ArmModel, arm_model
+from skills.arm.motion import plan_joint_path, plan_line, time_path
+from skills.arm.routine import PlanningError, Routine, RoutineSkill, SkillFailure
+from skills.robot import ArmTrajectory, FloatArray, Image
+
+Goal = Callable[[ArmScene, FloatArray], FloatArray]
+
+PLANNING_LATENCY_S = 0.3
+PICTURE_LATENCY_S = 0.1
+SETTLE_S = 0.15
+HAND_CAMERA = "hand"
+LINE_SPEED_RAD_S = 0.6
+
+
+class ArmSkill(RoutineSkill[InputsT]):
+    """A routine with an arm. `boxes` stand around it (frame B), `held` is in the hand (frame H)."""
+
+    def __init__(self, context: SkillContext) -> None:
+        super().__init__(context)
+        self.boxes: Sequence[Box] = ()
+        self.held: Sequence[Box] = ()
+        self._scene: ArmScene | None = None
+        self._model: ArmModel | None = None
+        self._rng = np.random.default_rng(context.seed)
+
+    def begin(self, inputs: InputsT) -> None:
+        """Forget an earlier attempt: what stood around, what was held, the random numbers drawn."""
+        self.boxes, self.held, self._scene = (), (), None
+        self._rng = np.random.default_rng(self.context.seed)
+        super().begin(inputs)
+
+    @property
+    def model(self) -> ArmModel:
+        """The robot's arm. Raises SkillFailure with cause PRECONDITION when it has none that we can move."""
+        if self._model is None:
+            try:
+                self._model = arm_model(self.context.robot.capabilities())
+            except ValueError as error:
+                raise SkillFailure(Cause.PRECONDITION, str(error)) from error
+        return self._model
+
+    def q_rad(self) -> FloatArray:
+        """Arm angles now."""
+        positions = self.context.robot.joints().position_rad
+        return np.array([positions[name] for name in self.model.names])
+
+    def X_WB(self) -> RigidTransform:
+        """The body's pose in the world, as estimated."""
+        return self.context.X_WB()
+
+    def prepared_scene(self) -> ArmScene:
+        """The collision scene with what stands around and what is held; for use within Worker jobs."""
+        if self._scene is None:
+            robot = self.context.robot
+            self._scene = ArmScene(robot.capabilities(), self.model, robot.joints().position_rad)
+        self._scene.set_boxes(self.boxes)
+        self._scene.hold(self.held)
+        self._scene.set_padding(0.01)
+        self._scene.set_jaw(max(0.0, self.context.robot.gripper().opening_rad))
+        return self._scene
+
+    def move_to(self, goal: Goal, message: str, speed_rad_s: float = 1.2) -> Routine[None]:
+        """Plan to the configuration that `goal(scene, q_now)` gives, and go there."""
+
+        def plan() -> ArmTrajectory:
+            scene, start = self.prepared_scene(), self.q_rad()
+            path = plan_joint_path(scene, start, goal(scene, start), self._rng)
+            return time_path(path, speed_rad_s=speed_rad_s, scene=scene)
+
+        trajectory = yield from self.compute(
+            plan, latency_s=PLANNING_LATENCY_S, name="plan arm motion", message=message
+        )
+        yield from self.follow(trajectory, message)
+
+    def move_straight(self, p_BH: FloatArray, message: str, scene: ArmScene | None = None) -> Routine[None]:
+        """Move the hand straight to p_BH with the orientation that it has."""
+
+        def plan() -> ArmTrajectory:
+            q = self.q_rad()
+            X_BH = RigidTransform(self.model.X_BH(q).rotation(), p_BH)
+            return time_path(plan_line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
+
+        trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)
+        yield from self.follow(trajectory, message)
+
+    def shift_hand(self, offset_B: FloatArray, message: str) -> Routine[None]:
+        """Move the hand straight by an offset in the body frame."""
+        yield from self.move_straight(self.model.X_BH(self.q_rad()).translation() + offset_B, message)
+
+    def stow(self, message: str = "stowing the arm") -> Routine[None]:
+        """Fold the arm onto the body; nothing is done where it lies there already."""
+        stowed = self.model.stowed_rad
+        if np.max(np.abs(self.q_rad() - stowed)) > 0.05:
+            yield from self.move_to(lambda scene, q: stowed, message)
+
+    def picture(self, message: str) -> Routine[Image]:
+        """A picture of the hand camera, once the arm is still."""
+        yield from self.pause(SETTLE_S, message)
+        robot = self.context.robot
+        return (
+            yield from self.compute(
+                lambda: robot.image(HAND_CAMERA), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
+            )
+        )
+
+    def try_stow(self) -> Routine[None]:
+        """Stow where a way is found; used on the way out of failures."""
+        try:
+            yield from self.stow("stowing the arm after the failure")
+        except SkillFailure:
+            return
+
+
+def hand_camera_in_hand(image: Image) -> RigidTransform:
+    """X_HC from a picture's frame tree."""
+    return image.frames.pose(image.camera_frame, "hand")
+
+
+def first_solution(goals: Sequence[Goal], message: str) -> Goal:
+    """A goal that tries others in order. Raises PlanningError with `message` when none works."""
+
+    def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
+        for one in goals:
+            try:
+                return one(scene, q)
+            except PlanningError:
+                continue
+        raise PlanningError(message)
+
+    return goal

@@ -1,0 +1,131 @@
+"""Collision checks of the arm against the body and boxes around it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import Box as BoxShape
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.planning import BodyShapeDescription, RobotDiagramBuilder, SceneGraphCollisionChecker
+
+from skills.arm.kinematics import ArmModel
+from skills.robot import Capabilities, FloatArray
+
+_WORLD = "WorldModelInstance"
+_EDGE_STEP_RAD = 0.05
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box: pose of its centre in some frame, full extents in m."""
+
+    X_FG: RigidTransform
+    size_m: tuple[float, float, float]
+
+
+class ArmScene:
+    """The robot standing still with boxes around it, all in the body frame.
+
+    Legs stand at the joint angles given; the jaw's angle and a thing in the hand may change between checks.
+    """
+
+    def __init__(
+        self,
+        capabilities: Capabilities,
+        model: ArmModel,
+        joint_positions_rad: Mapping[str, float],
+        padding_m: float = 0.01,
+    ) -> None:
+        self.model = model
+        builder = RobotDiagramBuilder()
+        plant = builder.plant()
+        (robot,) = Parser(plant).AddModelsFromString(_without_looks(capabilities.description), "urdf")
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("body", robot))
+        plant.Finalize()
+        self._instance = plant.GetModelInstanceName(robot)
+        self._checker = SceneGraphCollisionChecker(
+            model=builder.Build(), robot_model_instances=[robot], edge_step_size=_EDGE_STEP_RAD
+        )
+        self._checker.SetPaddingAllRobotEnvironmentPairs(padding_m)
+        self._q = np.zeros(plant.num_positions())
+        starts = {name: self._start(name) for name in self._joint_names()}
+        for name, start in starts.items():
+            self._q[start] = joint_positions_rad.get(name, 0.0)
+        self._arm = np.array([starts[name] for name in model.names])
+        self._jaw = starts[model.jaw.name]
+        self._allow_stowed_contacts()
+
+    def set_boxes(self, boxes: Sequence[Box]) -> None:
+        """Replace the boxes around the robot (frame B)."""
+        self._checker.RemoveAllAddedCollisionShapes("around")
+        for box in boxes:
+            self._add("around", box, _WORLD, "world")
+
+    def hold(self, boxes: Sequence[Box]) -> None:
+        """Replace the boxes fixed to the hand (frame H), for a thing held."""
+        self._checker.RemoveAllAddedCollisionShapes("held")
+        for box in boxes:
+            self._add("held", box, self._instance, self.model.hand_link)
+
+    def set_jaw(self, opening_rad: float) -> None:
+        """Angle of the jaw in later checks, 0 closed."""
+        self._q[self._jaw] = -opening_rad
+
+    def set_padding(self, padding_m: float) -> None:
+        """Distance that the robot keeps from boxes in later checks."""
+        self._checker.SetPaddingAllRobotEnvironmentPairs(padding_m)
+
+    def free(self, q_rad: FloatArray) -> bool:
+        """Whether arm angles q_rad (J,) collide with nothing."""
+        return bool(self._checker.CheckConfigCollisionFree(self._full(q_rad)))
+
+    def edge_free(self, q_from_rad: FloatArray, q_to_rad: FloatArray) -> bool:
+        """Whether the straight joint motion between two configurations collides with nothing."""
+        return bool(self._checker.CheckEdgeCollisionFree(self._full(q_from_rad), self._full(q_to_rad)))
+
+    def path_free(self, path_rad: FloatArray) -> bool:
+        """Whether every configuration of a dense path (K, J) is free."""
+        return all(self.free(q) for q in path_rad)
+
+    def contacts(self, q_rad: FloatArray) -> tuple[tuple[str, str], ...]:
+        """Names of the links that touch or come closer than the padding, for messages."""
+        clearance = self._checker.CalcRobotClearance(self._full(q_rad), 0.0)
+        bodies = [
+            (self._checker.get_body(a).name(), self._checker.get_body(b).name())
+            for a, b in zip(clearance.robot_indices(), clearance.other_indices(), strict=True)
+        ]
+        return tuple(bodies)
+
+    def _full(self, q_rad: FloatArray) -> FloatArray:
+        q = self._q.copy()
+        q[self._arm] = q_rad
+        return q
+
+    def _add(self, group: str, box: Box, instance: str, body: str) -> None:
+        shape = BodyShapeDescription(BoxShape(*box.size_m), box.X_FG, instance, body)
+        self._checker.AddCollisionShape(group, shape)
+
+    def _joint_names(self) -> list[str]:
+        plant = self._checker.plant()
+        return [plant.get_joint(index).name() for index in plant.GetJointIndices() if self._moves(index)]
+
+    def _moves(self, index: object) -> bool:
+        return bool(self._checker.plant().get_joint(index).num_positions() == 1)
+
+    def _start(self, name: str) -> int:
+        return int(self._checker.plant().GetJointByName(name).position_start())
+
+    def _allow_stowed_contacts(self) -> None:
+        """Links that touch when the arm is stowed may touch: resting there is what stowing means."""
+        for a, b in self.contacts(self.model.stowed_rad):
+            plant = self._checker.plant()
+            self._checker.SetCollisionFilteredBetween(plant.GetBodyByName(a), plant.GetBodyByName(b), True)
+
+
+def _without_looks(description: str) -> str:
+    """URDF text without its visual elements, whose mesh files a skill does not need."""
+    return re.sub(r"<visual\b.*?</visual>", "", description, flags=re.DOTALL)

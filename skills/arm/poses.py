@@ -1,0 +1,102 @@
+"""Named arm poses: looking at a point with the hand camera, carrying a thing near the body."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from skills.arm.collision import ArmScene
+from skills.arm.kinematics import ArmModel
+from skills.arm.routine import PlanningError
+from skills.robot import FloatArray
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
+    """X_BC of a camera at p_BC that looks at p_BT with the picture upright."""
+    forward = (p_BT - p_BC) / np.linalg.norm(p_BT - p_BC)
+    right = np.cross(forward, _UP)
+    right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([0.0, -1.0, 0.0])
+    return RigidTransform(RotationMatrix(np.stack([right, np.cross(forward, right), forward], axis=1)), p_BC)
+
+
+def look_configuration(
+    scene: ArmScene, X_HC: RigidTransform, stations_B: Iterable[FloatArray], p_BT: FloatArray, q_near_rad: FloatArray
+) -> FloatArray:
+    """Arm angles with the hand camera (X_HC) at the first possible station, looking at p_BT.
+
+    Raises PlanningError when no station can be taken.
+    """
+    for p_BC in stations_B:
+        solutions = scene.model.inverse(camera_pose(p_BC, p_BT) @ X_HC.inverse())
+        free = [q for q in solutions if scene.free(q)]
+        if free:
+            return min(free, key=lambda q: float(np.abs(q - q_near_rad) @ _COMFORT))
+    raise PlanningError(f"no arm pose looks at the point {np.round(p_BT, 2).tolist()} ahead of the body")
+
+
+_COMFORT = np.array([1.0, 1.0, 1.0, 2.0, 1.0, 1.0])
+
+
+def overview_stations(model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
+    """Camera places above the shoulder on the side of p_BT, high ones first; shift_rad turns them about the shoulder."""
+    direction = np.arctan2(p_BT[1] - model.p_BS[1], p_BT[0] - model.p_BS[0]) + shift_rad
+    heading = np.array([np.cos(direction), np.sin(direction), 0.0])
+    return [
+        model.p_BS + radius * heading + height * _UP
+        for height, radius in itertools.product((0.55, 0.48, 0.4, 0.3), (0.4, 0.5, 0.32))
+    ]
+
+
+def close_stations(p_BS: FloatArray, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
+    """Camera places 0.35 to 0.5 m from p_BT, on the shoulder's side of it and looking down at it."""
+    direction = np.arctan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0]) + shift_rad
+    return [
+        p_BT + distance * np.array([-np.cos(tilt) * np.cos(direction), -np.cos(tilt) * np.sin(direction), np.sin(tilt)])
+        for tilt, distance in itertools.product(np.radians([42.0, 35.0, 50.0, 58.0, 28.0]), (0.42, 0.36, 0.48))
+    ]
+
+
+def carry_configuration(scene: ArmScene, R_BH: RotationMatrix, q_near_rad: FloatArray) -> FloatArray:
+    """Arm angles that hold the hand low over the body, the thing as upright as in R_BH, turned to the front.
+
+    Where that tilt cannot be kept, the hand points forward. Raises PlanningError when no pose is free.
+    """
+    for rotations in (_turned(R_BH), _forward()):
+        candidates = [
+            (cost, q)
+            for rotation, (x, z) in itertools.product(rotations, _CARRY_PLACES)
+            for q in scene.model.inverse(RigidTransform(rotation, [x, 0.0, z]), margin_rad=0.05)
+            for cost in [_carry_cost(x, z, q, q_near_rad)]
+        ]
+        for _, q in sorted(candidates, key=lambda candidate: candidate[0]):
+            if scene.free(q):
+                return q
+    raise PlanningError("no pose to carry the thing near the body is free of contact")
+
+
+_CARRY_PLACES = tuple(itertools.product((0.3, 0.35, 0.4, 0.45, 0.5), (0.26, 0.3, 0.35, 0.4, 0.46, 0.54)))
+
+
+def _carry_cost(x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: FloatArray) -> float:
+    return abs(x_m - 0.36) + z_m + 0.04 * float(np.max(np.abs(q_rad - q_near_rad))) + 0.05 * abs(float(q_rad[0]))
+
+
+def _turned(R_BH: RotationMatrix) -> list[RotationMatrix]:
+    """R_BH turned about the vertical so that the hand points ahead, or to either side of it."""
+    x_axis = R_BH.matrix()[:, 0]
+    if x_axis[2] < -0.8:
+        return []
+    ahead = -float(np.arctan2(x_axis[1], x_axis[0]))
+    return [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in (0.0, 0.4, -0.4)]
+
+
+def _forward() -> list[RotationMatrix]:
+    return [
+        RollPitchYaw(roll, pitch, 0.0).ToRotationMatrix()
+        for roll, pitch in itertools.product((0.0, np.pi / 2, -np.pi / 2), (0.0, 0.4, 0.8))
+    ]

@@ -1,0 +1,1 @@
+"""Finding things with the hand camera."""

@@ -1,0 +1,79 @@
+"""Where to point the hand camera to see surfaces, and what stands around as boxes for the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import cv2
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from skills.api import Surface
+from skills.arm.collision import Box
+from skills.detect.interim_segmentation import Cluster
+from skills.detect.points import inside_polygon
+from skills.robot import FloatArray
+
+NEAREST_M = 0.35
+FURTHEST_M = 3.2
+_HALF_VIEW_RAD = 0.4
+_BEARING_LIMIT_RAD = 2.3
+
+
+def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
+    """Points p_BT on a surface whose views cover what is seen of it from the shoulder, the middle one first.
+
+    Empty when nothing of it lies between NEAREST_M and FURTHEST_M and within the arm's turn.
+    """
+    offsets = _samples(surface) @ X_WB.inverse().rotation().matrix().T + X_WB.inverse().translation() - p_BS
+    bearing, distance = np.arctan2(offsets[:, 1], offsets[:, 0]), np.hypot(offsets[:, 0], offsets[:, 1])
+    seen = (distance > NEAREST_M) & (distance < FURTHEST_M) & (np.abs(bearing) < _BEARING_LIMIT_RAD)
+    if not np.any(seen):
+        return []
+    low, high = float(bearing[seen].min()), float(bearing[seen].max())
+    count = max(1, int(np.ceil((high - low) / (2 * _HALF_VIEW_RAD))))
+    aims = low + (np.arange(count) + 0.5) * (high - low) / count
+    targets = []
+    for aim in sorted(aims, key=lambda a: abs(a - 0.5 * (low + high))):
+        column = seen & (np.abs(bearing - aim) <= 0.5 * (high - low) / count + 1e-9)
+        if np.any(column):
+            pitch = np.arctan2(0.45 - offsets[column, 2], distance[column])
+            middle = (0.45 - float(offsets[column, 2].mean())) / np.tan(0.5 * float(pitch.min() + pitch.max()))
+            reach = float(np.clip(middle, NEAREST_M, FURTHEST_M))
+            targets.append(p_BS + [reach * np.cos(aim), reach * np.sin(aim), float(offsets[column, 2].mean())])
+    return targets
+
+
+def _samples(surface: Surface, step_m: float = 0.1) -> FloatArray:
+    """Points (N, 3) all over a surface, its corners included."""
+    corners = np.asarray(surface.polygon_W, dtype=float)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    grid = np.stack(np.meshgrid(np.arange(low[0], high[0], step_m), np.arange(low[1], high[1], step_m)), axis=-1)
+    rows = grid.reshape(-1, 2)
+    xy = np.concatenate([corners, rows[inside_polygon(rows, surface.polygon_W)]])
+    return np.column_stack([xy, np.full(len(xy), surface.height_m)])
+
+
+def surface_boxes(surfaces: Iterable[Surface], X_WB: RigidTransform) -> list[Box]:
+    """Surfaces as solid boxes from just above the floor to their tops, in the body frame."""
+    return [_standing_box(np.asarray(s.polygon_W, dtype=float), 0.05, s.height_m, X_WB) for s in surfaces]
+
+
+def cluster_boxes(clusters: Sequence[Cluster], X_WB: RigidTransform, grow_m: float = 0.01) -> list[Box]:
+    """Things seen on a surface as boxes in the body frame."""
+    boxes = []
+    for cluster in clusters:
+        xy = cluster.points.p_W[:, :2]
+        base, top = cluster.base_m, cluster.base_m + cluster.shape.height_m + grow_m
+        boxes.append(_standing_box(xy, base, top, X_WB, grow_m))
+    return boxes
+
+
+def _standing_box(xy: FloatArray, bottom_m: float, top_m: float, X_WB: RigidTransform, grow_m: float = 0.0) -> Box:
+    """The upright box about points (x, y) in W, given in B."""
+    middle = xy.mean(axis=0)
+    (x, y), (width, depth), angle = cv2.minAreaRect((xy - middle).astype(np.float32))
+    centre = [middle[0] + x, middle[1] + y, 0.5 * (bottom_m + top_m)]
+    X_WG = RigidTransform(RotationMatrix.MakeZRotation(float(np.radians(angle))), centre)
+    size = (max(width, 0.01) + 2 * grow_m, max(depth, 0.01) + 2 * grow_m, top_m - bottom_m)
+    return Box(X_WB.inverse() @ X_WG, size)

@@ -1,0 +1,72 @@
+"""Depth pictures as points with their pixels and colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+from skills.robot import FloatArray, Image
+
+MIN_DEPTH_M = 0.15
+MAX_DEPTH_M = 4.0
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Points p_W (N, 3) in m, their pixels (N, 2) as (u, v) in the colour picture, colours (N, 3) RGB uint8."""
+
+    p_W: FloatArray
+    pixels: NDArray[np.int64]
+    colours: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.p_W)
+
+    def where(self, keep: NDArray[np.bool_]) -> PointCloud:
+        """The points that a mask (N,) keeps."""
+        return PointCloud(self.p_W[keep], self.pixels[keep], self.colours[keep])
+
+
+def camera_pose_W(image: Image, X_WO: RigidTransform) -> RigidTransform:
+    """X_WC at the picture's capture time."""
+    return X_WO @ image.frames.pose(image.camera_frame)
+
+
+def cloud_from_image(image: Image, X_WO: RigidTransform, max_depth_m: float = MAX_DEPTH_M) -> PointCloud:
+    """All valid depth pixels as world points. Raises ValueError for a picture without colour."""
+    if image.colour is None:
+        raise ValueError(f"picture of camera '{image.source}': it has no colour")
+    lens, depth = image.depth_intrinsics, image.depth_m
+    rows, columns = np.nonzero((depth > MIN_DEPTH_M) & (depth < max_depth_m))
+    z = depth[rows, columns].astype(np.float64)
+    x, y = (columns - lens.cx) / lens.fx * z, (rows - lens.cy) / lens.fy * z
+    X_WC = camera_pose_W(image, X_WO)
+    p_W = np.stack([x, y, z], axis=1) @ X_WC.rotation().matrix().T + X_WC.translation()
+    pixels = _colour_pixels(image, np.stack([x / z, y / z], axis=1))
+    return PointCloud(p_W, pixels, image.colour[pixels[:, 1], pixels[:, 0]])
+
+
+def _colour_pixels(image: Image, rays: FloatArray) -> NDArray[np.int64]:
+    """Pixels (N, 2) of the colour picture along rays (N, 2) with x/z and y/z."""
+    lens = image.intrinsics
+    u = np.clip(np.rint(rays[:, 0] * lens.fx + lens.cx), 0, lens.width - 1)
+    v = np.clip(np.rint(rays[:, 1] * lens.fy + lens.cy), 0, lens.height - 1)
+    return np.stack([u, v], axis=1).astype(np.int64)
+
+
+def inside_polygon(
+    xy: FloatArray, polygon: tuple[tuple[float, float], ...], margin_m: float = 0.0
+) -> NDArray[np.bool_]:
+    """Which rows of xy (N, 2) lie in a convex polygon grown by margin_m; corners in either order."""
+    corners = np.asarray(polygon, dtype=float)
+    edges = np.roll(corners, -1, axis=0) - corners
+    area = float(np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - np.roll(corners[:, 0], -1) * corners[:, 1]))
+    lengths = np.linalg.norm(edges, axis=1)
+    keep = np.ones(len(xy), dtype=bool)
+    for corner, edge, length in zip(corners, edges, lengths, strict=True):
+        offset = edge[0] * (xy[:, 1] - corner[1]) - edge[1] * (xy[:, 0] - corner[0])
+        keep &= np.sign(area) * offset / max(float(length), 1e-9) > -margin_m
+    return keep

@@ -1,0 +1,87 @@
+"""The size and place of a thing from the side of it that was seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.optimize import least_squares
+
+from skills.robot import FloatArray
+
+
+@dataclass(frozen=True)
+class SeenShape:
+    """A box about a thing: centre (x, y) in W, length >= width, height above its surface (m), yaw of the length.
+
+    `round` tells that its outline from above fits a circle.
+    """
+
+    centre: tuple[float, float]
+    length_m: float
+    width_m: float
+    height_m: float
+    yaw_rad: float
+    round: bool
+
+
+def measure(points_W: FloatArray, plane_m: FloatArray, p_WC: FloatArray) -> SeenShape:
+    """Shape of the points (N, 3) of one thing, seen from p_WC; plane_m (N,) is the surface's height below each."""
+    above = points_W[:, 2] - plane_m
+    height = float(np.percentile(above, 98))
+    if height > 0.06:
+        body = points_W[(above > 0.15 * height) & (above < 0.6 * height), :2]
+        circle = _circle(body, p_WC) if len(body) >= 12 else None
+        if circle is not None:
+            x, y, radius = circle
+            return SeenShape((x, y), 2 * radius, 2 * radius, height, 0.0, True)
+    return _rectangle(_upper(points_W, above, height), height)
+
+
+def _upper(points_W: FloatArray, above: FloatArray, height: float) -> FloatArray:
+    """Points (x, y) without the lowest, where the thing meets the noise of its surface."""
+    kept = points_W[above > 0.3 * height, :2]
+    return kept if len(kept) >= 8 else points_W[:, :2]
+
+
+def _circle(xy: FloatArray, p_WC: FloatArray) -> tuple[float, float, float] | None:
+    """Centre and radius of the visible front of a round thing, or None when it is not round."""
+    view = np.mean(xy, axis=0) - p_WC[:2]
+    distance = float(np.linalg.norm(view))
+    view = view / max(distance, 1e-6)
+    across = xy @ np.array([-view[1], view[0]])
+    left, right = np.percentile(across, [1, 99])
+    radius = 0.5 * (right - left)
+    if not 0.008 < radius < 0.09:
+        return None
+    near = float(np.percentile(xy @ view, 4))
+    guess = (near + radius) * view + 0.5 * (left + right) * np.array([-view[1], view[0]])
+
+    def residuals(centre: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(xy - centre, axis=1) - radius)
+
+    fit = least_squares(residuals, guess, loss="soft_l1", f_scale=0.004)
+    spread = float(np.median(np.abs(fit.fun)))
+    if spread > 0.003 + 0.003 * distance or np.linalg.norm(fit.x - guess) > 0.5 * radius + 0.01:
+        return None
+    return float(fit.x[0]), float(fit.x[1]), float(radius)
+
+
+def _rectangle(xy: FloatArray, height: float) -> SeenShape:
+    """The smallest rectangle about points (N, 2), without stray ones."""
+    kept = _without_strays(xy)
+    (x, y), (first, second), angle_deg = cv2.minAreaRect((kept - kept.mean(axis=0)).astype(np.float32))
+    yaw = np.radians(angle_deg) + (0.0 if first >= second else np.pi / 2)
+    centre = kept.mean(axis=0) + (x, y)
+    yaw = float((yaw + np.pi / 2) % np.pi - np.pi / 2)
+    length, width = float(max(first, second)), float(min(first, second))
+    return SeenShape((float(centre[0]), float(centre[1])), length, width, height, yaw, False)
+
+
+def _without_strays(xy: FloatArray, cell_m: float = 0.006) -> FloatArray:
+    """Points whose grid cell holds at least two of them, or all when that leaves too few."""
+    cells = np.floor(xy / cell_m).astype(np.int64)
+    _, inverse, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    kept = xy[counts[inverse.ravel()] >= 2]
+    return kept if len(kept) >= 8 else xy

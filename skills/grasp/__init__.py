@@ -1,0 +1,1 @@
+"""Grasping a thing that was seen."""

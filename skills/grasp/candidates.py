@@ -1,0 +1,139 @@
+"""Grasp candidates from the shape of what is seen, and which of them the arm can carry out.
+
+The jaw closes along the hand's z axis, which is kept level: from the side with the wrist rolled for what stands,
+from above for what lies. Along a long thing the local width counts, so that a hammer is taken by its handle.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from skills.robot import FloatArray
+
+
+@dataclass(frozen=True)
+class JawGeometry:
+    """The gripper in the hand frame, m: palm at palm_x, fingertips at tip_x, inner face of the fixed jaw at fixed_z."""
+
+    palm_x: float = 0.142
+    tip_x: float = 0.240
+    fixed_z: float = -0.038
+    clearance: float = 0.010
+    max_width: float = 0.115
+
+
+@dataclass(frozen=True)
+class Target:
+    """A thing to grasp, in the body frame: its points (N, 3), outline box, and the height of its surface (m)."""
+
+    points_B: FloatArray
+    centre_B: tuple[float, float]
+    yaw_rad: float
+    length_m: float
+    width_m: float
+    height_m: float
+    base_m: float
+    round: bool
+
+    @property
+    def upright(self) -> bool:
+        """Whether it stands high enough to be taken from the side."""
+        return self.height_m > 0.075
+
+
+@dataclass(frozen=True)
+class GraspCandidate:
+    """A hand pose about a thing, the width between the jaws there (m), what speaks against it, its tilt (rad, 0 level)."""
+
+    X_BH: RigidTransform
+    width_m: float
+    cost: float
+    tilt_rad: float
+
+    def retreated(self, distance_m: float) -> RigidTransform:
+        """The hand pose drawn back along the fingers."""
+        return self.X_BH @ RigidTransform([-distance_m, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class _Station:
+    """A place to grasp along a thing: point (x, y), direction of the approach seen from above, local width, cost."""
+
+    xy: FloatArray
+    azimuth_rad: float
+    width_m: float
+    half_depth_m: float
+    cost: float
+
+
+def grasp_candidates(target: Target, p_BS: FloatArray, jaw: JawGeometry | None = None) -> list[GraspCandidate]:
+    """Candidates, the best first; empty when the thing is too wide. p_BS is the shoulder."""
+    jaw = jaw or JawGeometry()
+    ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
+    stations = _round_stations(target, ahead) if target.round else list(_long_stations(target, ahead))
+    found = [
+        _candidate(target, station, tilt, side, jaw)
+        for station, tilt, side in itertools.product(stations, _tilts(target), (1.0, -1.0))
+        if station.width_m < jaw.max_width
+    ]
+    return sorted(found, key=lambda candidate: candidate.cost)
+
+
+def _tilts(target: Target) -> Sequence[float]:
+    """How far the fingers may point down, rad."""
+    degrees = (10.0, 0.0, 20.0, 32.0, 45.0) if target.upright else (90.0, 78.0, 66.0, 54.0)
+    return [float(np.radians(d)) for d in degrees]
+
+
+def _round_stations(target: Target, ahead_rad: float) -> list[_Station]:
+    """A round thing can be approached from any side; from the shoulder's is best."""
+    centre = np.array(target.centre_B)
+    return [
+        _Station(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, 0.5 * abs(turn))
+        for turn in (0.0, 0.3, -0.3, 0.6, -0.6, 0.9, -0.9)
+    ]
+
+
+def _long_stations(target: Target, ahead_rad: float) -> Iterator[_Station]:
+    """Places along a box's axes with the local width there; both axes for one that is nearly square."""
+    square = target.length_m < 1.4 * target.width_m
+    for turn in (0.0, 0.5 * np.pi) if square else (0.0,):
+        yaw = target.yaw_rad + turn
+        along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+        offsets = target.points_B[:, :2] - np.array(target.centre_B)
+        s, t = offsets @ along, offsets @ across
+        middle = float(np.mean(s))
+        for shift in (0.0,) if square else (0.0, 0.03, -0.03, 0.06, -0.06, 0.09, -0.09):
+            local = np.abs(s - middle - shift) < 0.022
+            if np.count_nonzero(local) < 8:
+                continue
+            low, high = np.percentile(t[local], [2, 98])
+            xy = np.array(target.centre_B) + (0.0 if square else middle + shift) * along + 0.5 * (low + high) * across
+            half_depth = 0.5 * (target.length_m if turn == 0.0 else target.width_m) if target.upright else 0.02
+            for azimuth in (yaw, yaw + np.pi):
+                off = abs((azimuth - ahead_rad + np.pi) % (2 * np.pi) - np.pi)
+                yield _Station(xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 0.15 * off)
+
+
+def _candidate(target: Target, station: _Station, tilt_rad: float, side: float, jaw: JawGeometry) -> GraspCandidate:
+    c, s = np.cos(station.azimuth_rad), np.sin(station.azimuth_rad)
+    x_axis = np.array([np.cos(tilt_rad) * c, np.cos(tilt_rad) * s, -np.sin(tilt_rad)])
+    z_axis = side * np.array([-s, c, 0.0])
+    R_BH = RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
+    if target.upright:
+        height = float(np.clip(0.56 * target.height_m, 0.05, 0.095))
+        depth = jaw.palm_x + station.half_depth_m + 0.008
+        cost = station.cost + 0.4 * abs(tilt_rad - np.radians(10.0))
+    else:
+        height = 0.5 * target.height_m
+        depth = jaw.tip_x - max(0.004, height - 0.006) / np.sin(tilt_rad)
+        cost = station.cost + 0.4 * abs(tilt_rad - 0.5 * np.pi)
+    p_HT = np.array([depth, 0.0, jaw.fixed_z + jaw.clearance + 0.5 * station.width_m])
+    p_BT = np.array([*station.xy, target.base_m + height])
+    X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
+    return GraspCandidate(X_BH, station.width_m, float(cost), tilt_rad)

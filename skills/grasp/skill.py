@@ -1,0 +1,253 @@
+"""The grasp skill: look closely, choose a grasp, take the thing, lift it and make sure that it is held."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import Cause, ObjectObservation, Succeeded, Surface
+from skills.arm.arm_skill import ArmSkill, first_solution, hand_camera_in_hand
+from skills.arm.collision import ArmScene, Box
+from skills.arm.poses import carry_configuration, close_stations, look_configuration, overview_stations
+from skills.arm.routine import PlanningError, Routine, SkillFailure
+from skills.detect.appearance import load_appearance
+from skills.detect.interim_segmentation import Cluster, SurfaceView, sightings, view_surface
+from skills.detect.looking import cluster_boxes, surface_boxes
+from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.grasp.planning import LIFT_M, PREGRASP_M, GraspPlan, Surroundings, plan_grasp
+from skills.robot import FloatArray, Image
+
+GRASP_FORCE_N = 60.0
+OPEN_FORCE_N = 20.0
+_LOOK_HALF_SIDE_M = 0.4
+_SAME_THING_M = 0.12
+_CLOSED_RAD = 0.06
+_SLIP_RAD = 0.12
+_PULL_BACK_M = 0.12
+
+
+@dataclass(frozen=True)
+class GraspInputs:
+    """The thing to take, as it was seen."""
+
+    observation: ObjectObservation
+
+
+@dataclass(frozen=True)
+class CloseView:
+    """The thing and what is around it, seen closely; X_WB at that time."""
+
+    target: Target
+    boxes: tuple[Box, ...]
+    target_box: Box
+    X_WB: RigidTransform
+
+
+class Grasp(ArmSkill[GraspInputs]):
+    """Ends with the thing held near the body; on failure the jaw is opened and the arm stowed."""
+
+    name = "grasp"
+    Inputs = GraspInputs
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "the thing is no longer where it was seen, the jaw holds something already, or there is no arm",
+        Cause.PLANNING: "no grasp is within reach and free",
+        Cause.EXECUTION: "the arm or the jaw did not get to where it was sent",
+        Cause.POSTCONDITION: "the jaw closed on nothing, or the thing slipped out",
+    }
+    default_timeout_s = 120.0
+
+    def run(self, inputs: GraspInputs) -> Routine[Succeeded]:
+        """Look, plan, take, lift, carry."""
+        thing = inputs.observation.thing
+        if self.context.robot.gripper().holding:
+            raise SkillFailure(Cause.PRECONDITION, "the jaw holds something already")
+        try:
+            view = yield from self._look_closely(inputs.observation)
+            plan = yield from self._plan(view, str(thing))
+            yield from self._take(plan, str(thing))
+        except SkillFailure:
+            yield from self._let_go()
+            raise
+        yield from self._carry(view, plan.candidate, str(thing))
+        return Succeeded(f"holding the {thing}")
+
+    def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
+        """A view of the thing from 0.4 m; the plane and what stands around come with it."""
+        message = f"looking closely at the {seen.thing}"
+        base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
+        surface = _square(seen.position_W, base_m, seen.surface or "surface")
+        self.boxes = surface_boxes([_square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
+        X_HC = hand_camera_in_hand((yield from self.picture(message)))
+        p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
+
+        def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
+            stations = [*close_stations(self.model.p_BS, p_BT), *overview_stations(self.model, p_BT)]
+            return look_configuration(scene, X_HC, stations, p_BT, q)
+
+        yield from self.move_to(goal, message)
+        image = yield from self.picture(message)
+        X_WO, X_WB = self.context.localiser.estimate().X_WO, self.X_WB()
+        view = yield from self.compute(
+            lambda: _examine(image, X_WO, X_WB, surface, seen), latency_s=0.15, name="segment closely", message=message
+        )
+        if view is None:
+            raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} is no longer where it was seen")
+        return view
+
+    def _plan(self, view: CloseView, thing: str) -> Routine[GraspPlan]:
+        self.boxes = view.boxes
+        up_B = view.X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
+        candidates = grasp_candidates(view.target, self.model.p_BS)
+        if not candidates:
+            raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the jaw")
+        opening = 0.9 * _open_rad(self)
+        yield from self.move_gripper(opening, OPEN_FORCE_N, "opening the jaw")
+
+        def plan() -> GraspPlan:
+            scene = self.prepared_scene()
+            scene.set_jaw(opening)
+            return plan_grasp(
+                scene, self.q_rad(), candidates, Surroundings(view.boxes, view.target_box, up_B), self._rng
+            )
+
+        return (
+            yield from self.compute(plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}")
+        )
+
+    def _take(self, plan: GraspPlan, thing: str) -> Routine[None]:
+        """Reach, close, lift; raises SkillFailure with cause POSTCONDITION when it is not held then."""
+        yield from self.follow(plan.to_pregrasp, f"reaching for the {thing}")
+        yield from self.follow(plan.to_grasp, f"reaching for the {thing}")
+        yield from self.move_gripper(0.0, GRASP_FORCE_N, f"closing on the {thing}")
+        yield from self.pause(0.4, f"closing on the {thing}")
+        opening = self._check_held(thing, None)
+        yield from self.shift_hand(self._up_B() * LIFT_M, f"lifting the {thing}")
+        yield from self.pause(0.3, f"lifting the {thing}")
+        self._check_held(thing, opening)
+
+    def _check_held(self, thing: str, opening_before_rad: float | None) -> float:
+        gripper = self.context.robot.gripper()
+        if gripper.opening_rad < _CLOSED_RAD or not gripper.holding:
+            raise SkillFailure(Cause.POSTCONDITION, f"the jaw closed on nothing where the {thing} was seen")
+        if opening_before_rad is not None and abs(gripper.opening_rad - opening_before_rad) > _SLIP_RAD:
+            raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the jaw while it was lifted")
+        return gripper.opening_rad
+
+    def _carry(self, view: CloseView, grasp: GraspCandidate, thing: str) -> Routine[None]:
+        """Draw back from the surface, hold the thing near the body, and check once more."""
+        opening = self._check_held(thing, None)
+        X_HB = grasp.X_BH.inverse()
+        self.held = [_held_box(X_HB, view.target_box)]
+        message = f"carrying the {thing}"
+        ahead = grasp.X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
+        try:
+            yield from self.shift_hand(-_PULL_BACK_M * ahead + 0.02 * self._up_B(), message)
+        except SkillFailure as failure:
+            if failure.cause is not Cause.PLANNING:
+                raise
+        R_BH = self.model.X_BH(self.q_rad()).rotation()
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
+        yield from self.pause(0.2, message)
+        self._check_held(thing, opening)
+
+    def _let_go(self) -> Routine[None]:
+        """On failure: open the jaw, draw back, stow; what does not work is left out."""
+        for recovery in (self._open, self._draw_back, self.try_stow):
+            try:
+                yield from recovery()
+            except SkillFailure:
+                continue
+
+    def _open(self) -> Routine[None]:
+        yield from self.move_gripper(0.9 * _open_rad(self), OPEN_FORCE_N, "opening the jaw after the failure")
+
+    def _draw_back(self) -> Routine[None]:
+        ahead = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
+        yield from self.shift_hand(-PREGRASP_M * ahead, "drawing back after the failure")
+        yield from self.move_gripper(0.0, OPEN_FORCE_N, "closing the empty jaw")
+
+    def _up_B(self) -> FloatArray:
+        return np.asarray(self.X_WB().rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
+
+
+def _open_rad(skill: Grasp) -> float:
+    gripper = skill.context.robot.capabilities().gripper
+    assert gripper is not None
+    return gripper.open_rad
+
+
+def _square(
+    position_W: tuple[float, float, float], height_m: float, name: str, half: float = _LOOK_HALF_SIDE_M
+) -> Surface:
+    """A square patch about a point."""
+    x, y, _ = position_W
+    corners = ((x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half))
+    return Surface(name, corners, height_m)
+
+
+def _examine(
+    image: Image, X_WO: RigidTransform, X_WB: RigidTransform, surface: Surface, seen: ObjectObservation
+) -> CloseView | None:
+    view = view_surface(image, X_WO, surface, margin_m=0.0)
+    cluster = _same_thing(view, seen) if view is not None else None
+    if view is None or cluster is None:
+        return None
+    others = [each for each in view.clusters if each is not cluster]
+    (target_box,) = cluster_boxes([cluster], X_WB)
+    boxes = (*surface_boxes([_seen_surface(view, surface)], X_WB), *cluster_boxes(others, X_WB))
+    return CloseView(_target(cluster, X_WB), boxes, target_box, X_WB)
+
+
+def _seen_surface(view: SurfaceView, surface: Surface) -> Surface:
+    """The surface as far as its own points show it."""
+    xy = view.plane_points.p_W[:, :2]
+    low, high = np.percentile(xy, [0.2, 99.8], axis=0)
+    corners = ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
+    return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), view.plane.height_m)
+
+
+def _same_thing(view: SurfaceView, seen: ObjectObservation) -> Cluster | None:
+    """The cluster that is the thing: of its class and nearest, else nearest of all; None when all are far."""
+    expected = np.array(seen.position_W[:2])
+
+    def off(cluster: Cluster) -> float:
+        return float(np.linalg.norm(np.array(cluster.shape.centre) - expected))
+
+    classed = [s.cluster for s in sightings(view.clusters, load_appearance(), (seen.thing.name,))]
+    for clusters in (classed, view.clusters):
+        near = [cluster for cluster in clusters if off(cluster) < _SAME_THING_M]
+        if near:
+            return min(near, key=off)
+    return None
+
+
+def _target(cluster: Cluster, X_WB: RigidTransform) -> Target:
+    X_BW = X_WB.inverse()
+    shape = cluster.shape
+    points_B = cluster.points.p_W @ X_BW.rotation().matrix().T + X_BW.translation()
+    centre_B = X_BW @ np.array([*shape.centre, cluster.base_m])
+    axis_B = X_BW.rotation().matrix() @ np.array([np.cos(shape.yaw_rad), np.sin(shape.yaw_rad), 0.0])
+    return Target(
+        points_B=points_B,
+        centre_B=(float(centre_B[0]), float(centre_B[1])),
+        yaw_rad=float(np.arctan2(axis_B[1], axis_B[0])),
+        length_m=shape.length_m,
+        width_m=shape.width_m,
+        height_m=shape.height_m,
+        base_m=float(centre_B[2]),
+        round=shape.round,
+    )
+
+
+def _held_box(X_HB: RigidTransform, box: Box) -> Box:
+    """A box in B as the upright box about it in H, for the thing once it is held."""
+    half = 0.5 * np.array(box.size_m)
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    X_HG = X_HB @ box.X_FG
+    corners = signs * half @ X_HG.rotation().matrix().T + X_HG.translation()
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return Box(RigidTransform(0.5 * (low + high)), tuple(float(v) for v in np.maximum(high - low - 0.02, 0.01)))  # type: ignore[arg-type]

@@ -87,7 +87,7 @@ def step_name(command: Command) -> str:
 def _remember(base: str, key: str, shops: Sequence[Workshop]) -> Iterator[NodePlan]:
     """A leaf that notes where the robot stands, when a command comes back to it."""
     if any(map(needs_start, shops)):
-        yield RememberPosePlan(path_id=f"{base}/remember-start", name="remember the start", key=key)
+        yield RememberPosePlan(path_id=f"{base}/remember-start", name="where it starts", key=key)
 
 
 def _refuse_several(shop: Workshop) -> None:

@@ -87,7 +87,7 @@ class MemorySelector(_MemoryComposite):
     """One way after the other until one works.
 
     Child RUNNING: RUNNING. Child SUCCESS: SUCCESS. Child FAILURE: on to the next in the same tick; after the last:
-    FAILURE with the sentences of all. Its cause is ERROR when one child had that, else the first that is neither
+    FAILURE with the sentences of all that could begin. Its cause is ERROR when one child had that, else the first that is neither
     PRECONDITION nor POSTCONDITION, else `exhausted_cause` where given, else the last child's.
     """
 
@@ -107,7 +107,8 @@ class MemorySelector(_MemoryComposite):
 
     def _explanation(self, child: Behaviour) -> tuple[Cause, str]:
         cause = self._decisive_cause([cause_of(one) for one in self.children])
-        sentences = list(dict.fromkeys(message_of(one) for one in self.children))
+        tried = [one for one in self.children if cause_of(one) is not Cause.PRECONDITION] or self.children
+        sentences = list(dict.fromkeys(map(message_of, tried)))
         shown = "; ".join(sentences[:4]) + (f"; and {len(sentences) - 4} more" if len(sentences) > 4 else "")
         return cause, f"{self._exhausted_message}: {shown}" if self._exhausted_message else shown
 

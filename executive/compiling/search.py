@@ -6,7 +6,7 @@ from executive.behaviours.board import FromBoard
 from executive.command import Thing
 from executive.compiling.plans import KnownPlan, NodePlan, SelectorPlan, SequencePlan
 from executive.compiling.workshop import Workshop, pose_2d
-from executive.knowledge import Knowledge, Pose
+from executive.knowledge import Knowledge
 from skills.api import Cause
 
 
@@ -24,12 +24,17 @@ def look_plans(
     shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str
 ) -> tuple[tuple[str, SequencePlan], ...]:
     """For each surface and viewpoint: drive there and look. The sighting goes to `key`."""
-    views = [(name, n, view) for name in surfaces for n, view in enumerate(shop.knowledge.surfaces[name].viewpoints)]
-    return tuple((name, _look_plan(shop.at(f"{name}-{n + 1}"), thing, name, view, key)) for name, n, view in views)
+    views = [(name, n) for name in surfaces for n in range(1, len(shop.knowledge.surfaces[name].viewpoints) + 1)]
+    return tuple((name, _look_plan(shop.at(f"{name}-{n}"), thing, name, n, key)) for name, n in views)
 
 
-def _look_plan(shop: Workshop, thing: Thing, surface: str, view: Pose, key: str) -> SequencePlan:
-    return shop.sequence(f"look at {surface}", shop.navigate(pose_2d(view)), detect_plan(shop, thing, (surface,), key))
+def _look_plan(shop: Workshop, thing: Thing, surface: str, number: int, key: str) -> SequencePlan:
+    view = shop.knowledge.surfaces[surface].viewpoints[number - 1]
+    return shop.sequence(
+        f"look at {surface}" + (f", view {number}" if number > 1 else ""),
+        shop.navigate(pose_2d(view)),
+        detect_plan(shop, thing, (surface,), key),
+    )
 
 
 def detect_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodePlan:
@@ -49,7 +54,7 @@ def find_again_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key
         name="seen before?",
         source=shop.source,
         key=key,
-        missing=f"no {thing} was seen yet",
+        missing="not seen before",
     )
     return shop.sequence("look from here", known, detect_plan(shop, thing, surfaces, key))
 

@@ -36,8 +36,11 @@ class Looks(enum.Enum):
 def look_of(state: NodeState) -> Look:
     """The look of a state."""
     if state.status is Status.INVALID:
-        return (Looks.CANCELLED if state.cause is Cause.CANCELLED else Looks.IDLE).value
-    return _BY_STATUS[state.status].value
+        looks = Looks.CANCELLED if state.cause is Cause.CANCELLED else Looks.IDLE
+    else:
+        looks = _BY_STATUS[state.status]
+    look: Look = looks.value
+    return look
 
 
 _BY_STATUS = {Status.RUNNING: Looks.RUNNING, Status.SUCCESS: Looks.SUCCESS, Status.FAILURE: Looks.FAILURE}

@@ -21,7 +21,7 @@ ROW_GAP: Final = 10
 MARGIN: Final = 20
 TITLE_H: Final = 34
 LEGEND_H: Final = 34
-NOTE_CHARS: Final = 36
+NOTE_CHARS: Final = 33
 NOTE_LINES: Final = 3
 NAME_CHARS: Final = 27
 FONT: Final = "DejaVu Sans, Helvetica, Arial, sans-serif"
@@ -97,10 +97,9 @@ def _wrapped(note: str) -> tuple[str, ...]:
 def _edges(box: _Box) -> Iterator[str]:
     start, bend = box.x + BOX_W, box.x + BOX_W + COLUMN_GAP / 2
     for child in box.children:
-        look = look_of(child.node.state)
         yield (
             f'<path d="M{start:g},{box.middle:g} H{bend:g} V{child.middle:g} H{child.x:g}" fill="none" '
-            f'stroke="{look.line}" stroke-width="1.4"/>'
+            f'stroke="#8c959f" stroke-width="1.4"/>'
         )
 
 
@@ -113,8 +112,8 @@ def _drawn(box: _Box) -> str:
         for n, row in enumerate(box.note)
     )
     return (
-        f'<g transform="translate({box.x:g},{box.y:g})" data-id="{escape(node.path_id)}"><title>{escape(tooltip)}</title>'
-        f"{_frame(look, box.height)}{_symbol(look, 20, 20)}"
+        f'<g transform="translate({box.x:g},{box.y:g})" data-id="{escape(node.path_id)}">'
+        f"<title>{escape(tooltip)}</title>{_frame(look, box.height)}{_symbol(look, 20, 20)}"
         f'<text x="38" y="15" font-size="9" letter-spacing="0.8" fill="#57606a">{escape(node.kind.upper())}</text>'
         f'<text x="38" y="31" font-size="12.5" fill="#1f2328">{escape(name)}</text>{rows}</g>'
     )

@@ -1,0 +1,366 @@
+"""A scripted robot, a clock that is moved by hand, and scripted skills: whole missions without a plant."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from executive.behaviours.board import Board
+from executive.behaviours.context import RunContext
+from executive.command import parse_command
+from executive.compiler import CompiledTree, Step, compile_commands
+from executive.knowledge import Knowledge
+from executive.runner import RunEntry, RunSettings, run
+from executive.worker import LockStepWorker
+from skills.api import (
+    Cause,
+    Failed,
+    LocalisationEstimate,
+    ObjectObservation,
+    Running,
+    Skill,
+    Succeeded,
+    Surface,
+    Thing,
+)
+from skills.api import Step as SkillStep
+from skills.robot import (
+    CommandId,
+    CommandState,
+    CommandStatus,
+    Gripper,
+    Lease,
+    LeaseError,
+    Odometry,
+    Pose2D,
+)
+
+
+class ManualClock:
+    """Time that only `advance` moves."""
+
+    def __init__(self) -> None:
+        self.time_s = 0.0
+
+    def now(self) -> float:
+        return self.time_s
+
+    def advance(self, dt_s: float) -> None:
+        self.time_s = round(self.time_s + dt_s, 9)
+
+
+class ScriptedRobot:
+    """Remembers what was asked of it; `raising` maps a verb to the exception that it raises."""
+
+    def __init__(self, clock: ManualClock, name: str = "Alice") -> None:
+        self.name = name
+        self.clock = clock
+        self.holding = False
+        self.driving = False
+        self.holder: str | None = None
+        self.calls: list[str] = []
+        self.raising: dict[str, BaseException] = {}
+
+    def _called(self, verb: str) -> CommandId:
+        self.calls.append(verb)
+        if verb in self.raising:
+            raise self.raising[verb]
+        return CommandId(len(self.calls))
+
+    def odometry(self) -> Odometry:
+        if "odometry" in self.raising:
+            raise self.raising["odometry"]
+        return Odometry(self.clock.now(), RigidTransform(), (0.0, 0.0, 0.0))
+
+    def gripper(self) -> Gripper:
+        return Gripper(self.clock.now(), 0.3, 10.0 if self.holding else 0.0, self.holding)
+
+    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
+        command = self._called("drive")
+        self.driving = True
+        return command
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        command = self._called("stop")
+        self.driving = False
+        return command
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        return CommandStatus(CommandState.DONE)
+
+    def acquire_lease(self, holder: str) -> Lease:
+        if self.holder is not None:
+            raise LeaseError(f"{self.holder} holds the lease of {self.name}")
+        self.holder = holder
+        return Lease(self.name, holder, 1)
+
+    def return_lease(self, lease: Lease) -> None:
+        self._called("return_lease")
+        self.holder = None
+
+
+class StillLocaliser:
+    """Stands at the origin of the world."""
+
+    def __init__(self) -> None:
+        self.localised = True
+        self.updates = 0
+
+    def estimate(self) -> LocalisationEstimate:
+        return LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), self.localised)
+
+    def update(self, robot: Any) -> None:
+        self.updates += 1
+
+
+class EmptyCostmap:
+    def clearance_m(self, points_W: Any) -> Any:
+        return np.full(len(points_W), 9.0)
+
+    def update(self, robot: Any, localisation: LocalisationEstimate) -> None:
+        pass
+
+
+@dataclass
+class Script:
+    """What the scripted skills do: `ends[name]` gives the last step; `seen_on` the surfaces where things are seen."""
+
+    ends: dict[str, Callable[[Any], SkillStep]] = field(default_factory=dict)
+    seen_on: tuple[str, ...] = ("counter",)
+    steps: int = 3
+    begun: list[str] = field(default_factory=list)
+    ended: list[str] = field(default_factory=list)
+
+
+COKE = ObjectObservation(0.0, Thing("coke"), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.0, 0.9, "counter")
+
+
+def scripted_skill(script: Script, skill_name: str, inputs_type: type, outputs_: Mapping[str, type]) -> type[Skill[Any]]:
+    """A skill that drives for a few steps and then ends as the script says."""
+
+    class Scripted(Skill[Any]):
+        name: ClassVar[str] = skill_name
+        Inputs: ClassVar[type] = inputs_type
+        outputs: ClassVar[Mapping[str, type]] = outputs_
+        default_timeout_s: ClassVar[float] = 30.0
+
+        def begin(self, inputs: Any) -> None:
+            script.begun.append(skill_name)
+            self.inputs, self.left, self.open = inputs, script.steps, True
+
+        def step(self) -> SkillStep:
+            robot, lease = self.context.robot, self.context.lease
+            robot.drive(0.1, 0.0, 0.0, until_s=self.context.clock.now() + 0.5, lease=lease)
+            self.left -= 1
+            if self.left > 0:
+                return Running(f"{skill_name} goes on")
+            return script.ends.get(skill_name, default_end(script, skill_name))(self)
+
+        def end(self) -> None:
+            if getattr(self, "open", False):
+                script.ended.append(skill_name)
+                self.open = False
+            self.context.robot.stop(lease=self.context.lease)
+
+    return Scripted
+
+
+def default_end(script: Script, name: str) -> Callable[[Any], SkillStep]:
+    """What a scripted skill does when nothing else was said."""
+
+    def detect(skill: Any) -> SkillStep:
+        seen = any(surface.name in script.seen_on for surface in skill.inputs.surfaces)
+        return Succeeded("seen", {"observation": COKE}) if seen else Failed(Cause.POSTCONDITION, "not seen")
+
+    def grasp(skill: Any) -> SkillStep:
+        skill.context.robot._robot.holding = True
+        return Succeeded("held", {"held": COKE})
+
+    special = {"detect": detect, "grasp": grasp, "approach": lambda s: Succeeded("near", {"observation": COKE})}
+    return special.get(name, lambda skill: Succeeded(f"{name} done"))
+
+
+@dataclass(frozen=True)
+class NavigateInputs:
+    goal: Pose2D
+    position_tolerance_m: float = 0.15
+
+
+@dataclass(frozen=True)
+class DetectInputs:
+    classes: tuple[str, ...]
+    attributes: tuple[str, ...]
+    surfaces: tuple[Surface, ...]
+
+
+@dataclass(frozen=True)
+class ApproachInputs:
+    observation: ObjectObservation
+    surfaces: tuple[Surface, ...]
+
+
+@dataclass(frozen=True)
+class GraspInputs:
+    observation: ObjectObservation
+
+
+@dataclass(frozen=True)
+class PlaceInputs:
+    surface: Surface
+
+
+@dataclass(frozen=True)
+class HandOverInputs:
+    person: str
+
+
+@dataclass(frozen=True)
+class NoInputs:
+    pass
+
+
+PORTS: dict[str, tuple[type, dict[str, type]]] = {
+    "navigate": (NavigateInputs, {}),
+    "detect": (DetectInputs, {"observation": ObjectObservation}),
+    "approach": (ApproachInputs, {"observation": ObjectObservation}),
+    "grasp": (GraspInputs, {"held": ObjectObservation}),
+    "place": (PlaceInputs, {}),
+    "hand_over": (HandOverInputs, {}),
+    "stow": (NoInputs, {}),
+}
+
+KNOWLEDGE = {
+    "robot": {"name": "Alice"},
+    "start": {"x": 0, "y": 0},
+    "dock": {"x": 0, "y": -1},
+    "places": {
+        "kitchen": {"pose": {"x": 4, "y": 0}, "polygon": [[3, -2], [6, -2], [6, 2]]},
+        "bedroom": {"pose": {"x": -4, "y": 0}, "polygon": [[-3, -2], [-6, -2], [-6, 2]]},
+        "bathroom": {"pose": {"x": 0, "y": 4}, "polygon": [[0, 3], [1, 3], [1, 5]]},
+    },
+    "surfaces": {
+        "shelf": {
+            "place": "kitchen",
+            "height": 1.0,
+            "polygon": [[5, 1], [6, 1], [6, 2]],
+            "viewpoints": [{"x": 4.5, "y": 1}],
+        },
+        "counter": {
+            "place": "kitchen",
+            "height": 0.9,
+            "polygon": [[5, -2], [6, -2], [6, -1]],
+            "viewpoints": [{"x": 4.5, "y": -1}, {"x": 5, "y": -0.5}],
+        },
+        "bedside table": {
+            "place": "bedroom",
+            "height": 0.5,
+            "polygon": [[-5, 1], [-6, 1], [-6, 2]],
+            "viewpoints": [{"x": -4.5, "y": 1}],
+        },
+    },
+    "things": {
+        "coke": {"categories": ["drink"], "usual": ["counter"]},
+        "beer": {"categories": ["drink"], "usual": ["counter"]},
+        "hammer": {},
+    },
+    "people": {
+        "Sam": {"at": "bathroom", "pose": {"x": 0.5, "y": 4.5}},
+        "Robin": {"at": "kitchen", "pose": {"x": 1.0, "y": 0.0}},
+    },
+}
+
+FETCH = (
+    "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
+    "Take [drink] to [start] and do [Nothing] to [Nothing]",
+)
+
+
+@pytest.fixture
+def clock() -> ManualClock:
+    return ManualClock()
+
+
+@pytest.fixture
+def robot(clock: ManualClock) -> ScriptedRobot:
+    return ScriptedRobot(clock)
+
+
+@pytest.fixture
+def published() -> list[tuple[str, Mapping[str, Any]]]:
+    return []
+
+
+@pytest.fixture
+def context(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> RunContext:
+    """What nodes share; messages go to `published`."""
+    return RunContext(
+        robot=robot,  # type: ignore[arg-type]
+        lease=Lease("Alice", "test", 1),
+        clock=clock,
+        worker=LockStepWorker(clock),
+        localiser=StillLocaliser(),
+        costmap=EmptyCostmap(),
+        publish=lambda topic, message: published.append((topic, message)),
+        seed=7,
+        board=Board("alice"),
+    )
+
+
+@pytest.fixture
+def knowledge() -> Knowledge:
+    return Knowledge.model_validate(KNOWLEDGE)
+
+
+@pytest.fixture
+def script() -> Script:
+    return Script()
+
+
+@pytest.fixture
+def registry(script: Script) -> dict[str, type[Skill[Any]]]:
+    return {name: scripted_skill(script, name, *ports) for name, ports in PORTS.items()}
+
+
+@pytest.fixture
+def compiled(knowledge: Knowledge, registry: dict[str, type[Skill[Any]]]) -> Callable[..., CompiledTree]:
+    """Compile commands given in their text form."""
+
+    def compile_texts(*texts: str, name: str = "fetch drink") -> CompiledTree:
+        steps = [Step(parse_command(text)) for text in texts]
+        return compile_commands(name, steps, knowledge=knowledge, registry=registry, robot_name="Alice")
+
+    return compile_texts
+
+
+@pytest.fixture
+def run_tree(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> Callable[..., Any]:
+    """Run a compiled tree with the scripted robot."""
+
+    def runner(tree: CompiledTree, **options: Any) -> Any:
+        settings = replace(RunSettings(seed=3), **options.pop("settings", {}))
+        entry = RunEntry(tree, robot, StillLocaliser(), EmptyCostmap())  # type: ignore[arg-type]
+        return run(
+            [entry],
+            clock=clock,
+            worker=LockStepWorker(clock),
+            publish=options.pop("publish", lambda topic, message: published.append((topic, message))),
+            settings=settings,
+            **options,
+        )
+
+    return runner
+
+
+@pytest.fixture
+def make() -> types.SimpleNamespace:
+    """The scripted classes, for tests that build their own."""
+    return types.SimpleNamespace(
+        FETCH=FETCH, COKE=COKE, ScriptedRobot=ScriptedRobot, StillLocaliser=StillLocaliser,
+        EmptyCostmap=EmptyCostmap, scripted_skill=scripted_skill, Script=Script, PORTS=PORTS,
+    )  # fmt: skip

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from pydrake.geometry import GeometryId, GeometrySet, MakeRenderEngineVtk, RenderEngineVtkParams, Role, SceneGraph
+from pydrake.geometry import GeometryId, GeometrySet, MakeRenderEngineVtk, Meshcat, MeshcatVisualizer, RenderEngineVtkParams, Role, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import LoadModelDirectives, Parser, ProcessModelDirectives
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
@@ -33,13 +33,14 @@ class LooseModel:
 
 @dataclass(frozen=True)
 class WorldDiagram:
-    """The finished Diagram and handles to its parts."""
+    """The finished Diagram and handles to its parts; `rebuild` makes the same once more, shown in a Meshcat."""
 
     diagram: Diagram
     plant: MultibodyPlant
     scene_graph: SceneGraph
     robots: Mapping[str, SpotModel]
     models: Mapping[str, ModelInstanceIndex]
+    rebuild: Callable[[Meshcat], WorldDiagram]
 
 
 def build_diagram(
@@ -51,14 +52,23 @@ def build_diagram(
     carried: bool = True,
     render: bool = True,
     time_step_s: float = TIME_STEP_S,
+    meshcat: Meshcat | None = None,
 ) -> WorldDiagram:
     """A Diagram of the directives' world (or an empty one) with models and robots.
 
     SAP contact at `time_step_s`; positions of the models are defaults of the plant, the robots' are set by the caller.
     `looks` draws Spot with meshes where they are installed; `render` adds the renderer named `RENDERER`.
     """
-    if not any(isinstance(each, _MissingMaterials) for each in logging.getLogger("drake").filters):
-        logging.getLogger("drake").addFilter(_MissingMaterials())
+    rebuild = partial(
+        build_diagram,
+        directives=directives,
+        models=models,
+        robot_names=robot_names,
+        looks=looks,
+        carried=carried,
+        render=False,
+        time_step_s=time_step_s,
+    )
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(time_step=time_step_s, discrete_contact_approximation="sap")
     plant, scene_graph = AddMultibodyPlant(config, builder)
@@ -80,16 +90,11 @@ def build_diagram(
     floor = GeometrySet(_floor_geometries(plant, scene_graph))
     for robot in robots.values():
         robot.filter_collisions(filters, floor)
-    return WorldDiagram(builder.Build(), plant, scene_graph, robots, instances)
-
-
-class _MissingMaterials(logging.Filter):
-    """Drops Drake's warnings on material files that the looks' OBJ files name and do not need: the URDF colours them."""
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        """False for such a warning."""
-        message = record.getMessage()
-        return not ("material" in message and ".mtl" in message)
+    if meshcat is not None:
+        MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    return WorldDiagram(
+        builder.Build(), plant, scene_graph, robots, instances, lambda shown_in: rebuild(meshcat=shown_in)
+    )
 
 
 def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> ModelInstanceIndex:

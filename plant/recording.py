@@ -1,0 +1,68 @@
+"""What happened in the plant, kept as states over time, and shown afterwards as one HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Meshcat
+from pydrake.systems.framework import Context
+
+from plant.diagram import WorldDiagram
+
+FloatArray = NDArray[np.float64]
+FRAMES_PER_SECOND = 16.0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """All positions of the plant at one time."""
+
+    time_s: float
+    positions: FloatArray
+
+
+class Recorder:
+    """Keeps the plant's positions at a fixed rate; call it after every step."""
+
+    def __init__(self, world: WorldDiagram, context: Context, frames_per_second: float = FRAMES_PER_SECOND) -> None:
+        """Record from the plant's `context`."""
+        self._plant, self._context = world.plant, context
+        self._period_s = 1.0 / frames_per_second
+        self._frames: list[Frame] = []
+
+    def __call__(self, now_s: float) -> None:
+        """Keep a frame when one is due."""
+        if not self._frames or now_s - self._frames[-1].time_s >= self._period_s - 1e-9:
+            self._frames.append(Frame(now_s, self._plant.GetPositions(self._context).copy()))
+
+    @property
+    def frames(self) -> Sequence[Frame]:
+        """All frames so far."""
+        return self._frames
+
+    def at(self, time_s: float) -> Frame:
+        """The last frame at or before a time, or the first. Raises LookupError when nothing was recorded."""
+        if not self._frames:
+            raise LookupError("nothing was recorded")
+        earlier = [frame for frame in self._frames if frame.time_s <= time_s + 1e-9]
+        return earlier[-1] if earlier else self._frames[0]
+
+
+def save_html(world: WorldDiagram, frames: Sequence[Frame], path: Path) -> None:
+    """Write an animation of `frames` as one HTML file that needs no server."""
+    meshcat = Meshcat()
+    shown = world.rebuild(meshcat)
+    root_context = shown.diagram.CreateDefaultContext()
+    context = shown.plant.GetMyMutableContextFromRoot(root_context)
+    meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
+    for frame in frames:
+        root_context.SetTime(frame.time_s)
+        shown.plant.SetPositions(context, frame.positions)
+        shown.diagram.ForcedPublish(root_context)
+    meshcat.StopRecording()
+    meshcat.PublishRecording()
+    path.write_text(meshcat.StaticHtml())

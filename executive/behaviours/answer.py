@@ -18,7 +18,8 @@ class Answer(ExplainedDecorator):
 
     Child RUNNING: RUNNING. Child SUCCESS: SUCCESS, answer True. Child FAILURE with every surface looked at: SUCCESS,
     answer False. Child FAILURE with a surface that could not be looked at: FAILURE with what kept the robot from it.
-    `looks` names for each surface the leaves that look at it; a leaf has looked when it failed with POSTCONDITION.
+    `looks` names for each surface the leaves that look at it, one for each viewpoint: all of them must have looked,
+    which means that they failed with POSTCONDITION.
     """
 
     def __init__(
@@ -60,8 +61,8 @@ class Answer(ExplainedDecorator):
 
 
 def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
-    """True when one of the leaves took a look and saw nothing."""
-    return any(leaf in nodes and nodes[leaf].cause == Cause.POSTCONDITION for leaf in leaves)
+    """True when each of the leaves took a look and saw nothing."""
+    return all(leaf in nodes and nodes[leaf].cause == Cause.POSTCONDITION for leaf in leaves)
 
 
 def _obstacle(nodes: Mapping[str, Explained]) -> Cause:

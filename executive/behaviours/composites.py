@@ -87,8 +87,8 @@ class MemorySelector(_MemoryComposite):
     """One way after the other until one works.
 
     Child RUNNING: RUNNING. Child SUCCESS: SUCCESS. Child FAILURE: on to the next in the same tick; after the last:
-    FAILURE with the sentences of all that could begin. Its cause is ERROR when one child had that, else the first that is neither
-    PRECONDITION nor POSTCONDITION, else `exhausted_cause` where given, else the last child's.
+    FAILURE with the sentences of all that could begin. Its cause is ERROR when one child had that, else the first
+    that is neither PRECONDITION nor POSTCONDITION, else `exhausted_cause` where given, else the last child's.
     """
 
     goes_on_after = Status.FAILURE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
@@ -47,7 +47,7 @@ def grasp_plan(shop: Workshop) -> NodePlan:
         f"pick up {thing}",
         search_plan(shop.at("find"), thing, place, key),
         shop.skill("approach", {"observation": sighting(key), "surfaces": surfaces}, {"observation": near}),
-        shop.skill("grasp", {"observation": FromBoard(near)}, {"held": f"{shop.path_id}/held"}),
+        shop.skill("grasp", {"observation": FromBoard(near)}),
     )
     attempts = RetryPlan(
         path_id=f"{shop.path_id}/attempts",
@@ -154,15 +154,22 @@ def _holding(shop: Workshop, item: Thing, below: NodePlan) -> NodePlan:
 
 
 def _person_at_start(shop: Workshop) -> str:
-    """The known person who is nearest to the start, within 3 m; else whoever stands there."""
-    start, people = shop.knowledge.start, shop.knowledge.people
-    distances = {
-        name: math.hypot(facts.pose.x - start.x, facts.pose.y - start.y)
-        for name, facts in people.items()
-        if facts.pose is not None
-    }
-    nearest = min(distances, key=lambda name: distances[name], default=None)
-    return nearest if nearest is not None and distances[nearest] < 3.0 else "person"
+    """The one person who is known to be in the room of the start; else whoever stands there."""
+    knowledge = shop.knowledge
+    start = (knowledge.start.x, knowledge.start.y)
+    rooms = [name for name, place in knowledge.places.items() if inside(place.polygon, start)]
+    there = [name for name, facts in knowledge.people.items() if knowledge.room(shop.place(facts.at)) in rooms]
+    return there[0] if len(there) == 1 else "person"
+
+
+def inside(polygon: Sequence[tuple[float, float]], point: tuple[float, float]) -> bool:
+    """True when (x, y) lies within the outline."""
+    x, y = point
+    crossings = 0
+    for (x1, y1), (x2, y2) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
+        if (y1 > y) != (y2 > y):
+            crossings += x < x1 + (y - y1) * (x2 - x1) / (y2 - y1)
+    return crossings % 2 == 1
 
 
 def _required(shop: Workshop, thing: Thing | None) -> Thing:

@@ -89,13 +89,18 @@ SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType(
         ),
         DETECT_TOPIC: Schema(
             "errand.ObjectToDetect",
-            {**_fields("number", "stamp"), **_fields("integer", "sequence"), "class_ids": _NUMBERS},
+            {
+                **_fields("number", "stamp"),
+                **_fields("string", "robot_name"),
+                "class_id": _NUMBERS,
+                "class_name": {"type": "array", "items": {"type": "string"}},
+            },
         ),
         DESTINATION_TOPIC: Schema(
             "errand.ObjectDestination",
             {
-                **_fields("integer", "sequence", "message_id", "class_id"),
-                **_fields("string", "class_name"),
+                **_fields("integer", "sequence", "class_id"),
+                **_fields("string", "message_id", "class_name"),
                 **_fields("number", "stamp", "goal_x", "goal_y", "goal_z"),
                 **_fields("number", "distance_from_robot_x", "distance_from_robot_y", "distance_from_robot_z"),
             },

@@ -180,7 +180,7 @@ def default_end(script: Script, name: str) -> Callable[[Any], SkillStep]:
 
     def grasp(skill: Any) -> SkillStep:
         skill.context.robot._robot.holding = True
-        return Succeeded("held", {"held": COKE})
+        return Succeeded("held")
 
     special = {"detect": detect, "grasp": grasp, "approach": lambda s: Succeeded("near", {"observation": COKE})}
     return special.get(name, lambda skill: Succeeded(f"{name} done"))
@@ -229,7 +229,7 @@ PORTS: dict[str, tuple[type, dict[str, type]]] = {
     "navigate": (NavigateInputs, {}),
     "detect": (DetectInputs, {"observation": ObjectObservation}),
     "approach": (ApproachInputs, {"observation": ObjectObservation}),
-    "grasp": (GraspInputs, {"held": ObjectObservation}),
+    "grasp": (GraspInputs, {}),
     "place": (PlaceInputs, {}),
     "hand_over": (HandOverInputs, {}),
     "stow": (NoInputs, {}),
@@ -242,6 +242,7 @@ KNOWLEDGE = {
     "places": {
         "kitchen": {"pose": {"x": 4, "y": 0}, "polygon": [[3, -2], [6, -2], [6, 2]]},
         "bedroom": {"pose": {"x": -4, "y": 0}, "polygon": [[-3, -2], [-6, -2], [-6, 2]]},
+        "hall": {"pose": {"x": 0, "y": 0}, "polygon": [[-2, -2], [2, -2], [2, 2], [-2, 2]]},
         "bathroom": {"pose": {"x": 0, "y": 4}, "polygon": [[0, 3], [1, 3], [1, 5]]},
     },
     "surfaces": {
@@ -271,7 +272,7 @@ KNOWLEDGE = {
     },
     "people": {
         "Sam": {"at": "bathroom", "pose": {"x": 0.5, "y": 4.5}},
-        "Robin": {"at": "kitchen", "pose": {"x": 1.0, "y": 0.0}},
+        "Robin": {"at": "hall"},
     },
 }
 

@@ -59,12 +59,15 @@ class Box(Shape):
     size: Vector
 
     def sdf(self) -> str:
+        """The SDF `<geometry>` content."""
         return f"<box><size>{' '.join(number(v) for v in self.size)}</size></box>"
 
     def volume(self) -> float:
+        """Volume in cubic metres."""
         return float(np.prod(self.size))
 
     def unit_inertia(self) -> Vector:
+        """Principal moments about the centre per kilogram (m^2), in the shape's own axes."""
         x, y, z = (v * v / 12.0 for v in self.size)
         return (y + z, x + z, x + y)
 
@@ -77,12 +80,15 @@ class Cylinder(Shape):
     length: float
 
     def sdf(self) -> str:
+        """The SDF `<geometry>` content."""
         return f"<cylinder><radius>{number(self.radius)}</radius><length>{number(self.length)}</length></cylinder>"
 
     def volume(self) -> float:
+        """Volume in cubic metres."""
         return float(np.pi * self.radius**2 * self.length)
 
     def unit_inertia(self) -> Vector:
+        """Principal moments about the centre per kilogram (m^2), in the shape's own axes."""
         across = (3 * self.radius**2 + self.length**2) / 12.0
         return (across, across, self.radius**2 / 2.0)
 
@@ -95,12 +101,15 @@ class Capsule(Shape):
     length: float
 
     def sdf(self) -> str:
+        """The SDF `<geometry>` content."""
         return f"<capsule><radius>{number(self.radius)}</radius><length>{number(self.length)}</length></capsule>"
 
     def volume(self) -> float:
+        """Volume in cubic metres."""
         return float(np.pi * self.radius**2 * (self.length + 4.0 / 3.0 * self.radius))
 
     def unit_inertia(self) -> Vector:
+        """Principal moments about the centre per kilogram (m^2), in the shape's own axes."""
         return Cylinder(radius=self.radius, length=self.length + 4.0 / 3.0 * self.radius).unit_inertia()
 
 
@@ -111,12 +120,15 @@ class Sphere(Shape):
     radius: float
 
     def sdf(self) -> str:
+        """The SDF `<geometry>` content."""
         return f"<sphere><radius>{number(self.radius)}</radius></sphere>"
 
     def volume(self) -> float:
+        """Volume in cubic metres."""
         return float(4.0 / 3.0 * np.pi * self.radius**3)
 
     def unit_inertia(self) -> Vector:
+        """Principal moments about the centre per kilogram (m^2), in the shape's own axes."""
         moment = 0.4 * self.radius**2
         return (moment, moment, moment)
 

@@ -1,0 +1,245 @@
+"""Textured triangle meshes made of simple surfaces, and their OBJ form.
+
+Texture coordinates outside of [0, 1] are clamped by the renderer, so a surface larger than its texture is cut into
+tiles here.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+Colour = tuple[float, float, float]
+UV = tuple[tuple[float, float], tuple[float, float]]
+WHOLE: UV = ((0.0, 0.0), (1.0, 1.0))
+PALETTE_COLUMNS = 16
+IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Material:
+    """How a surface looks: colour (RGB, 0..1), a texture file beside the mesh, metres that one texture covers.
+
+    A `tile_m` of None stretches the texture once over each surface.
+    """
+
+    colour: Colour = (1.0, 1.0, 1.0)
+    texture: str | None = None
+    tile_m: tuple[float, float] | None = None
+    shine: float = 0.0
+
+
+@dataclass
+class _Triangles:
+    points: list[FloatArray] = field(default_factory=list)
+    normals: list[FloatArray] = field(default_factory=list)
+    uvs: list[FloatArray] = field(default_factory=list)
+
+
+class Mesh:
+    """Triangles by material. All `add_` methods take metres in the mesh's frame and outward-looking surfaces."""
+
+    def __init__(self, materials: Mapping[str, Material]) -> None:
+        self.materials = materials
+        self._groups: dict[str, _Triangles] = {}
+
+    def add_triangles(self, material: str, points: ArrayLike, normals: ArrayLike, uvs: ArrayLike) -> None:
+        """Add (N, 3, 3) corner points and normals with (N, 3, 2) texture coordinates. Raises KeyError."""
+        if material not in self.materials:
+            raise KeyError(f"no material {material!r}")
+        group = self._groups.setdefault(material, _Triangles())
+        group.points.append(np.asarray(points, dtype=float).reshape(-1, 3))
+        group.normals.append(np.asarray(normals, dtype=float).reshape(-1, 3))
+        group.uvs.append(np.asarray(uvs, dtype=float).reshape(-1, 2))
+
+    def add_rectangle(self, material: str, corner: ArrayLike, edge_u: ArrayLike, edge_v: ArrayLike) -> None:
+        """Add the rectangle from `corner` along two edges; its normal is edge_u x edge_v."""
+        p, u, v = (np.asarray(a, dtype=float) for a in (corner, edge_u, edge_v))
+        tile = self.materials[material].tile_m
+        lengths = np.linalg.norm(u), np.linalg.norm(v)
+        spans = (1.0, 1.0) if tile is None else (float(lengths[0] / tile[0]), float(lengths[1] / tile[1]))
+        for u0, u1 in _cuts(spans[0]):
+            for v0, v1 in _cuts(spans[1]):
+                origin = p + u * (u0 / spans[0]) + v * (v0 / spans[1])
+                sides = u * ((u1 - u0) / spans[0]), v * ((v1 - v0) / spans[1])
+                base = np.floor([u0 + 1e-9, v0 + 1e-9])
+                uv = ((u0 - base[0], v0 - base[1]), (u1 - base[0], v1 - base[1]))
+                self._add_patch(material, origin, *sides, uv)
+
+    def _add_patch(self, material: str, p: FloatArray, u: FloatArray, v: FloatArray, uv: UV) -> None:
+        n = np.cross(u, v)
+        n /= np.linalg.norm(n)
+        (s0, t0), (s1, t1) = uv
+        a, b, c, d = (p, (s0, t0)), (p + u, (s1, t0)), (p + u + v, (s1, t1)), (p + v, (s0, t1))
+        corners = [a, b, c, a, c, d]
+        self.add_triangles(material, [q for q, _ in corners], [n] * 6, [t for _, t in corners])
+
+    def add_box(
+        self,
+        material: str,
+        low: ArrayLike,
+        high: ArrayLike,
+        *,
+        faces: Mapping[str, str | None] | None = None,
+    ) -> None:
+        """Add the box between two corners. `faces` gives other materials (or None: leave out) to -x, +x, ... +z."""
+        a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+        x, y, z = np.diag(b - a)
+        rectangles = {
+            "-x": (a + y, -y, z),
+            "+x": (a + x, y, z),
+            "-y": (a, x, z),
+            "+y": (a + x + y, -x, z),
+            "-z": (a + y, x, -y),
+            "+z": (a + z, x, y),
+        }
+        for face, (corner, u, v) in rectangles.items():
+            chosen = (faces or {}).get(face, material)
+            if chosen is not None:
+                self.add_rectangle(chosen, corner, u, v)
+
+    def add_lathe(
+        self, material: str, profile: Sequence[tuple[float, float]], *, centre: ArrayLike = (0, 0, 0), sides: int = 24
+    ) -> None:
+        """Turn a profile of (radius, z), from the bottom up, about the vertical through `centre`."""
+        outline = np.asarray(profile, dtype=float)
+        steps = np.linalg.norm(np.diff(outline, axis=0), axis=1)
+        v = np.concatenate([[0.0], np.cumsum(steps)]) / np.sum(steps)
+        for k, (lower, upper) in enumerate(itertools.pairwise(outline)):
+            self._add_band(material, lower, upper, (v[k], v[k + 1]), np.asarray(centre, dtype=float), sides)
+
+    def _add_band(
+        self, material: str, low: FloatArray, high: FloatArray, v: tuple[float, float], centre: FloatArray, sides: int
+    ) -> None:
+        angle = np.linspace(0, 2 * np.pi, sides + 1)
+        ring = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+        slope = high - low
+        normal = ring * slope[1] + np.array([0, 0, -slope[0]])
+        normal /= np.linalg.norm(slope)
+        bottom = centre + ring * low[0] + [0, 0, low[1]]
+        top = centre + ring * high[0] + [0, 0, high[1]]
+        u = np.linspace(0, 1, sides + 1)
+        for i in range(sides):
+            j = i + 1
+            corners = [(bottom, i, 0), (bottom, j, 0), (top, j, 1), (bottom, i, 0), (top, j, 1), (top, i, 1)]
+            points = [side[k] for side, k, _ in corners]
+            self.add_triangles(
+                material, points, [normal[k] for _, k, _ in corners], [(u[k], v[e]) for _, k, e in corners]
+            )
+
+    def add_cylinder(
+        self, material: str, radius: float, low: ArrayLike, height: float, *, cap: str | None = None, sides: int = 20
+    ) -> None:
+        """Add an upright closed cylinder on the point `low`; its top may have another material."""
+        centre = np.asarray(low, dtype=float)
+        self.add_lathe(material, [(0, 0), (radius, 0), (radius, height)], centre=centre, sides=sides)
+        self.add_lathe(cap or material, [(radius, height), (0, height)], centre=centre, sides=sides)
+
+    def add_prism(self, material: str, outline: Sequence[tuple[float, float]], z0: float, z1: float) -> None:
+        """Extrude a convex, counter-clockwise outline (x, y) from z0 to z1."""
+        flat = np.asarray(outline, dtype=float)
+        bottom = np.column_stack([flat, np.full(len(flat), z0)])
+        top = np.column_stack([flat, np.full(len(flat), z1)])
+        for i in range(len(flat)):
+            j = (i + 1) % len(flat)
+            self._add_patch(material, bottom[i], bottom[j] - bottom[i], top[i] - bottom[i], WHOLE)
+        for i in range(1, len(flat) - 1):
+            uv = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]
+            self.add_triangles(material, [top[0], top[i], top[i + 1]], [(0, 0, 1)] * 3, uv)
+            self.add_triangles(material, [bottom[0], bottom[i + 1], bottom[i]], [(0, 0, -1)] * 3, uv)
+
+    def add_mesh(self, other: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> None:
+        """Add another mesh, turned by the (3, 3) matrix R, then moved by p. R may scale, too."""
+        matrix, offset = np.asarray(R, dtype=float), np.asarray(p, dtype=float)
+        to_normal = np.linalg.inv(matrix)
+        for material, points, normals, uvs in other.groups():
+            turned = normals @ to_normal
+            turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+            self.add_triangles(material, points @ matrix.T + offset, turned, uvs)
+
+    def groups(self) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
+        """Material, points (3N, 3), normals (3N, 3) and texture coordinates (3N, 2), by material name."""
+        for material in sorted(self._groups):
+            g = self._groups[material]
+            yield material, np.concatenate(g.points), np.concatenate(g.normals), np.concatenate(g.uvs)
+
+
+def _cuts(span: float) -> list[tuple[float, float]]:
+    """Whole tiles and the rest of a length that is `span` textures long."""
+    edges = [*np.arange(0.0, span - 1e-6, 1.0), span]
+    return [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
+
+
+def obj_text(mesh: Mesh, material_file: str, shared_texture: str = "palette") -> str:
+    """The Wavefront OBJ form. Plain colours share one material that reads `shared_texture`; see `mtl_text`."""
+    colours = plain_colours(mesh.materials)
+    lines, merged = [f"mtllib {material_file}"], dict[str, list[tuple[FloatArray, FloatArray, FloatArray]]]()
+    for material, points, normals, uvs in mesh.groups():
+        if material in colours:
+            uvs = np.tile(palette_uv(colours.index(material)), (len(points), 1))
+        name = shared_texture if material in colours else material
+        merged.setdefault(name, []).append((points, normals, uvs))
+    counts = [0, 0, 0]
+    for name, parts in sorted(merged.items()):
+        points, normals, uvs = (np.concatenate([part[k] for part in parts]) for k in range(3))
+        lines += _obj_group(name, points, normals, uvs, counts)
+    return "\n".join(lines) + "\n"
+
+
+def _obj_group(name: str, points: FloatArray, normals: FloatArray, uvs: FloatArray, counts: list[int]) -> list[str]:
+    """One material's lines; `counts` (vertices, texture coordinates, normals so far) is moved on."""
+    lines, index = [], []
+    for k, (key, rows, places) in enumerate((("v", points, 4), ("vt", uvs, 4), ("vn", normals, 3))):
+        unique, inverse = np.unique(np.round(rows, places) + 0.0, axis=0, return_inverse=True)
+        lines += [f"{key} " + " ".join(f"{value:.{places}f}" for value in row) for row in unique]
+        index.append(inverse.reshape(-1) + counts[k] + 1)
+        counts[k] += len(unique)
+    lines.append(f"usemtl {name}")
+    corners = [f"{v}/{t}/{n}" for v, t, n in zip(*index, strict=True)]
+    return lines + ["f " + " ".join(corners[i : i + 3]) for i in range(0, len(corners), 3)]
+
+
+def plain_colours(materials: Mapping[str, Material]) -> list[str]:
+    """The names of the materials without a texture, in a fixed order."""
+    return sorted(name for name, material in materials.items() if material.texture is None)
+
+
+def palette_uv(index: int) -> tuple[float, float]:
+    """Texture coordinates of a colour in the palette picture."""
+    row, column = divmod(index, PALETTE_COLUMNS)
+    return ((column + 0.5) / PALETTE_COLUMNS, 1.0 - (row + 0.5) / PALETTE_COLUMNS)
+
+
+def palette_picture(materials: Mapping[str, Material], cell: int = 4) -> NDArray[np.uint8]:
+    """The palette as an RGB picture. Raises ValueError when there are too many colours."""
+    names = plain_colours(materials)
+    if len(names) > PALETTE_COLUMNS**2:
+        raise ValueError(f"{len(names)} plain colours do not fit into the palette")
+    cells = np.full((PALETTE_COLUMNS, PALETTE_COLUMNS, 3), 255, np.uint8)
+    for index, name in enumerate(names):
+        cells[divmod(index, PALETTE_COLUMNS)] = np.round(np.array(materials[name].colour) * 255)
+    return cells.repeat(cell, axis=0).repeat(cell, axis=1)
+
+
+def mtl_text(materials: Mapping[str, Material], palette_file: str, shared_texture: str = "palette") -> str:
+    """The material file for meshes written by `obj_text`."""
+    entries = {name: m for name, m in sorted(materials.items()) if m.texture is not None}
+    entries[shared_texture] = Material(texture=palette_file)
+    return "".join(_mtl_entry(name, material) for name, material in entries.items())
+
+
+def _mtl_entry(name: str, material: Material) -> str:
+    colour = " ".join(f"{value:.3f}" for value in material.colour)
+    return f"newmtl {name}\nKd {colour}\nmap_Kd {material.texture}\n\n"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file with Unix line ends, making its folder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8", newline="\n")

@@ -1,0 +1,1 @@
+"""Builds the worlds' shells, furniture and maps: `python -m plant.worlds.builder`."""

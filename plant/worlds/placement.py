@@ -1,0 +1,153 @@
+"""Where the seed puts things and people: pure functions of a world and a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from plant.models.catalogue import ModelClass, load_catalogue
+from plant.worlds.world import ObjectRule, PersonRule, Point, Polygon, World, WorldError
+from skills.api import Surface
+
+FloatArray = NDArray[np.float64]
+ATTEMPTS = 500
+ROUND_SIDES = 16
+_OBJECT_STREAM, _PEOPLE_STREAM = 1, 2
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A model in the world: X_WO is its pose at the start. Loose things rest on `surface`; people are welded."""
+
+    name: str
+    class_name: str
+    model_path: Path
+    X_WO: RigidTransform
+    surface: str | None = None
+
+
+def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
+    """The world's loose things, each at rest on one of its surfaces. Raises WorldError when they don't fit.
+
+    Surface and pose vary with the seed; each thing has its own random stream, so that another thing more or less in
+    the world moves only what is in its way.
+    """
+    catalogue, outlines, placed = load_catalogue(), list[FloatArray](), list[Placement]()
+    for index, rule in enumerate(world.seed_rules.objects):
+        model = _model_class(catalogue, rule.model, world)
+        rng = np.random.default_rng([seed, _OBJECT_STREAM, index])
+        placement, outline = _place(world, rule, model, outlines, rng)
+        placed.append(placement)
+        outlines.append(outline)
+    return tuple(placed)
+
+
+def place_people(world: World, seed: int) -> tuple[Placement, ...]:
+    """The people, who stand on the floor before the start pose and look at the robot."""
+    catalogue = load_catalogue()
+    return tuple(
+        _place_person(world, rule, _model_class(catalogue, rule.model, world), seed, index)
+        for index, rule in enumerate(world.seed_rules.people)
+    )
+
+
+def _model_class(catalogue: dict[str, ModelClass], name: str, world: World) -> ModelClass:
+    if name not in catalogue or catalogue[name].file is None:
+        known = ", ".join(key for key, entry in catalogue.items() if entry.file)
+        raise WorldError(f"{world.folder / 'objects.yaml'}: no model {name!r}; there are {known}")
+    return catalogue[name]
+
+
+def _place(
+    world: World, rule: ObjectRule, model: ModelClass, others: Sequence[FloatArray], rng: np.random.Generator
+) -> tuple[Placement, FloatArray]:
+    """A free pose for one thing, and its outline there."""
+    rules = world.seed_rules.rules
+    first = int(rng.integers(len(rule.surfaces)))
+    obstacles = [*others, *(np.array(polygon) for polygon in world.seed_rules.keep_clear)]
+    for name in (*rule.surfaces[first:], *rule.surfaces[:first]):
+        surface = world.surfaces[name]
+        for centre, yaw in _candidates(world, surface, rng):
+            outline = outline_W(model, centre, yaw)
+            clear = all(polygon_distance(outline, other) >= rules.clear_m for other in obstacles)
+            if clear and _inside(outline, surface.polygon_W, rules.rim_m):
+                z = surface.height_m + model.rest_height_m + rules.drop_m
+                X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z]))
+                return Placement(rule.name, rule.model, model.path(), X_WO, name), outline
+    raise WorldError(f"{world.folder / 'objects.yaml'}: {rule.name} finds no free spot on {', '.join(rule.surfaces)}")
+
+
+def _candidates(world: World, surface: Surface, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
+    """Random centres along the surface's front edges, with random yaws."""
+    fronts = world.seed_rules.fronts[surface.name]
+    middle = np.mean(surface.polygon_W, axis=0)
+    for _ in range(ATTEMPTS):
+        a, b = (np.array(end) for end in fronts[int(rng.integers(len(fronts)))])
+        inward = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)
+        inward *= np.sign(inward @ (middle - a))
+        centre = a + rng.uniform() * (b - a) + rng.uniform(*world.seed_rules.rules.from_edge_m) * inward
+        yield (float(centre[0]), float(centre[1])), float(rng.uniform(-np.pi, np.pi))
+
+
+def _place_person(world: World, rule: PersonRule, model: ModelClass, seed: int, index: int) -> Placement:
+    rng = np.random.default_rng([seed, _PEOPLE_STREAM, index])
+    direction = world.start.yaw_rad + rng.uniform(*rule.bearing_rad)
+    distance = rng.uniform(*rule.distance_m)
+    yaw = direction + np.pi + rng.uniform(*rule.turned_rad)
+    x = world.start.x_m + distance * np.cos(direction)
+    y = world.start.y_m + distance * np.sin(direction)
+    X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, model.rest_height_m]))
+    return Placement(rule.name, rule.model, model.path(), X_WO)
+
+
+def outline_W(model: ModelClass, centre: Point, yaw_rad: float) -> FloatArray:
+    """A model's convex outline from above at a pose, as (K, 2) corners in the world."""
+    half = np.array(model.half_extents_m)
+    if model.round:
+        angle = np.arange(ROUND_SIDES) * 2 * np.pi / ROUND_SIDES
+        corners = np.stack([np.cos(angle), np.sin(angle)], axis=1) * half
+    else:
+        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * half
+    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
+    return np.asarray(corners @ np.array([[c, s], [-s, c]]) + np.array(centre))
+
+
+def _inside(outline: FloatArray, polygon: Polygon, rim_m: float) -> bool:
+    """True when a convex polygon holds all corners at least rim_m from its edges."""
+    corners = np.array(polygon)
+    edges = np.roll(corners, -1, axis=0) - corners
+    area = np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1))
+    normals = np.sign(area) * np.stack([-edges[:, 1], edges[:, 0]], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    depth = np.einsum("ek,pek->pe", normals, outline[:, None, :] - corners[None, :, :])
+    return bool(np.all(depth >= rim_m))
+
+
+def polygon_distance(a: FloatArray, b: FloatArray) -> float:
+    """Distance between two convex polygons (m), 0 when they overlap."""
+    if _overlap(a, b):
+        return 0.0
+    return min(_corners_to_edges(a, b), _corners_to_edges(b, a))
+
+
+def _overlap(a: FloatArray, b: FloatArray) -> bool:
+    """Separating axis test."""
+    for polygon in (a, b):
+        edges = np.roll(polygon, -1, axis=0) - polygon
+        for normal in np.stack([-edges[:, 1], edges[:, 0]], axis=1):
+            from_a, from_b = a @ normal, b @ normal
+            if from_a.max() < from_b.min() or from_b.max() < from_a.min():
+                return False
+    return True
+
+
+def _corners_to_edges(points: FloatArray, polygon: FloatArray) -> float:
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    offset = points[:, None, :] - polygon[None, :, :]
+    along = np.clip(np.sum(offset * edges, axis=-1) / np.sum(edges**2, axis=-1), 0.0, 1.0)
+    return float(np.min(np.linalg.norm(offset - along[..., None] * edges, axis=-1)))

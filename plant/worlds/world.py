@@ -1,0 +1,218 @@
+"""Loads a world: a folder with directives, knowledge, maps, and the rules by which the seed sets things in it.
+
+Only what a plant needs is read of `knowledge.yaml`: the start pose, rooms and surfaces.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydrake.multibody.parsing import PackageMap
+
+from skills.api import Surface
+from skills.robot import Pose2D
+
+WORLDS_FOLDER = Path(__file__).resolve().parent
+PACKAGE_NAME = "errand"
+
+Point = tuple[float, float]
+Polygon = tuple[Point, ...]
+Span = tuple[float, float]
+ModelT = TypeVar("ModelT", bound=BaseModel)
+
+
+class WorldError(ValueError):
+    """A world is unknown or its files are wrong; the message says where and what to do."""
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Rules(_Strict):
+    """How things lie on surfaces, in metres; see `objects.yaml`."""
+
+    from_edge_m: Span
+    clear_m: float
+    rim_m: float
+    drop_m: float
+
+
+class ObjectRule(_Strict):
+    """A loose thing, its class, and the surfaces on which it may lie."""
+
+    name: str
+    model: str
+    surfaces: tuple[str, ...] = Field(min_length=1)
+
+
+class PersonRule(_Strict):
+    """A person who stands before the robot's start pose: ranges of distance, bearing and turn from facing it."""
+
+    name: str
+    model: str
+    distance_m: Span
+    bearing_rad: Span
+    turned_rad: Span
+
+
+class SeedRules(_Strict):
+    """The schema of `objects.yaml`."""
+
+    rules: Rules
+    fronts: dict[str, tuple[tuple[Point, Point], ...]]
+    keep_clear: tuple[Polygon, ...] = ()
+    objects: tuple[ObjectRule, ...]
+    people: tuple[PersonRule, ...] = ()
+
+
+class _Pose(BaseModel):
+    x: float
+    y: float
+    yaw: float
+
+    def pose(self) -> Pose2D:
+        return Pose2D(self.x, self.y, self.yaw)
+
+
+class _Place(BaseModel):
+    polygon: Polygon
+
+
+class _Top(BaseModel):
+    place: str
+    height: float
+    polygon: Polygon
+
+
+class _Knowledge(BaseModel):
+    start: _Pose
+    dock: _Pose
+    places: dict[str, _Place]
+    surfaces: dict[str, _Top]
+
+
+@dataclass(frozen=True)
+class World:
+    """A world's files and what the plant needs to know of them. Lengths in metres, world frame."""
+
+    name: str
+    folder: Path
+    start: Pose2D
+    dock: Pose2D
+    rooms: dict[str, Polygon]
+    surfaces: dict[str, Surface]
+    surface_places: dict[str, str]
+    seed_rules: SeedRules
+
+    @property
+    def directives_path(self) -> Path:
+        """Drake model directives of rooms and furniture."""
+        return self.folder / "world.dmd.yaml"
+
+    @property
+    def knowledge_path(self) -> Path:
+        """What the robot is told."""
+        return self.folder / "knowledge.yaml"
+
+    @property
+    def scan_map_path(self) -> Path:
+        """The surveyed grid of what the LiDAR sees."""
+        return self.folder / "map" / "scan.yaml"
+
+    @property
+    def keepout_map_path(self) -> Path:
+        """The surveyed grid of what the body would touch."""
+        return self.folder / "map" / "keepout.yaml"
+
+
+def add_package(package_map: PackageMap) -> None:
+    """Make `package://errand/` mean the plant's folder, as worlds and models use it."""
+    package_map.Add(PACKAGE_NAME, WORLDS_FOLDER.parent)
+
+
+def known_worlds() -> tuple[str, ...]:
+    """Names of the worlds that come with the project."""
+    return tuple(sorted(path.parent.name for path in WORLDS_FOLDER.glob("*/world.dmd.yaml")))
+
+
+def load_world(name_or_path: str | Path) -> World:
+    """Load a world by its name, or by the path of its folder. Raises WorldError."""
+    folder = _find_folder(name_or_path)
+    knowledge = _read(folder / "knowledge.yaml", _Knowledge)
+    rules = _read(folder / "objects.yaml", SeedRules)
+    surfaces = {name: Surface(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
+    _check_surfaces(folder / "objects.yaml", rules, surfaces)
+    return World(
+        name=folder.name,
+        folder=folder,
+        start=knowledge.start.pose(),
+        dock=knowledge.dock.pose(),
+        rooms={name: place.polygon for name, place in knowledge.places.items()},
+        surfaces=surfaces,
+        surface_places={name: top.place for name, top in knowledge.surfaces.items()},
+        seed_rules=rules,
+    )
+
+
+def _find_folder(name_or_path: str | Path) -> Path:
+    named = WORLDS_FOLDER / name_or_path
+    for folder in (named, Path(name_or_path)):
+        if (folder / "world.dmd.yaml").is_file():
+            return folder.resolve()
+    close = difflib.get_close_matches(str(name_or_path), known_worlds(), n=1)
+    hint = f" Did you mean {close[0]!r}?" if close else ""
+    known = ", ".join(known_worlds())
+    raise WorldError(
+        f"unknown world {str(name_or_path)!r}.{hint} Known worlds: {known}; or give a folder with a world.dmd.yaml"
+    )
+
+
+def _read(path: Path, schema: type[ModelT]) -> ModelT:
+    """Read and check a YAML file; every error names the file, the line and the key."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        return schema.model_validate(yaml.safe_load(text))
+    except OSError as error:
+        raise WorldError(f"{path}: cannot be read ({error.strerror}); every world needs this file") from error
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise WorldError(f"{path}:{line}: broken YAML, {error.problem}; mend the syntax there") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise WorldError(f"{path}:{_line_of(root, first['loc'])}: {key}: {first['msg']}") from error
+
+
+def _line_of(node: yaml.Node | None, location: tuple[int | str, ...]) -> int:
+    """The line (from 1) of the deepest YAML node on the way to a key."""
+    line = 1
+    for part in location:
+        if isinstance(node, yaml.MappingNode):
+            entries = {key.value: (key, value) for key, value in node.value}
+            if part not in entries:
+                return line
+            key, node = entries[part]
+            line = key.start_mark.line + 1
+        elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+            node = node.value[part]
+            line = node.start_mark.line + 1
+    return line
+
+
+def _check_surfaces(path: Path, rules: SeedRules, surfaces: dict[str, Surface]) -> None:
+    """Every surface that the rules name is known, and those for things have fronts."""
+    wanted = {name for thing in rules.objects for name in thing.surfaces}
+    for name in sorted(wanted | set(rules.fronts)):
+        if name not in surfaces:
+            close = difflib.get_close_matches(name, surfaces, n=1)
+            hint = f"; did you mean {close[0]!r}?" if close else ""
+            raise WorldError(f"{path}: no surface {name!r} in knowledge.yaml{hint}")
+        if name in wanted and not rules.fronts.get(name):
+            raise WorldError(f"{path}: surface {name!r} may carry things but has no entry under `fronts`")

@@ -1,0 +1,57 @@
+# make env    the virtual environment .venv with all but the training extra
+# make demo   one mission, end to end; look into out/
+# make test   all tests
+# make check  lint, format and strict types
+# make bench  benchmarks, as ratios
+
+PYTHON ?= $(shell command -v python3.11 || echo python3)
+VENV := .venv
+BIN := $(VENV)/bin
+# What the wheels need beyond Python: EGL and software rendering for the cameras.
+DEBIAN := libegl1 libgl1 libgl1-mesa-dri libx11-6
+JOBS ?= 2
+
+.PHONY: env demo test fast check bench format debian clean
+
+env: $(VENV)/.ready
+
+$(VENV)/.ready: pyproject.toml constraints.txt | debian
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
+	  || { echo "Errand needs Python 3.11; set PYTHON=/path/to/python3.11"; exit 1; }
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[looks,test,bench,dev]'
+	@touch $@
+
+debian:
+	@missing=; \
+	for package in $(DEBIAN); do dpkg -s $$package >/dev/null 2>&1 || missing="$$missing $$package"; done; \
+	$(PYTHON) -c 'import ensurepip' 2>/dev/null || missing="$$missing python3.11-venv"; \
+	if [ -z "$$missing" ]; then exit 0; fi; \
+	if [ "$$(id -u)" = 0 ]; then run=; elif command -v sudo >/dev/null; then run=sudo; \
+	else echo "Errand needs these Debian packages; as root: apt-get install$$missing"; exit 1; fi; \
+	echo "installing Debian packages:$$missing"; \
+	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $$missing >/dev/null
+
+demo: env
+	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
+
+test: env
+	$(BIN)/pytest -n $(JOBS) --dist worksteal
+
+fast: env
+	$(BIN)/pytest -n $(JOBS) -m "not mission"
+
+check: env
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: env
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: env
+	$(BIN)/pytest tests/benchmarks -p no:xdist --benchmark-only
+
+clean:
+	rm -rf $(VENV) out build dist *.egg-info

@@ -1,0 +1,148 @@
+"""Actions: what each clause asks for, in the robot's own few kinds of work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from executive.language.clauses import Clause
+from executive.language.items import Being, Chunk, Item, Unknown, Verb
+from executive.language.lexicon import Lexicon, VerbKind
+from executive.language.phrases import Phrase
+from executive.language.roles import HERE, Location, Roles, read_roles
+
+__all__ = ["Action", "read_actions"]
+
+
+@dataclass(frozen=True)
+class Action:
+    """One verb's work: `objects` are what it is done to, `source` where those are, `goal` where they or the robot go.
+
+    `kind` is None for a statement, which only tells where something is. `unknown` are the words that do not fit.
+    """
+
+    kind: VerbKind | None
+    verb: str
+    objects: tuple[Phrase, ...] = ()
+    source: Location | None = None
+    goal: Location | None = None
+    unknown: tuple[str, ...] = ()
+
+
+_DESCRIBED: Final = frozenset(VerbKind) - {VerbKind.GO}
+
+
+def read_actions(clauses: Sequence[Clause], words: Lexicon) -> tuple[Action, ...]:
+    """The actions of all clauses, in order."""
+    merged = _without_checks(clauses)
+    return tuple(action for clause in merged for action in _actions(clause, words))
+
+
+def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
+    """Leave out "see" and "check" before "if there is": the question stands alone."""
+    for clause, after in zip(clauses, [*clauses[1:], None], strict=True):
+        checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
+        if not (checks and after is not None and after.whether):
+            yield clause
+
+
+def _actions(clause: Clause, words: Lexicon) -> Iterator[Action]:
+    if clause.verb is None:
+        yield Action(None, "", unknown=tuple(_spoken(clause.items)))
+    elif isinstance(clause.verb, Being):
+        yield _being(clause, clause.verb, words)
+    else:
+        yield from _acting(clause, clause.verb, words)
+
+
+def _spoken(items: Sequence[Item]) -> Iterator[str]:
+    """The words of items that no verb takes."""
+    for item in items:
+        if isinstance(item, Chunk):
+            yield " ".join(filter(None, (item.preposition, item.phrase.text)))
+        elif isinstance(item, Unknown):
+            yield item.word
+
+
+def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
+    """A status check ("is there a hammer in the workshop"), or a statement ("there is a hammer in the workshop")."""
+    roles = read_roles(clause.items, words, describes=False)
+    objects = [*([clause.subject.phrase] if clause.subject else []), *roles.objects]
+    place, *others = [*roles.ats, *roles.sources, *roles.goals, None]
+    unknown = [*roles.unknown, *(p.text for p in objects[1:]), *(o.text for o in others if o is not None)]
+    if place is None and not being.existential:
+        unknown.append("be")
+    asked = being.asked or clause.whether
+    return Action(VerbKind.FIND if asked else None, "be", tuple(objects[:1]), place, unknown=tuple(unknown))
+
+
+def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
+    going = verb.kinds == {VerbKind.GO}
+    roles = read_roles(clause.items, words, describes=not going)
+    kind = _kind(verb, roles)
+    blank = Action(kind, verb.text, unknown=tuple(roles.unknown))
+    if kind is VerbKind.GO:
+        yield from _going(blank, roles)
+    elif kind is VerbKind.FIND:
+        yield _finding(blank, roles)
+    elif kind is VerbKind.CHECK:
+        yield replace(blank, unknown=(*blank.unknown, verb.text))
+    else:
+        yield _carrying(blank, roles, words)
+
+
+def _kind(verb: Verb, roles: Roles) -> VerbKind:
+    """Which of a verb's meanings fits what stands behind it."""
+    if VerbKind.GO in verb.kinds and (len(verb.kinds) == 1 or not (roles.objects or roles.recipient)):
+        return VerbKind.GO
+    return next(kind for kind in VerbKind if kind in verb.kinds and kind is not VerbKind.GO)
+
+
+def _going(blank: Action, roles: Roles) -> Iterator[Action]:
+    """One action for each place to go to."""
+    bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
+    places = [*roles.goals, *roles.ats, *bare, *roles.joined_goals]
+    extra = [phrase.text for phrase in (roles.recipient, roles.searched) if phrase is not None]
+    extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
+    unknown = (*blank.unknown, *extra)
+    for place in places or [None]:
+        yield replace(blank, goal=place, unknown=unknown)
+
+
+def _finding(blank: Action, roles: Roles) -> Action:
+    objects, places = list(roles.objects), [*roles.ats, *roles.sources, *roles.goals]
+    if roles.searched is not None:
+        places = [*(Location(phrase) for phrase in objects), *places]
+        objects = [roles.searched]
+    extra = [place.text for place in (*places[1:], *roles.joined_goals)]
+    return _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
+
+
+def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Action:
+    """Taking, bringing and putting: sort out from where, to where and for whom."""
+    goals, sources, ats = list(roles.goals), list(roles.sources), list(roles.ats)
+    if roles.recipient is not None:
+        recipient = HERE if roles.recipient.speaker else Location(roles.recipient)
+        goals = [*goals, recipient] if goals and not goals[0].person else [recipient, *goals]
+    at_is_goal = blank.kind is VerbKind.PLACE or blank.verb in words.at_is_goal or len(ats) > 1
+    if ats and not goals and at_is_goal:
+        goals.append(ats.pop())
+    sources += ats
+    goal = next(iter(goals), None)
+    extra = [place.text for place in (*sources[1:], *_others(goals), *roles.joined_goals)]
+    extra += [roles.searched.text] if roles.searched is not None else []
+    return _with_object(
+        replace(blank, objects=tuple(roles.objects), source=next(iter(sources), None), goal=goal), extra
+    )
+
+
+def _others(goals: Sequence[Location]) -> Sequence[Location]:
+    """Goals that are too many; HERE beside another one only says for whom."""
+    return [goal for goal in goals[1:] if goal is not HERE]
+
+
+def _with_object(action: Action, extra: Sequence[str]) -> Action:
+    """The action with the words that are too many, its verb among them when it says not what."""
+    missing = () if action.objects else (action.verb,)
+    return replace(action, unknown=(*action.unknown, *extra, *missing))

@@ -1,0 +1,52 @@
+"""The sentence's clauses: a verb with what stands behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from executive.language.items import Being, Chunk, Item, Separator, Verb, Whether
+
+__all__ = ["Clause", "split_clauses"]
+
+
+@dataclass(frozen=True)
+class Clause:
+    """A verb, or a form of "to be", with the items behind it.
+
+    `verb` is None for what stands before the first verb; `subject` stood before a form of "to be"; `whether` says that
+    "if" or "whether" did.
+    """
+
+    verb: Verb | Being | None
+    items: tuple[Item, ...] = ()
+    subject: Chunk | None = None
+    whether: bool = False
+
+
+def split_clauses(items: Iterable[Item]) -> tuple[Clause, ...]:
+    """Cut the row of items at its verbs."""
+    found: list[Clause] = [Clause(None)]
+    for item in items:
+        if isinstance(item, Being):
+            found = [*found[:-1], *_begin_being(found[-1], item)]
+        elif isinstance(item, Verb):
+            found.append(Clause(item))
+        else:
+            found[-1] = replace(found[-1], items=(*found[-1].items, item))
+    return tuple(clause for clause in found if clause.verb is not None or _content(clause.items))
+
+
+def _content(items: Sequence[Item]) -> bool:
+    return any(not isinstance(item, Separator) for item in items)
+
+
+def _begin_being(last: Clause, being: Being) -> list[Clause]:
+    """Begin a clause of "to be", which takes its subject, and the "if" before it, from the clause before."""
+    rest, subject = last.items, None
+    if rest and isinstance(rest[-1], Chunk) and rest[-1].role is None and not being.existential:
+        rest, subject = rest[:-1], rest[-1]
+    whether = bool(rest) and isinstance(rest[-1], Whether)
+    asked = being.asked and subject is None
+    before = replace(last, items=rest[: len(rest) - whether])
+    return [before, Clause(replace(being, asked=asked), (), subject, whether)]

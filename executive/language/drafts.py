@@ -1,0 +1,110 @@
+"""Deeds become drafts of commands: going for a thing and carrying it are two."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from executive.command import Command, Task, Thing
+from executive.language.lexicon import VerbKind
+from executive.language.phrases import Phrase
+from executive.language.reference import Deed
+from executive.language.roles import HERE, Location
+
+__all__ = ["Draft", "draft_commands", "spoken_command"]
+
+_GOES_FOR: Final = frozenset({VerbKind.FIND, VerbKind.PICK, VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP})
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A command whose names are still as they were spoken."""
+
+    verb: str
+    item: Phrase | None = None
+    goal: Location | None = None
+    task: Task | None = None
+    object: Phrase | None = None
+
+
+def draft_commands(deeds: Sequence[Deed]) -> tuple[Draft, ...]:
+    """The commands of all deeds, in order.
+
+    A place that the robot is sent to first is where the next deed's thing is looked for; a thing in the hand is not
+    gone for again.
+    """
+    drafts: list[Draft] = []
+    held: Phrase | None = None
+    for index, deed in enumerate(joined := _join_going(deeds)):
+        later = any(other.again and other.target == deed.target for other in joined[index + 1 :])
+        drafts += _drafts(deed, held, later)
+        held = _held_after(deed, held, later)
+    return tuple(drafts)
+
+
+def _join_going(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
+    """Give the place of a bare "go" to the next deed, where that lacks one."""
+    joined: list[Deed] = []
+    for deed in deeds:
+        before = joined[-1] if joined and joined[-1].kind is VerbKind.GO else None
+        takes_source = before and deed.kind in _GOES_FOR and deed.source is None and not deed.again
+        takes_goal = before and deed.kind is VerbKind.PLACE and deed.goal is None
+        if before and (takes_source or takes_goal):
+            joined.pop()
+            deed = replace(deed, **{"source" if takes_source else "goal": before.goal})
+        joined.append(deed)
+    return tuple(joined)
+
+
+def _drafts(deed: Deed, held: Phrase | None, later: bool) -> Iterator[Draft]:
+    if deed.kind is VerbKind.GO:
+        yield Draft(deed.verb, goal=deed.goal)
+    elif deed.kind is VerbKind.FIND and not later:
+        yield Draft(deed.verb, goal=deed.source, task=Task.FIND, object=deed.target)
+    else:
+        yield from _handling(deed, held, later)
+
+
+def _handling(deed: Deed, held: Phrase | None, later: bool) -> Iterator[Draft]:
+    """Going for a thing unless it is in the hand, and carrying it where a goal is said."""
+    goal = _goal(deed, later)
+    sets_down = deed.kind is VerbKind.PLACE
+    if held != deed.target and not (sets_down and goal is None):
+        yield Draft(deed.verb, goal=deed.source, task=Task.GRASP, object=deed.target)
+    if sets_down:
+        yield Draft(deed.verb, item=deed.target, goal=goal, task=Task.PLACE, object=deed.target)
+    elif goal is not None:
+        yield Draft(deed.verb, item=deed.target, goal=goal)
+
+
+def _goal(deed: Deed, later: bool) -> Location | None:
+    """Where the thing goes: what was said, or back, for what makes a round trip and is not needed again."""
+    back = deed.kind is VerbKind.ROUND_TRIP and not later
+    return deed.goal or (HERE if back else None)
+
+
+def _held_after(deed: Deed, held: Phrase | None, later: bool) -> Phrase | None:
+    if deed.kind is VerbKind.GO or (deed.kind is VerbKind.FIND and not later):
+        return held
+    return None if deed.kind is VerbKind.PLACE or _goal(deed, later) is not None else deed.target
+
+
+def spoken_command(draft: Draft) -> Command:
+    """The draft as a command with its names as they were spoken."""
+    goal, within = draft.goal, None if draft.goal is None else draft.goal.within
+    person = goal is not None and goal.person
+    return Command(
+        item=_thing(draft.item),
+        goal=None if goal is None else goal.name if person else goal.text,
+        goal_at=within.text if person and within is not None else None,
+        task=draft.task,
+        object=_thing(draft.object),
+        item_count=1 if draft.item is None else draft.item.count,
+        object_count=1 if draft.object is None else draft.object.count,
+        verb=draft.verb,
+    )
+
+
+def _thing(phrase: Phrase | None) -> Thing | None:
+    return None if phrase is None else phrase.thing

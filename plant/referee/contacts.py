@@ -1,0 +1,81 @@
+"""Which bodies touch now, and bumps: touches of a robot with what it should keep clear of, counted once each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pydrake.geometry import GeometryId
+from pydrake.multibody.plant import ContactResults
+
+from plant.referee.cast import ROBOT_KINDS, Actor, Kind
+
+Pair = tuple[int, int]
+
+FLOOR_Z_M = 0.04
+
+
+def touching(results: ContactResults, body_of_geometry: Mapping[GeometryId, int]) -> dict[Pair, float]:
+    """Pairs of body indices (lower first) in contact, and the height of their lowest contact point (m)."""
+    lowest: dict[Pair, float] = {}
+    for i in range(results.num_point_pair_contacts()):
+        info = results.point_pair_contact_info(i)
+        _lower(lowest, int(info.bodyA_index()), int(info.bodyB_index()), float(info.contact_point()[2]))
+    for i in range(results.num_hydroelastic_contacts()):
+        surface = results.hydroelastic_contact_info(i).contact_surface()
+        a, b = body_of_geometry[surface.id_M()], body_of_geometry[surface.id_N()]
+        _lower(lowest, a, b, float(surface.centroid()[2]))
+    return lowest
+
+
+def _lower(lowest: dict[Pair, float], a: int, b: int, z: float) -> None:
+    pair = (a, b) if a < b else (b, a)
+    lowest[pair] = min(z, lowest.get(pair, z))
+
+
+@dataclass(frozen=True)
+class Collision:
+    """A robot bumped into something."""
+
+    time_s: float
+    robot: str
+    part: Kind
+    sentence: str
+
+
+class CollisionCounter:
+    """Counts rising edges of contact between robots and scenery, persons or other robots.
+
+    A pair that parts for less than `debounce_s` is still the same bump. What touches at the first look does not count.
+    """
+
+    def __init__(self, actors: Mapping[int, Actor], debounce_s: float = 0.5) -> None:
+        """Start with a clean record."""
+        self._actors, self._debounce_s = actors, debounce_s
+        self._last_touched_s: dict[Pair, float] | None = None
+        self.collisions: list[Collision] = []
+
+    def update(self, time_s: float, pairs: Mapping[Pair, float]) -> None:
+        """Take in the pairs that touch at time_s, with the height of their lowest contact."""
+        bumps = [pair for pair, z in pairs.items() if self._is_bump(pair, z)]
+        if self._last_touched_s is None:
+            self._last_touched_s = dict.fromkeys(bumps, time_s)
+        for pair in bumps:
+            if time_s - self._last_touched_s.get(pair, float("-inf")) > self._debounce_s:
+                self.collisions.append(self._collision(time_s, pair))
+            self._last_touched_s[pair] = time_s
+
+    def _is_bump(self, pair: Pair, z: float) -> bool:
+        """Whether a touch is a collision: not feet on the floor, not loose objects, not a robot with itself."""
+        kinds = {self._actors[index].kind for index in pair}
+        if Kind.OBJECT in kinds or not kinds & ROBOT_KINDS:
+            return False
+        if self._actors[pair[0]].owner == self._actors[pair[1]].owner:
+            return False
+        return not (kinds == {Kind.LEG, Kind.SCENERY} and z < FLOOR_Z_M)
+
+    def _collision(self, time_s: float, pair: Pair) -> Collision:
+        first, second = self._actors[pair[0]], self._actors[pair[1]]
+        robot, other = (first, second) if first.kind in ROBOT_KINDS else (second, first)
+        sentence = f"{robot.label} hit {other.label} at {time_s:.2f} s."
+        return Collision(time_s, robot.owner, robot.kind, sentence)

@@ -1,0 +1,84 @@
+"""What was promised, and the verdict on it: plain data, so that the plant needs to know nothing of missions."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+class PromiseKind(enum.Enum):
+    """What is to have happened, or to be so at the end."""
+
+    GRASPED = "grasped"  # taken from a source region and lifted, at some time
+    HANDED_OVER = "handed over"  # held out in the gripper near a person
+    PLACED = "placed"  # resting in a goal region, let go
+    WENT = "went"  # the robot's body in a goal region
+    ANSWERED = "answered"  # the answer is what is true of the source regions
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of the world: an outline seen from above, (x, y) corners in order, and a range of heights (m).
+
+    For an object its body origin counts, for a robot the origin of its body: a table of 0.75 m whose objects have their
+    origin between base and 0.25 m above it is the range 0.70 to 1.00.
+    """
+
+    name: str
+    polygon_W: tuple[tuple[float, float], ...]
+    z_min_m: float = -0.1
+    z_max_m: float = 3.0
+
+    def __post_init__(self) -> None:
+        if len(self.polygon_W) < 3 or not self.z_min_m < self.z_max_m:
+            raise ValueError(f"region {self.name!r} needs three corners or more and z_min_m below z_max_m")
+
+    def contains(self, p_W: Iterable[float]) -> bool:
+        """Whether a point (x, y, z) in the world lies inside."""
+        x, y, z = p_W
+        return self.z_min_m <= z <= self.z_max_m and _inside(self.polygon_W, x, y)
+
+
+def _inside(polygon: tuple[tuple[float, float], ...], x: float, y: float) -> bool:
+    """Whether (x, y) lies in the polygon: a ray to the right crosses its outline an odd number of times."""
+    inside = False
+    for (x1, y1), (x2, y2) in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) * (x2 - x1) / (y2 - y1):
+            inside = not inside
+    return inside
+
+
+@dataclass(frozen=True)
+class Promise:
+    """One thing promised.
+
+    `classes` are the object classes that fulfil it and `count` how many objects (0 counts as 1); `source` is where
+    they were to be taken from (empty: anywhere) or, for an answer, where was to be looked; `goal` where they or the
+    robot were to go (any of the regions); `person` the one to be handed to (None: anyone); `answer` what was said;
+    `robot` who was to do it (None: any).
+    """
+
+    kind: PromiseKind
+    classes: tuple[str, ...] = ()
+    count: int = 1
+    source: tuple[Region, ...] = ()
+    goal: tuple[Region, ...] = ()
+    person: str | None = None
+    answer: bool | None = None
+    robot: str | None = None
+
+    @property
+    def needed(self) -> int:
+        """How many objects fulfil it."""
+        return max(1, self.count)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the referee saw: whether all promises hold, a plain sentence on each, and the counts of the whole run."""
+
+    success: bool
+    why: str
+    collisions: int
+    drops: int

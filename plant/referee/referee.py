@@ -1,0 +1,140 @@
+"""The referee itself: looks at the truth while the plant runs, and judges afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context
+
+from plant.referee.cast import Cast, Kind, LinkNames, Placed
+from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
+from plant.referee.judge import Truth, judge, offered
+from plant.referee.promise import Promise, Verdict
+from plant.referee.story import Look, ObjectStory
+
+FloatArray = NDArray[np.float64]
+
+PATH_STEP_M = 0.02
+
+
+class Referee:
+    """Watches one plant. `observe` at about 20 Hz while it runs, `judge` whenever wanted."""
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        placements: Iterable[Placed],
+        *,
+        robots: Sequence[str],
+        persons: Sequence[str] = (),
+        links: LinkNames | None = None,
+    ) -> None:
+        """Build for a finalized plant.
+
+        `placements` are the loose objects; those named in `persons` are people. `robots` are the model instances of the
+        robots. Raises ValueError that names what the plant does not have.
+        """
+        self._plant, self._results = plant, plant.get_contact_results_output_port()
+        self._cast = Cast.of(plant, placements, robots, persons, links or LinkNames())
+        self._counter = CollisionCounter(self._cast.actors)
+        self._stories = {name: ObjectStory(name, self._cast.classes[name]) for name in self._cast.objects}
+        self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
+        self._offers: dict[tuple[str, str], float] = {}
+        self._bases: dict[str, FloatArray] = {}
+        self._persons: dict[str, FloatArray] = {}
+
+    @property
+    def collisions(self) -> tuple[Collision, ...]:
+        """All bumps so far."""
+        return tuple(self._counter.collisions)
+
+    @property
+    def drops(self) -> int:
+        """Objects dropped so far."""
+        return sum(story.drops for story in self._stories.values())
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """What happened, one sentence each: bumps, lifts, drops."""
+        told = [event for story in self._stories.values() for event in story.events]
+        return (*told, *(collision.sentence for collision in self._counter.collisions))
+
+    def path(self, robot: str) -> FloatArray:
+        """The way of a robot's body so far, (N, 3) in the world, a point every few centimetres. Raises KeyError."""
+        return np.array(self._paths[robot], dtype=np.float64).reshape(-1, 3)
+
+    def observe(self, plant_context: Context, time_s: float) -> None:
+        """Look at the plant's state at time_s."""
+        pairs = touching(self._results.Eval(plant_context), self._cast.body_of_geometry)
+        self._counter.update(time_s, pairs)
+        self._bases = {name: self._position(plant_context, body) for name, body in self._cast.bases.items()}
+        self._persons = {name: self._position(plant_context, body) for name, body in self._cast.persons.items()}
+        for name, p_WB in self._bases.items():
+            _extend(self._paths[name], p_WB)
+        neighbours = self._neighbours(pairs)
+        for name, body in self._cast.objects.items():
+            touches = neighbours.get(int(body.index()), {})
+            self._stories[name].take(self._look(plant_context, time_s, self._position(plant_context, body), touches))
+        self._note_offers(time_s)
+
+    def judge(self, promises: Sequence[Promise]) -> Verdict:
+        """Whether all promises hold as things stand. Raises ValueError before the first look."""
+        if not self._bases:
+            raise ValueError("the referee has not observed anything yet")
+        truth = Truth(
+            stories=tuple(self._stories.values()),
+            bases=self._bases,
+            paths={name: self.path(name) for name in self._paths},
+            persons=self._persons,
+            offers=frozenset(self._offers),
+        )
+        return judge(promises, truth, collisions=len(self._counter.collisions), drops=self.drops)
+
+    def _position(self, plant_context: Context, body: object) -> FloatArray:
+        """The body origin's position in the world."""
+        return np.array(self._plant.EvalBodyPoseInWorld(plant_context, body).translation())
+
+    def _neighbours(self, pairs: Mapping[Pair, float]) -> dict[int, dict[int, float]]:
+        """For each object's body, the bodies that touch it and the height of the lowest contact."""
+        found: dict[int, dict[int, float]] = {}
+        for (a, b), z in pairs.items():
+            for this, other in ((a, b), (b, a)):
+                if self._cast.actors[this].kind is Kind.OBJECT:
+                    found.setdefault(this, {})[other] = z
+        return found
+
+    def _look(self, plant_context: Context, time_s: float, p_WO: FloatArray, touches: Mapping[int, float]) -> Look:
+        """One look at an object with the bodies that touch it."""
+        actors = {index: self._cast.actors[index] for index in touches}
+        gripper = next((actor.owner for actor in actors.values() if actor.kind is Kind.GRIPPER), None)
+        still = (Kind.SCENERY, Kind.PERSON, Kind.OBJECT)
+        return Look(
+            time_s=time_s,
+            p_WO=p_WO,
+            gripper=gripper,
+            X_WH=self._hand_pose(plant_context, gripper),
+            supported=any(actor.kind in still for actor in actors.values()),
+            on_floor=any(actors[i].kind is Kind.SCENERY and z < FLOOR_Z_M for i, z in touches.items()),
+        )
+
+    def _hand_pose(self, plant_context: Context, robot: str | None) -> RigidTransform | None:
+        if robot is None or robot not in self._cast.hands:
+            return None
+        return self._plant.EvalBodyPoseInWorld(plant_context, self._cast.hands[robot])
+
+    def _note_offers(self, time_s: float) -> None:
+        """Remember which object was held out to whom, and when last."""
+        for story in self._stories.values():
+            for person, p_WP in self._persons.items():
+                if offered(story, p_WP):
+                    self._offers[story.name, person] = time_s
+
+
+def _extend(path: list[FloatArray], p_W: FloatArray) -> None:
+    """Add a point to a path when it is some way from the last."""
+    if not path or float(np.linalg.norm(p_W[:2] - path[-1][:2])) >= PATH_STEP_M:
+        path.append(p_W)

@@ -1,0 +1,168 @@
+"""What befell one loose object: where it rested, who lifted it, whether it was dropped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+FloatArray = NDArray[np.float64]
+
+LIFT_M = 0.03
+FALL_M = 0.05
+STILL_M_S = 0.05
+WITH_HAND_M_S = 0.2
+REST_S = 0.2
+FLICKER_S = 0.15
+
+
+@dataclass(frozen=True)
+class Look:
+    """One look at an object: its place, what touches it.
+
+    `gripper` names the robot whose gripper touches it, `X_WH` is that hand's pose; `supported` tells contact with
+    anything that is no part of a robot, `on_floor` that the floor is among it.
+    """
+
+    time_s: float
+    p_WO: FloatArray
+    gripper: str | None
+    X_WH: RigidTransform | None
+    supported: bool
+    on_floor: bool
+
+
+@dataclass(frozen=True)
+class Lift:
+    """An object was lifted off the place where it had rested."""
+
+    time_s: float
+    robot: str
+    from_W: FloatArray
+
+
+@dataclass
+class ObjectStory:
+    """The record of one object; `take` is called with every look."""
+
+    name: str
+    class_name: str
+    lifts: list[Lift] = field(default_factory=list)
+    rests_W: list[FloatArray] = field(default_factory=list)
+    events: list[str] = field(default_factory=list)
+    drops: int = 0
+    touches: int = 0
+    speed_m_s: float = 0.0
+    _last: Look | None = None
+    _grip_s: float = float("-inf")
+    _grip_robot: str | None = None
+    _grip_z_m: float = 0.0
+    _supported_s: float = float("-inf")
+    _still_since_s: float | None = None
+    _carried: bool = False
+    _left_z_m: float | None = None
+    _dropped: bool = False
+
+    @property
+    def last(self) -> Look:
+        """The latest look. Raises ValueError before the first."""
+        if self._last is None:
+            raise ValueError("the referee has not observed anything yet")
+        return self._last
+
+    @property
+    def resting(self) -> bool:
+        """Still, supported, and in nobody's gripper."""
+        return self.held_by is None and self._supported and self.speed_m_s < STILL_M_S
+
+    @property
+    def held_by(self) -> str | None:
+        """The robot whose gripper has it, or had it a moment ago."""
+        return self._grip_robot if self.last.time_s - self._grip_s <= FLICKER_S else None
+
+    @property
+    def held_out(self) -> bool:
+        """Carried in a gripper and touching nothing but the robot."""
+        return self._carried and self.held_by is not None and not self._supported
+
+    @property
+    def _supported(self) -> bool:
+        """On something, now or a moment ago."""
+        return self.last.time_s - self._supported_s <= FLICKER_S
+
+    def take(self, look: Look) -> None:
+        """Go on with the story."""
+        with_hand = self._moves_with_hand(look)
+        self._measure_speed(look)
+        if look.gripper is not None:
+            self.touches += self._last is None or look.time_s - self._grip_s > 0.5
+            self._grip_s, self._grip_robot = look.time_s, look.gripper
+        if look.supported:
+            self._supported_s = look.time_s
+        self._last = look
+        if not self.rests_W:
+            self.rests_W.append(look.p_WO)
+        self._note_lift(look, with_hand)
+        self._note_leaving(look, with_hand)
+        self._note_fall(look)
+        self._note_rest(look)
+
+    def _measure_speed(self, look: Look) -> None:
+        if self._last is None or look.time_s <= self._last.time_s:
+            return
+        self.speed_m_s = float(np.linalg.norm(look.p_WO - self._last.p_WO)) / (look.time_s - self._last.time_s)
+
+    def _moves_with_hand(self, look: Look) -> bool:
+        """Whether it keeps its place in the hand since the last look."""
+        last = self._last
+        if last is None or look.X_WH is None or last.X_WH is None or look.time_s <= last.time_s:
+            return False
+        slip = look.X_WH.inverse() @ look.p_WO - last.X_WH.inverse() @ last.p_WO
+        return float(np.linalg.norm(slip)) / (look.time_s - last.time_s) < WITH_HAND_M_S
+
+    def _note_lift(self, look: Look, with_hand: bool) -> None:
+        """Begin a carry once the gripper has raised it clear of its place."""
+        if look.gripper is None or look.supported or not with_hand:
+            return
+        if not self._carried and look.p_WO[2] - self.rests_W[-1][2] >= LIFT_M:
+            self.lifts.append(Lift(look.time_s, look.gripper, self.rests_W[-1]))
+            self.events.append(f"{look.gripper} lifted the {self.name} at {look.time_s:.2f} s.")
+            self._carried = True
+
+    def _note_leaving(self, look: Look, with_hand: bool) -> None:
+        """Remember the height at which a carried object left the gripper."""
+        if look.gripper is not None and with_hand:
+            self._left_z_m, self._dropped = None, False
+            self._grip_z_m = float(look.p_WO[2])
+        elif self._carried and self._left_z_m is None:
+            self._left_z_m = self._grip_z_m
+
+    def _note_fall(self, look: Look) -> None:
+        """Count a drop once it is clear that it falls, or lies on the floor."""
+        if self._left_z_m is None or self._dropped:
+            return
+        if self._left_z_m - look.p_WO[2] > FALL_M or look.on_floor:
+            self._dropped = True
+            self.drops += 1
+            self.events.append(f"{self._grip_robot} dropped the {self.name} at {look.time_s:.2f} s.")
+
+    def _note_rest(self, look: Look) -> None:
+        """End a carry, and remember the place, once it has lain still and let go for a while."""
+        if not self.resting:
+            self._still_since_s = None
+            return
+        if self._still_since_s is None:
+            self._still_since_s = look.time_s
+        if look.time_s - self._still_since_s < REST_S:
+            return
+        self._note_knock(look)
+        if self._carried or float(np.linalg.norm(look.p_WO - self.rests_W[-1])) > 0.02:
+            self.rests_W.append(look.p_WO)
+        self._carried, self._left_z_m, self._dropped = False, None, False
+
+    def _note_knock(self, look: Look) -> None:
+        """Tell of an object that came to lie lower without having been carried."""
+        if not self._carried and self.rests_W[-1][2] - look.p_WO[2] > FALL_M:
+            self.events.append(f"The {self.name} was knocked down before {look.time_s:.2f} s.")

@@ -36,6 +36,7 @@ class CostmapOptions:
     explained_m: float = 0.15
     confirm_s: float = 0.6
     memory_s: float = 12.0
+    cell_m: float = 0.05
     min_points_per_cell: int = 3
 
 
@@ -45,10 +46,13 @@ class LayeredCostmap:
     def __init__(self, keepout: GridMap, options: CostmapOptions | None = None) -> None:
         self._keepout = keepout.with_unknown_blocked()
         self._options = options or CostmapOptions()
-        self._until_s = np.full(keepout.occupied.shape, -math.inf)
-        self._candidate_s = np.full(keepout.occupied.shape, -math.inf)
-        self._height_m = np.zeros(keepout.occupied.shape)
+        self._layer = _empty_like(keepout, self._options.cell_m)
+        self._until_s = np.full(self._layer.occupied.shape, -math.inf)
+        self._candidate_s = np.full(self._layer.occupied.shape, -math.inf)
+        self._height_m = np.zeros(self._layer.occupied.shape)
         self._field: NDArray[np.float32] | None = None
+        self._changed = False
+        self._next_expiry_s = math.inf
         self._now_s = -math.inf
         self._scan_stamp_s = -math.inf
         self._X_WB: Pose2D | None = None
@@ -62,12 +66,16 @@ class LayeredCostmap:
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
         """Distance (m) from each (x, y) row to the nearest obstacle, negative inside one and off the grid."""
         points = np.ascontiguousarray(points_W, dtype=np.float64)
-        x0_m, y0_m = self._keepout.origin_m
-        return distances(self._combined(), self._keepout.resolution_m, x0_m, y0_m, points)
+        clearance = self._keepout.distance_m(points)
+        field = self._seen_field()
+        if field is None:
+            return clearance
+        x0_m, y0_m = self._layer.origin_m
+        return np.minimum(clearance, distances(field, self._layer.resolution_m, x0_m, y0_m, points))
 
     def seen_m(self) -> FloatArray:
         """Centres (x, y) of the cells that are blocked by something seen and not surveyed."""
-        return self._keepout.centres(np.argwhere(self._until_s > self._now_s))
+        return self._layer.centres(np.argwhere(self._until_s > self._now_s))
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
         """Take in the newest scan, if it is new and the robot knows where it is."""
@@ -89,19 +97,30 @@ class LayeredCostmap:
         points = self._unexplained(points_W[own])
         if len(points) == 0:
             return
-        cells, first, counts = np.unique(self._keepout.cells(points), axis=0, return_index=True, return_counts=True)
+        cells, first, counts = np.unique(self._layer.cells(points), axis=0, return_index=True, return_counts=True)
         kept = counts >= self._options.min_points_per_cell
         rows, columns = cells[kept].T
         self._until_s[rows, columns] = np.maximum(self._until_s[rows, columns], stamp_s + self._options.memory_s)
         self._height_m[rows, columns] = points[first[kept], 2]
-        self._field = None
+        self._note_change()
 
     def _pass_time(self, now_s: float) -> None:
         """Forget what is too old."""
-        expired = (self._until_s <= now_s) & (self._until_s > self._now_s)
         self._now_s = now_s
-        if expired.any():
-            self._field = None
+        if now_s >= self._next_expiry_s:
+            self._note_change()
+
+    def _note_change(self) -> None:
+        """The set of blocked cells is another than before."""
+        blocked = self._until_s[self._until_s > self._now_s]
+        self._next_expiry_s = float(blocked.min()) if len(blocked) else math.inf
+        self._changed = True
+
+    def _active(self) -> NDArray[np.int64]:
+        """The (row, column) of the blocked cells."""
+        if math.isinf(self._next_expiry_s):
+            return np.empty((0, 2), dtype=np.int64)
+        return np.argwhere(self._until_s > self._now_s)
 
     def _arm_F(self, robot: Robot, scan: Scan) -> FloatArray:
         """The arm's segments in the levelled body frame."""
@@ -114,50 +133,52 @@ class LayeredCostmap:
 
     def _take_scan(self, scan: Scan, X_WO: Pose2D, arm_F: FloatArray, self_filter: SelfFilter) -> None:
         """Clear the cells that beams see past, then mark those that are hit and not explained."""
-        options, grid = self._options, self._keepout
+        options = self._options
         X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
-        rotation, translation = sensor_pose(scan)
-        active = np.argwhere(self._until_s > self._now_s)
-        changed = False
-        if len(active):
-            beams = Beams(scan.ranges_m, scan.elevations_rad, scan.azimuths_rad)
-            centres_F = in_body_axes(
-                np.column_stack([grid.centres(active), self._height_m[active[:, 0], active[:, 1]]]), X_WF
-            )
-            gone = active[clear_cells(beams, centres_F, rotation, translation, grid.resolution_m)]
-            self._until_s[gone[:, 0], gone[:, 1]] = -math.inf
-            changed = len(gone) > 0
+        changed = self._clear(scan, X_WF)
         points_F = scan_points(
             scan, azimuths=options.azimuths, heights_m=options.heights_m, max_range_m=options.max_range_m
         )
         points = self._unexplained(_placed(points_F, X_WF))
         if len(points):
             points = points[self_filter.foreign(in_body_axes(points, X_WF), arm_F)]
-        changed |= mark_cells(
-            grid.cells(points),
-            points[:, 2],
-            (scan.stamp_s, options.confirm_s, options.memory_s),
-            self._candidate_s,
-            self._until_s,
-            self._height_m,
-        )
+        times = (scan.stamp_s, options.confirm_s, options.memory_s)
+        cells = self._layer.cells(points)
+        changed |= mark_cells(cells, points[:, 2].copy(), times, self._candidate_s, self._until_s, self._height_m)
         if changed:
-            self._field = None
+            self._note_change()
+
+    def _clear(self, scan: Scan, X_WF: Pose2D) -> bool:
+        """Forget the cells that the scan's beams see past; True when there were any."""
+        active = self._active()
+        if len(active) == 0:
+            return False
+        heights = self._height_m[active[:, 0], active[:, 1]]
+        centres_F = in_body_axes(np.column_stack([self._layer.centres(active), heights]), X_WF)
+        beams = Beams(scan.ranges_m, scan.elevations_rad, scan.azimuths_rad)
+        gone = active[clear_cells(beams, centres_F, *sensor_pose(scan), self._layer.resolution_m)]
+        self._until_s[gone[:, 0], gone[:, 1]] = -math.inf
+        return len(gone) > 0
 
     def _unexplained(self, points_W: FloatArray) -> FloatArray:
         """Those (x, y, z) rows that lie on the grid and away from all that was surveyed."""
         return np.ascontiguousarray(points_W[self._keepout.distance_m(points_W) > self._options.explained_m])
 
-    def _combined(self) -> NDArray[np.float32]:
-        """The surveyed distance field, lowered around what is seen."""
-        if self._field is None:
+    def _seen_field(self) -> NDArray[np.float32] | None:
+        """Distance (m) from each cell of the layer to what is seen, None when nothing is."""
+        if self._changed:
             seen = self._until_s > self._now_s
-            self._field = self._keepout.distance
+            self._field, self._changed = None, False
             if seen.any():
                 cells = cv2.distanceTransform((~seen).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-                to_seen = (cells - np.float32(0.5)) * np.float32(self._keepout.resolution_m)
-                self._field = np.minimum(self._keepout.distance, to_seen)
+                self._field = ((cells - np.float32(0.5)) * np.float32(self._layer.resolution_m)).astype(np.float32)
         return self._field
+
+
+def _empty_like(grid: GridMap, cell_m: float) -> GridMap:
+    """An empty grid over the same ground with cells of another size."""
+    columns, rows = (max(2, math.ceil(size / cell_m)) for size in grid.size_m)
+    return GridMap(np.zeros((rows, columns), dtype=np.bool_), cell_m, grid.origin_m)
 
 
 def _placed(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:

@@ -65,8 +65,8 @@ def cost_to_go(space: Space, lattice: Lattice, goal_row: int, goal_column: int, 
     factor = np.full((rows, columns), np.inf)
     for i in range(rows):
         for j in range(columns):
-            u = int(round((lattice.x0_m + j * lattice.cell_m - frame[1]) / frame[0]))
-            v = int(round((lattice.y0_m + i * lattice.cell_m - frame[2]) / frame[0]))
+            u = round((lattice.x0_m + j * lattice.cell_m - frame[1]) / frame[0])
+            v = round((lattice.y0_m + i * lattice.cell_m - frame[2]) / frame[0])
             if 0 <= v < field.shape[0] and 0 <= u < field.shape[1] and field[v, u] > inscribed_m - frame[0]:
                 factor[i, j] = nearness(field[v, u] - inscribed_m + frame[0], weights)
     cost = np.full((rows, columns), np.inf)
@@ -116,6 +116,7 @@ def search(
         cost[index] = seeds[n, 1]
         heapq.heappush(heap, (seeds[n, 1] + greed * _ahead(to_go, lattice, index), index))
     goal_cell = goal_row * lattice.columns + goal_column
+    reached_totals, reached_states = np.empty(len(moves)), np.empty(len(moves), dtype=np.int64)
     while len(heap) > 0:
         _, index = heapq.heappop(heap)
         if index == states:
@@ -127,18 +128,37 @@ def search(
         if cell == goal_cell and cost[index] + final[k] < cost[states]:
             cost[states], parent[states] = cost[index] + final[k], index
             heapq.heappush(heap, (cost[states], np.int64(states)))
-        _expand(space, lattice, moves, to_go, needs, greed, index, cost, parent, closed, clear, heap)
+        count = _expand(
+            space, lattice, moves, to_go, needs, int(index), cost, closed, clear, reached_states, reached_totals
+        )
+        for n in range(count):
+            new, total = reached_states[n], reached_totals[n]
+            if total < cost[new]:
+                cost[new], parent[new] = total, index
+                heapq.heappush(heap, (total + greed * _ahead(to_go, lattice, new), new))
     return _trace(parent, states)
 
 
 @compiled
-def _expand(space, lattice, moves, to_go, needs, greed, index, cost, parent, closed, clear, heap):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
-    """Relax all moves from a state."""
+def _expand(
+    space: Space,
+    lattice: Lattice,
+    moves: IntArray,
+    to_go: FloatArray,
+    needs: Needs,
+    index: int,
+    cost: FloatArray,
+    closed: NDArray[np.bool_],
+    clear: NDArray[np.float32],
+    reached_states: IntArray,
+    reached_totals: FloatArray,
+) -> int:
+    """Write the states that moves from a state reach more cheaply than before, and their costs; returns how many."""
     headings, columns = lattice.headings, lattice.columns
     cell, k = index // headings, index % headings
     i, j = cell // columns, cell % columns
     turn = 2.0 * math.pi / headings
-    here, there = np.empty(3), np.empty(3)
+    here, there, count = np.empty(3), np.empty(3), 0
     here[0], here[1] = lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m
     here[2] = lattice.yaw0_rad + k * turn
     near = math.hypot(here[0] - needs.x_m, here[1] - needs.y_m) < needs.escape_m
@@ -159,8 +179,9 @@ def _expand(space, lattice, moves, to_go, needs, greed, index, cost, parent, clo
             continue
         total = cost[index] + _move_cost(space, clear, here, there, new, need, least)
         if total < cost[new]:
-            cost[new], parent[new] = total, index
-            heapq.heappush(heap, (total + greed * to_go[a, b], new))
+            reached_states[count], reached_totals[count] = new, total
+            count += 1
+    return count
 
 
 @compiled
@@ -190,7 +211,7 @@ def _move_cost(
 
 
 @compiled
-def _ahead(to_go: FloatArray, lattice: Lattice, index: int) -> float:
+def _ahead(to_go: FloatArray, lattice: Lattice, index: int | np.int64) -> float:
     """The cost to go from a state's place."""
     cell = index // lattice.headings
     return float(to_go[cell // lattice.columns, cell % lattice.columns])

@@ -70,9 +70,17 @@ def problem_of(
     xs, ys = (np.arange(low[axis], high[axis] + FIELD_CELL_M, FIELD_CELL_M) for axis in (0, 1))
     points = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
     field = costmap.clearance_m(points).reshape(len(ys), len(xs)).astype(np.float32)
-    frame = (FIELD_CELL_M, float(low[0]), float(low[1]))
+    rows, columns = _used(field.max(axis=1)), _used(field.max(axis=0))
+    field = field[rows, columns]
+    frame = (FIELD_CELL_M, float(xs[columns.start]), float(ys[rows.start]))
     space = Space(np.ascontiguousarray(field), frame, footprint.discs, options.weights())
     return Problem(space, footprint, start, goal, options)
+
+
+def _used(best: NDArray[np.float32]) -> slice:
+    """The stretch between the first and the last free place, and one more to either side."""
+    free = np.flatnonzero(best > 0.0)
+    return slice(max(0, int(free[0]) - 1), int(free[-1]) + 2) if len(free) else slice(0, 2)
 
 
 def solve(problem: Problem) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,7 @@ def shortcut(space: Space, poses: FloatArray, needs: Needs, window: int) -> Floa
 def densify(poses: FloatArray, step_m: float = 0.06) -> FloatArray:
     """The same way with poses at most step_m apart (a radian counting 0.6 m)."""
     pieces = [poses[:1]]
-    for a, b in zip(poses[:-1], poses[1:], strict=True):
+    for a, b in pairwise(poses):
         way = math.hypot(b[0] - a[0], b[1] - a[1]) + 0.6 * abs(b[2] - a[2])
         shares = np.linspace(0.0, 1.0, max(1, math.ceil(way / step_m)) + 1)[1:]
         pieces.append(a + shares[:, None] * (b - a))
@@ -54,7 +55,7 @@ def densify(poses: FloatArray, step_m: float = 0.06) -> FloatArray:
 
 @compiled
 def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m: float) -> FloatArray:
-    """Pull poses to the middle of their neighbours, turn them along the way and push them from what is nearer than wide_m.
+    """Pull poses between their neighbours, turn them along the way, push them off what is nearer than wide_m.
 
     The ends stay. A pose moves only where its clearance stays above margin_m or does not get worse.
     """

@@ -1,0 +1,43 @@
+"""Driving the base for a skill: one command after another, each short-lived, and all of them ended at the end."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.api import SkillContext
+from skills.robot import CommandId, CommandState
+
+EXPIRY_S = 0.3
+"""A drive command lives so long (s) unless the next one replaces it."""
+
+
+class Base:
+    """Sends drive commands under a context's lease and remembers the last."""
+
+    def __init__(self, context: SkillContext) -> None:
+        self._context = context
+        self._command: CommandId | None = None
+        self.last_velocity: NDArray[np.float64] = np.zeros(3)
+
+    def drive(self, velocity: tuple[float, float, float]) -> None:
+        """Move at a body-frame velocity (m/s, m/s, rad/s) until the next call, EXPIRY_S at the longest."""
+        until_s = self._context.clock.now() + EXPIRY_S
+        self._command = self._context.robot.drive(*velocity, until_s=until_s, lease=self._context.lease)
+        self.last_velocity = np.array(velocity)
+
+    def refusal(self) -> str | None:
+        """Why the robot refused the last command, None when it did not."""
+        if self._command is None:
+            return None
+        status = self._context.robot.command_status(self._command)
+        return (status.reason or "no reason given") if status.state is CommandState.REFUSED else None
+
+    def stop(self) -> None:
+        """Stop the last command, if it still runs, and nothing else."""
+        self.last_velocity = np.zeros(3)
+        if self._command is None:
+            return
+        if self._context.robot.command_status(self._command).state is CommandState.RUNNING:
+            self._context.robot.stop(lease=self._context.lease, only=self._command)
+        self._command = None

@@ -1,0 +1,80 @@
+"""Watching for what lies low in front of the robot, where the LiDAR does not look, by the front depth cameras."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+from skills.api import Job, SkillContext
+from skills.robot import Image
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WatchOptions:
+    """Cameras asked in turn, one picture each `period_s`, which arrives after `latency_s`.
+
+    Kept are points of every `stride`-th pixel, between the heights above the floor and within `reach_m` of the camera.
+    """
+
+    sources: tuple[str, ...] = ("frontleft", "frontright")
+    period_s: float = 0.35
+    latency_s: float = 0.1
+    stride: int = 6
+    heights_m: tuple[float, float] = (0.06, 0.5)
+    reach_m: float = 2.0
+
+
+class LowObstacleWatch:
+    """Feeds the context's costmap with depth points while its `step` is called."""
+
+    def __init__(self, context: SkillContext, options: WatchOptions | None = None) -> None:
+        self._context = context
+        self._options = options or WatchOptions()
+        known = context.robot.capabilities().camera_sources
+        self._sources = tuple(source for source in self._options.sources if source in known)
+        self._turn = 0
+        self._next_s = -math.inf
+        self._job: Job[tuple[FloatArray, float]] | None = None
+        self._X_WO = RigidTransform()
+
+    def step(self) -> None:
+        """Take in a picture that has arrived; ask for the next when its time has come. Never blocks."""
+        if self._job is not None:
+            if self._job.done():
+                points_O, stamp_s = self._job.result()
+                self._job = None
+                self._context.costmap.add_points(self._X_WO.multiply(points_O.T).T, stamp_s)
+            return
+        if not self._sources or self._context.clock.now() < self._next_s:
+            return
+        source = self._sources[self._turn % len(self._sources)]
+        self._turn += 1
+        self._next_s = self._context.clock.now() + self._options.period_s
+        self._X_WO = self._context.localiser.estimate().X_WO
+        self._job = self._context.worker.submit(
+            lambda: self._look(source), latency_s=self._options.latency_s, name=f"look for low things by {source}"
+        )
+
+    def _look(self, source: str) -> tuple[FloatArray, float]:
+        """Low points (N, 3) in odom and the picture's stamp."""
+        image = self._context.robot.image(source)
+        return low_points(image, self._options), image.stamp_s
+
+
+def low_points(image: Image, options: WatchOptions) -> FloatArray:
+    """Points (N, 3) in the odom frame that a depth picture shows low above the floor and near."""
+    depth = image.depth_m[:: options.stride, :: options.stride].astype(np.float64)
+    rows, columns = np.nonzero((depth > 0.0) & (depth < options.reach_m))
+    z = depth[rows, columns]
+    lens = image.depth_intrinsics
+    x = (columns * options.stride - lens.cx) / lens.fx * z
+    y = (rows * options.stride - lens.cy) / lens.fy * z
+    points_O = image.frames.pose(image.camera_frame).multiply(np.stack([x, y, z])).T
+    low, high = options.heights_m
+    return np.ascontiguousarray(points_O[(points_O[:, 2] > low) & (points_O[:, 2] < high)])

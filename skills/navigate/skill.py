@@ -1,0 +1,260 @@
+"""The skill that goes to a place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from skills.api import Cause, Failed, Job, Running, Skill, SkillContext, Step, Succeeded
+from skills.estimate.planar import relative
+from skills.navigate.base import Base
+from skills.navigate.follower import FollowerOptions, PathFollower
+from skills.navigate.footprint import Footprint
+from skills.navigate.low_obstacles import LowObstacleWatch
+from skills.navigate.motion_cost import PlannerOptions
+from skills.navigate.path import Path
+from skills.navigate.planner import PlanningError, problem_of, solve
+from skills.robot import Pose2D
+
+
+@dataclass(frozen=True)
+class NavigateInputs:
+    """Where to go: `goal` is the body's pose in the world; how exactly, and how fast at most."""
+
+    goal: Pose2D
+    position_tolerance_m: float = 0.10
+    yaw_tolerance_rad: float = 0.10
+    max_speed_m_s: float = 0.8
+
+
+@dataclass(frozen=True)
+class NavigateOptions:
+    """Patience and bounds of the skill, times in seconds of the robot's clock."""
+
+    planning_latency_s: float = 0.3
+    localising_patience_s: float = 3.0
+    blocked_patience_s: float = 1.5
+    replan_pause_s: float = 2.0
+    replans: int = 6
+    stuck_s: float = 4.0
+    settle_s: float = 2.0
+    still_m_s: float = 0.03
+    still_rad_s: float = 0.05
+
+
+class Navigate(Skill[NavigateInputs]):
+    """Plan a way for the whole footprint, follow it with checks, and be there at the end, standing still."""
+
+    name: ClassVar[str] = "navigate"
+    Inputs: ClassVar[type] = NavigateInputs
+    outputs: ClassVar[Mapping[str, type]] = {}
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "The robot does not know where it is, or refuses to drive from the start on.",
+        Cause.PLANNING: "The goal is blocked or there is no way, also after waiting for what stands in it to go.",
+        Cause.EXECUTION: "The robot does not get on, loses its place on the way, or refuses to drive on.",
+        Cause.POSTCONDITION: "It stands still, but not where it should.",
+    }
+    default_timeout_s: ClassVar[float] = 180.0
+
+    def __init__(self, context: SkillContext, options: NavigateOptions | None = None) -> None:
+        super().__init__(context)
+        self._options = options or NavigateOptions()
+        self._base = Base(context)
+
+    def begin(self, inputs: NavigateInputs) -> None:
+        """Start anew to the goal of `inputs`."""
+        self._base.stop()
+        self._inputs = inputs
+        self._footprint = Footprint.of(self.context.robot.capabilities())
+        self._watch = LowObstacleWatch(self.context)
+        self._phase: Callable[[], Step] = self._localising
+        self._follower: PathFollower | None = None
+        self._job: Job[Path] | None = None
+        self._replans = 0
+        self._driven = False
+        self._whole_m: float | None = None
+        self._wait_until_s = -math.inf
+        self._blocked_since_s: float | None = None
+        self._lost_since_s: float | None = None
+        self._obstacle: tuple[float, float] | None = None
+        self._best_m, self._best_s = math.inf, self._now()
+
+    def step(self) -> Step:
+        """One tick: see `Skill.step`."""
+        if self._phase != self._localising and self._lost():
+            self._base.stop()
+            return Failed(Cause.EXECUTION, "The robot lost its place: its scans no longer agree with the map.")
+        refusal = self._base.refusal()
+        if refusal is not None:
+            cause = Cause.EXECUTION if self._driven else Cause.PRECONDITION
+            return Failed(cause, f"The robot refused to drive: {refusal}.")
+        return self._phase()
+
+    def end(self) -> None:
+        """Stop what this skill set in motion."""
+        self._base.stop()
+
+    def _now(self) -> float:
+        return self.context.clock.now()
+
+    def _lost(self) -> bool:
+        """Whether the robot has not known its place for longer than patience allows; it stands meanwhile."""
+        if self.context.localiser.estimate().localised:
+            self._lost_since_s = None
+            return False
+        self._lost_since_s = self._now() if self._lost_since_s is None else self._lost_since_s
+        return self._now() - self._lost_since_s > self._options.localising_patience_s
+
+    def _localising(self) -> Step:
+        """Wait for the first agreement of a scan with the map."""
+        if self._lost():
+            return Failed(Cause.PRECONDITION, "The robot does not know where it is, so no way can be planned.")
+        if self._lost_since_s is None:
+            self._ask_for_plan()
+            self._phase = self._planning
+        return Running("finding out where I am")
+
+    def _ask_for_plan(self) -> None:
+        """Sample the costmap now and plan in the Worker."""
+        speed = max(0.1, self._inputs.max_speed_m_s)
+        options = PlannerOptions(forward_m_s=speed)
+        start = self.context.pose()
+        problem = problem_of(self.context.costmap, self._footprint, start, self._inputs.goal, options, margin_m=8.0)
+        self._job = self.context.worker.submit(
+            lambda: solve(problem), latency_s=self._options.planning_latency_s, name="plan a way"
+        )
+
+    def _planning(self) -> Step:
+        """Stand and wait for a plan, or for the time of the next attempt."""
+        self._watch.step()
+        if self._job is None:
+            if self._now() < self._wait_until_s:
+                return Running(self._waiting_sentence())
+            self._ask_for_plan()
+        return self._take_plan() or Running(f"planning a way to {_place(self._inputs.goal)}")
+
+    def _take_plan(self) -> Step | None:
+        """Take over a plan that is done; a failure when planning failed for good."""
+        if self._job is None or not self._job.done():
+            return None
+        job, self._job = self._job, None
+        try:
+            path = job.result()
+        except PlanningError as error:
+            return self._plan_failed(str(error))
+        options = replace(FollowerOptions(), max_speed_m_s=self._inputs.max_speed_m_s)
+        self._follower = PathFollower(path, self._footprint, options)
+        self._whole_m = self._whole_m or max(self._follower.length_m, 1e-3)
+        self._blocked_since_s = self._obstacle = None
+        self._best_m, self._best_s = math.inf, self._now()
+        self._phase = self._following
+        poses = [[round(float(v), 3) for v in pose] for pose in path.poses[::4]]
+        self.context.publish("path", {"robot": self.context.robot.name, "frame": "world", "poses": poses})
+        return None
+
+    def _plan_failed(self, why: str) -> Step | None:
+        """Wait and try again when something seen may go away; give up at the bound."""
+        self._base.stop()
+        self._replans += 1
+        if self._obstacle is None or self._replans >= self._options.replans:
+            seen = f" The way is blocked by something seen at {_xy(self._obstacle)}." if self._obstacle else ""
+            return Failed(Cause.PLANNING, why + seen)
+        self._wait_until_s = self._now() + self._options.replan_pause_s
+        self._phase = self._planning
+        return None
+
+    def _waiting_sentence(self) -> str:
+        place = _xy(self._obstacle) if self._obstacle else "ahead"
+        return f"waiting for the way to become free at {place}"
+
+    def _following(self) -> Step:
+        """Drive along the path; replan around what stays in the way."""
+        self._watch.step()
+        failure = self._take_plan()
+        if failure is not None or self._phase != self._following or self._follower is None:
+            return failure or Running(self._waiting_sentence())
+        if self._lost_since_s is not None:
+            self._base.drive((0.0, 0.0, 0.0))
+            return Running("standing until scans agree with the map again")
+        pose, velocity = self.context.pose(), self.context.robot.odometry().velocity
+        answer = self._follower.command(pose, velocity, self._base.last_velocity, self.context.costmap)
+        self._base.drive(answer.velocity)
+        self._driven = True
+        if self._arrived(pose, 0.4):
+            self._wait_until_s = self._now() + self._options.settle_s
+            self._phase = self._settling
+            return Running("stopping at the goal", 1.0)
+        self._note_block(answer.blocked_at)
+        trouble = self._trouble(answer.remaining_m, answer.off_path_m)
+        if trouble is not None and self._job is None:
+            return self._replan(trouble)
+        return self._progress(answer.remaining_m)
+
+    def _progress(self, remaining_m: float) -> Running:
+        done = 1.0 - remaining_m / max(self._whole_m or remaining_m, remaining_m, 1e-3)
+        return Running(f"going to {_place(self._inputs.goal)}, {remaining_m:.1f} m to go", min(1.0, max(0.0, done)))
+
+    def _note_block(self, blocked_at: tuple[float, float] | None) -> None:
+        if blocked_at is None:
+            self._blocked_since_s = None
+            return
+        self._obstacle = blocked_at
+        self._blocked_since_s = self._now() if self._blocked_since_s is None else self._blocked_since_s
+
+    def _trouble(self, remaining_m: float, off_path_m: float) -> str | None:
+        """Why the path should be given up, None when all goes well."""
+        now = self._now()
+        if remaining_m < self._best_m - 0.03:
+            self._best_m, self._best_s = remaining_m, now
+        if self._blocked_since_s is not None and now - self._blocked_since_s > self._options.blocked_patience_s:
+            return f"The way is blocked by something seen at {_xy(self._obstacle)}."
+        if off_path_m > FollowerOptions().lost_path_m:
+            return f"The robot is {off_path_m:.2f} m off its path."
+        if now - self._best_s > self._options.stuck_s:
+            return "The robot does not get on."
+        return None
+
+    def _replan(self, why: str) -> Step:
+        """Plan anew from here; fail when that was done too often."""
+        self._replans += 1
+        if self._replans > self._options.replans:
+            self._base.stop()
+            return Failed(Cause.EXECUTION, f"{why} Planning anew {self._options.replans} times did not help.")
+        self._best_m, self._best_s = math.inf, self._now()
+        self._blocked_since_s = None
+        self._ask_for_plan()
+        return Running(f"{why} Planning a way around.")
+
+    def _arrived(self, pose: Pose2D, share: float) -> bool:
+        """Whether a pose lies within a share of the tolerances of the goal."""
+        off = relative(self._inputs.goal, pose)
+        near = math.hypot(off.x_m, off.y_m) <= share * self._inputs.position_tolerance_m
+        return near and abs(off.yaw_rad) <= share * self._inputs.yaw_tolerance_rad
+
+    def _settling(self) -> Step:
+        """Come to rest, then look whether the robot really is there."""
+        self._base.drive((0.0, 0.0, 0.0))
+        vx, vy, wz = self.context.robot.odometry().velocity
+        still = math.hypot(vx, vy) < self._options.still_m_s and abs(wz) < self._options.still_rad_s
+        if not still and self._now() < self._wait_until_s:
+            return Running("stopping at the goal", 1.0)
+        self._base.stop()
+        off = relative(self._inputs.goal, self.context.pose())
+        sentence = (
+            f"{math.hypot(off.x_m, off.y_m):.2f} m and {abs(off.yaw_rad):.2f} rad from {_place(self._inputs.goal)}"
+        )
+        if not still:
+            return Failed(Cause.POSTCONDITION, f"The robot does not come to rest; it is {sentence}.")
+        if not self._arrived(self.context.pose(), 1.0):
+            return Failed(Cause.POSTCONDITION, f"The robot stands {sentence}.")
+        return Succeeded(f"standing {sentence}")
+
+
+def _xy(place: tuple[float, float] | None) -> str:
+    return "an unknown place" if place is None else f"({place[0]:.2f}, {place[1]:.2f})"
+
+
+def _place(pose: Pose2D) -> str:
+    return f"({pose.x_m:.2f}, {pose.y_m:.2f})"

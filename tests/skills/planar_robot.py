@@ -1,0 +1,372 @@
+"""A kinematic stand-in for a robot on a floor with boxes: no dynamics, but drift, lag, LiDAR, depth, expiry and lease."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numba import njit
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from skills.api import SkillContext
+from skills.estimate.costmap import LayeredCostmap
+from skills.estimate.grid_map import GridMap
+from skills.estimate.localiser import ScanMatchingLocaliser
+from skills.estimate.planar import compose, inverse
+from skills.robot import (
+    Capabilities,
+    CommandId,
+    CommandState,
+    CommandStatus,
+    FrameTree,
+    Image,
+    Intrinsics,
+    Lease,
+    LeaseError,
+    Odometry,
+    Pose2D,
+    Scan,
+)
+
+OUTLINE = ((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25))
+BODY_HEIGHT_M = 0.52
+X_BL = RigidTransform(np.array([-0.2, 0.0, 0.4]))
+X_BC = RigidTransform(
+    RotationMatrix(RollPitchYaw(0.0, math.radians(30.0), 0.0))
+    @ RotationMatrix(RollPitchYaw(-math.pi / 2, 0, -math.pi / 2)),
+    np.array([0.42, 0.0, 0.02]),
+)
+ELEVATIONS = np.deg2rad(np.arange(-15.0, 16.0, 2.0))
+LENS = Intrinsics(80, 60, 41.0, 41.0, 39.5, 29.5)
+
+
+@dataclass(frozen=True)
+class Box:
+    """An upright box from (x0, y0) to (x1, y1), from height z0 to z1."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    z0: float = 0.0
+    z1: float = 2.5
+
+
+TWO_ROOMS = (
+    Box(-0.1, -0.1, 10.1, 0.0),
+    Box(-0.1, 7.0, 10.1, 7.1),
+    Box(-0.1, 0.0, 0.0, 7.0),
+    Box(10.0, 0.0, 10.1, 7.0),
+    Box(0.0, 4.0, 2.0, 4.1),  # between the rooms below and the corridor above, doors of 0.9 m at x = 2 and x = 7
+    Box(2.9, 4.0, 7.0, 4.1),
+    Box(7.9, 4.0, 10.0, 4.1),
+    Box(4.95, 0.0, 5.05, 4.0),
+    Box(0.6, 0.4, 1.4, 1.0, 0.0, 0.9),  # furniture
+    Box(3.9, 2.6, 4.5, 3.4, 0.0, 1.2),
+    Box(8.6, 0.3, 9.6, 0.9, 0.0, 1.1),
+    Box(4.4, 6.5, 5.6, 7.0, 0.0, 1.8),
+)
+"""Two rooms side by side under a corridor 2.9 m wide; the way from one to the other leads through both doors."""
+
+
+def grid_of(boxes: Sequence[Box], band_m: tuple[float, float], resolution_m: float = 0.05) -> GridMap:
+    """The grid that a surveyor would make of the boxes that stand in a band of heights."""
+    x0, y0 = min(b.x0 for b in boxes) - 0.2, min(b.y0 for b in boxes) - 0.2
+    columns = math.ceil((max(b.x1 for b in boxes) + 0.2 - x0) / resolution_m)
+    rows = math.ceil((max(b.y1 for b in boxes) + 0.2 - y0) / resolution_m)
+    x = x0 + (np.arange(columns) + 0.5) * resolution_m
+    y = y0 + (np.arange(rows) + 0.5) * resolution_m
+    occupied = np.zeros((rows, columns), dtype=np.bool_)
+    for b in boxes:
+        if b.z0 < band_m[1] and b.z1 > band_m[0]:
+            occupied |= ((y > b.y0) & (y < b.y1))[:, None] & ((x > b.x0) & (x < b.x1))[None, :]
+    return GridMap(occupied, resolution_m, (x0, y0), height_band_m=band_m)
+
+
+@njit(cache=True)
+def cast_rays(origin, directions, boxes, limit):
+    """Distance along each direction (N, 3) to the nearest box or the floor; NaN beyond the limit."""
+    ranges = np.empty(directions.shape[0])
+    for n in range(directions.shape[0]):
+        best = limit
+        if directions[n, 2] < 0.0:
+            best = min(best, -origin[2] / directions[n, 2])
+        for b in range(boxes.shape[0]):
+            near, far = 0.0, best
+            for axis in range(3):
+                d = directions[n, axis]
+                d = d if abs(d) > 1e-12 else 1e-12
+                t0 = (boxes[b, axis] - origin[axis]) / d
+                t1 = (boxes[b, axis + 3] - origin[axis]) / d
+                near, far = max(near, min(t0, t1)), min(far, max(t0, t1))
+            if 0.0 < near < far:
+                best = near
+        ranges[n] = best if best < limit else np.nan
+    return ranges
+
+
+class PlanarClock:
+    def __init__(self) -> None:
+        self.time_s = 0.0
+        self.robots: list[PlanarRobot] = []
+
+    def now(self) -> float:
+        return self.time_s
+
+    def advance(self, dt_s: float) -> None:
+        steps = round(dt_s / 0.01)
+        for _ in range(steps):
+            self.time_s += 0.01
+            for robot in self.robots:
+                robot.pass_time(0.01)
+
+
+class PlanarRobot:
+    """Implements the verbs of `skills.robot.Robot` that going about needs."""
+
+    name = "alice"
+
+    def __init__(
+        self,
+        clock: PlanarClock,
+        boxes: Sequence[Box],
+        pose: Pose2D,
+        *,
+        seed: int = 0,
+        azimuths: int = 900,
+        cameras: bool = True,
+    ) -> None:
+        self.clock = clock
+        self.boxes = list(boxes)
+        self.pose = pose
+        self.velocity = np.zeros(3)
+        self.odometry_pose = Pose2D(0.0, 0.0, 0.0)
+        self.travelled_m = 0.0
+        self.least_clearance_m = math.inf
+        self.refuse_because = ""
+        self.images_taken = 0
+        self.scale_drift, self.yaw_drift_rad_per_m = 1.01, math.radians(0.3)
+        self._rng = np.random.default_rng(seed)
+        self._azimuths = np.linspace(-math.pi, math.pi, azimuths, endpoint=False)
+        self._cameras = ("frontleft", "frontright") if cameras else ()
+        self._scan: Scan | None = None
+        self._lease = Lease(self.name, "", 0)
+        self._commands: dict[CommandId, CommandStatus] = {}
+        self._drive: tuple[CommandId, np.ndarray, float] | None = None
+        clock.robots.append(self)
+
+    # ---- know and sense
+
+    def capabilities(self) -> Capabilities:
+        return Capabilities(OUTLINE, 1.6, 2.0, BODY_HEIGHT_M, (0.4, 0.6), (-0.3, 0.3), None, None, self._cameras, "")
+
+    def odometry(self) -> Odometry:
+        X_OB = self.odometry_pose.transform(BODY_HEIGHT_M)
+        vx, vy, wz = (float(v) for v in self.velocity)
+        return Odometry(self.clock.now(), X_OB, (vx, vy, wz))
+
+    def scan(self) -> Scan | None:
+        return self._scan
+
+    def image(self, source: str) -> Image:
+        if source not in self._cameras:
+            raise ValueError(f"no camera {source!r}")
+        self.images_taken += 1
+        u, v = np.meshgrid(np.arange(LENS.width), np.arange(LENS.height))
+        rays_C = np.stack([(u - LENS.cx) / LENS.fx, (v - LENS.cy) / LENS.fy, np.ones_like(u, dtype=float)], axis=-1)
+        X_WC = self.pose.transform(BODY_HEIGHT_M) @ X_BC
+        rays_W = rays_C.reshape(-1, 3) @ X_WC.rotation().matrix().T
+        depth = cast_rays(X_WC.translation(), np.ascontiguousarray(rays_W), self._box_array(), 4.0)
+        depth = np.nan_to_num(depth + 0.005 * self._rng.standard_normal(depth.shape), nan=0.0)
+        grey = np.zeros((LENS.height, LENS.width), dtype=np.uint8)
+        frames = FrameTree({"body": ("odom", self.odometry().X_OB), f"{source}_camera": ("body", X_BC)})
+        return Image(
+            self.clock.now(),
+            source,
+            f"{source}_camera",
+            LENS,
+            LENS,
+            None,
+            grey,
+            depth.reshape(grey.shape).astype(np.float32),
+            frames,
+        )
+
+    # ---- act
+
+    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
+        command = CommandId(len(self._commands) + 1)
+        if lease.number != self._lease.number or self.refuse_because:
+            reason = self.refuse_because or "the lease was taken away"
+            self._commands[command] = CommandStatus(CommandState.REFUSED, reason)
+            return command
+        self._finish(CommandState.STOPPED, "replaced")
+        self._commands[command] = CommandStatus(CommandState.RUNNING)
+        self._drive = (command, np.array([vx, vy, wz]), until_s)
+        return command
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        if lease.number == self._lease.number and self._drive and only in (None, self._drive[0]):
+            self._finish(CommandState.STOPPED, "stopped")
+        command = CommandId(len(self._commands) + 1)
+        self._commands[command] = CommandStatus(CommandState.DONE)
+        return command
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        return self._commands[command]
+
+    def acquire_lease(self, holder: str) -> Lease:
+        if self._lease.holder:
+            raise LeaseError(f"{self._lease.holder} holds the lease")
+        return self.take_lease(holder)
+
+    def take_lease(self, holder: str) -> Lease:
+        self._finish(CommandState.STOPPED, "lease taken")
+        self._lease = Lease(self.name, holder, self._lease.number + 1)
+        return self._lease
+
+    @property
+    def driving(self) -> bool:
+        return self._drive is not None
+
+    # ---- the world's side
+
+    def pass_time(self, dt_s: float) -> None:
+        if self._drive is not None and self.clock.now() > self._drive[2]:
+            self._finish(CommandState.DONE, "expired")
+        wanted = self._drive[1] if self._drive is not None else np.zeros(3)
+        self.velocity = self.velocity + (wanted - self.velocity) * min(1.0, dt_s / 0.12)
+        step = self.velocity * dt_s
+        self.pose = compose(self.pose, Pose2D(*step.tolist()))
+        way = math.hypot(step[0], step[1])
+        self.travelled_m += way
+        turn = step[2] + self.yaw_drift_rad_per_m * way
+        drifted = Pose2D(self.scale_drift * step[0], self.scale_drift * step[1], turn)
+        self.odometry_pose = compose(self.odometry_pose, drifted)
+        ticks = round(self.clock.now() / 0.01)
+        if ticks % 10 == 0:
+            self._scan = self._sweep()
+        if ticks % 5 == 0:
+            self.least_clearance_m = min(self.least_clearance_m, self.true_clearance_m())
+
+    def push(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
+        """Somebody shoves the robot, in the body frame; its odometry notices."""
+        shove = Pose2D(dx_m, dy_m, dyaw_rad)
+        self.pose, self.odometry_pose = compose(self.pose, shove), compose(self.odometry_pose, shove)
+
+    def carry_off(self, pose: Pose2D) -> None:
+        """Somebody lifts the robot to another place; its odometry does not notice."""
+        self.pose = pose
+        self._scan = self._sweep()
+
+    def true_clearance_m(self) -> float:
+        """Distance from points on the outline to the nearest box below 1 m; negative inside one."""
+        t = np.linspace(0.0, 1.0, 12)[:, None]
+        corners = np.array(OUTLINE)
+        edge = np.concatenate([a + t * (b - a) for a, b in zip(corners, np.roll(corners, 1, axis=0), strict=True)])
+        c, s = math.cos(self.pose.yaw_rad), math.sin(self.pose.yaw_rad)
+        x = self.pose.x_m + c * edge[:, 0] - s * edge[:, 1]
+        y = self.pose.y_m + s * edge[:, 0] + c * edge[:, 1]
+        boxes = np.array([(b.x0, b.y0, b.x1, b.y1) for b in self.boxes if b.z0 < 1.0])[:, None, :]
+        dx = np.maximum(boxes[..., 0] - x, x - boxes[..., 2])
+        dy = np.maximum(boxes[..., 1] - y, y - boxes[..., 3])
+        outside = np.hypot(np.maximum(dx, 0.0), np.maximum(dy, 0.0))
+        return float(np.min(np.where(outside > 0.0, outside, np.maximum(dx, dy))))
+
+    def _finish(self, state: CommandState, reason: str) -> None:
+        if self._drive is not None:
+            self._commands[self._drive[0]] = CommandStatus(state, reason)
+            self._drive = None
+
+    def _box_array(self) -> np.ndarray:
+        return np.array([(b.x0, b.y0, b.z0, b.x1, b.y1, b.z1) for b in self.boxes])
+
+    def _sweep(self) -> Scan:
+        X_WL = self.pose.transform(BODY_HEIGHT_M) @ X_BL
+        e, a = ELEVATIONS[:, None], self._azimuths[None, :]
+        rays = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e) + 0.0 * a], axis=-1).reshape(-1, 3)
+        rays_W = np.ascontiguousarray(rays @ X_WL.rotation().matrix().T)
+        ranges = cast_rays(X_WL.translation(), rays_W, self._box_array(), 100.0)
+        ranges = ranges + 0.03 * self._rng.standard_normal(ranges.shape)
+        ranges[ranges < 0.5] = np.nan
+        shaped = ranges.reshape(len(ELEVATIONS), -1).astype(np.float32)
+        return Scan(self.clock.now(), shaped, ELEVATIONS, self._azimuths, X_BL, self.odometry().X_OB)
+
+
+@dataclass
+class LockStepJob:
+    ready_s: float
+    clock: PlanarClock
+    work: Callable[[], Any]
+    outcome: Any = None
+    error: Exception | None = None
+
+    def __post_init__(self) -> None:
+        try:
+            self.outcome = self.work()
+        except Exception as error:
+            self.error = error
+
+    def done(self) -> bool:
+        return self.clock.now() >= self.ready_s - 1e-9
+
+    def result(self) -> Any:
+        if not self.done():
+            raise RuntimeError("not done")
+        if self.error is not None:
+            raise self.error
+        return self.outcome
+
+
+@dataclass
+class LockStepWorker:
+    clock: PlanarClock
+    names: list[str] = field(default_factory=list)
+
+    def submit(self, work: Callable[[], Any], *, latency_s: float, name: str) -> LockStepJob:
+        self.names.append(name)
+        return LockStepJob(self.clock.now() + latency_s, self.clock, work)
+
+
+class Bench:
+    """A robot among boxes with its estimators, advanced as the runner would do it. `surveyed` is what the maps know."""
+
+    def __init__(
+        self,
+        start: Pose2D,
+        *,
+        surveyed: Sequence[Box] = TWO_ROOMS,
+        unmapped: Sequence[Box] = (),
+        believed_start: Pose2D | None = None,
+        seed: int = 0,
+        cameras: bool = True,
+    ) -> None:
+        self.clock = PlanarClock()
+        self.robot = PlanarRobot(self.clock, [*surveyed, *unmapped], start, seed=seed, cameras=cameras)
+        self.localiser = ScanMatchingLocaliser(grid_of(surveyed, (0.7, 1.3)), believed_start or start)
+        self.costmap = LayeredCostmap(grid_of(surveyed, (0.05, 1.0)))
+        self.worker = LockStepWorker(self.clock)
+        self.published: list[tuple[str, Mapping[str, Any]]] = []
+        self.lease = self.robot.take_lease("test")
+
+    def context(self) -> SkillContext:
+        def publish(topic: str, message: Mapping[str, Any]) -> None:
+            self.published.append((topic, message))
+
+        return SkillContext(
+            self.robot, self.lease, self.clock, self.worker, self.localiser, self.costmap, publish, seed=0
+        )
+
+    def tick(self) -> None:
+        """One tick's time and the estimators after it."""
+        self.clock.advance(0.05)
+        self.localiser.update(self.robot)
+        self.costmap.update(self.robot, self.localiser.estimate())
+
+    def pose_error(self) -> tuple[float, float]:
+        """Metres and radians between the estimated and the true pose."""
+        off = compose(inverse(self.robot.pose), self.context().pose())
+        return math.hypot(off.x_m, off.y_m), abs(off.yaw_rad)

@@ -69,8 +69,9 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     """A status check ("is there a hammer in the workshop"), or a statement ("there is a hammer in the workshop")."""
     roles = read_roles(clause.items, words, describes=False)
     objects = [*([clause.subject.phrase] if clause.subject else []), *roles.objects]
-    place, *others = [*roles.ats, *roles.sources, *roles.goals, None]
-    unknown = [*roles.unknown, *(p.text for p in objects[1:]), *(o.text for o in others if o is not None)]
+    places = [*roles.ats, *roles.sources, *roles.goals]
+    place = next(iter(places), None)
+    unknown = [*roles.unknown, *(p.text for p in objects[1:]), *(other.text for other in places[1:])]
     if place is None and not being.existential:
         unknown.append("be")
     asked = being.asked or clause.whether
@@ -105,9 +106,8 @@ def _going(blank: Action, roles: Roles) -> Iterator[Action]:
     places = [*roles.goals, *roles.ats, *bare, *roles.joined_goals]
     extra = [phrase.text for phrase in (roles.recipient, roles.searched) if phrase is not None]
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
-    unknown = (*blank.unknown, *extra)
-    for place in places or [None]:
-        yield replace(blank, goal=place, unknown=unknown)
+    blank = replace(blank, unknown=(*blank.unknown, *extra))
+    yield from (replace(blank, goal=place) for place in places) if places else (blank,)
 
 
 def _finding(blank: Action, roles: Roles) -> Action:

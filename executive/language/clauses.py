@@ -43,9 +43,12 @@ def _content(items: Sequence[Item]) -> bool:
 
 def _begin_being(last: Clause, being: Being) -> list[Clause]:
     """Begin a clause of "to be", which takes its subject, and the "if" before it, from the clause before."""
-    rest, subject = last.items, None
-    if rest and isinstance(rest[-1], Chunk) and rest[-1].role is None and not being.existential:
-        rest, subject = rest[:-1], rest[-1]
+    rest = last.items
+    subject = rest[-1] if rest and isinstance(rest[-1], Chunk) and not being.existential else None
+    if subject is None or subject.role is not None:
+        subject = None
+    else:
+        rest = rest[:-1]
     whether = bool(rest) and isinstance(rest[-1], Whether)
     asked = being.asked and subject is None
     before = replace(last, items=rest[: len(rest) - whether])

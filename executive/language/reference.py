@@ -41,7 +41,8 @@ def resolve(actions: Sequence[Action]) -> tuple[Deed, ...]:
     Raises:
         RefusalError: a pronoun stands for nothing that was said.
     """
-    memory, deeds = _Memory(), []
+    memory = _Memory()
+    deeds: list[Deed] = []
     for action in actions:
         if action.kind is None:
             deeds = _stated(action, deeds, memory)

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from executive.language.items import Adverb, Being, Chunk, Item, Separator, Unknown, Verb, Whether
-from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
+from executive.language.items import Adverb, Chunk, Item, Separator, Unknown, Whether
+from executive.language.lexicon import Lexicon, PrepositionRole
 from executive.language.phrases import Phrase
 
 __all__ = ["HERE", "THERE", "Location", "Roles", "read_roles"]

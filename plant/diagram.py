@@ -7,11 +7,21 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from pydrake.geometry import GeometryId, GeometrySet, MakeRenderEngineVtk, Meshcat, MeshcatVisualizer, RenderEngineVtkParams, Role, SceneGraph
+from pydrake.geometry import (
+    Box,
+    GeometryId,
+    GeometrySet,
+    HalfSpace,
+    MakeRenderEngineVtk,
+    Meshcat,
+    MeshcatVisualizer,
+    RenderEngineVtkParams,
+    SceneGraph,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import LoadModelDirectives, Parser, ProcessModelDirectives
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
-from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.spot.model import SpotModel
@@ -19,6 +29,7 @@ from plant.spot.model import SpotModel
 RENDERER = "vtk"
 TIME_STEP_S = 0.005
 PACKAGE = "errand"
+FLOOR_TOP_M = 0.01
 
 
 @dataclass(frozen=True)
@@ -52,11 +63,13 @@ def build_diagram(
     carried: bool = True,
     render: bool = True,
     time_step_s: float = TIME_STEP_S,
+    renderer_parameters: RenderEngineVtkParams | None = None,
     meshcat: Meshcat | None = None,
 ) -> WorldDiagram:
     """A Diagram of the directives' world (or an empty one) with models and robots.
 
     SAP contact at `time_step_s`; positions of the models are defaults of the plant, the robots' are set by the caller.
+    `renderer_parameters` set light and sky; `meshcat` shows the world there.
     `looks` draws Spot with meshes where they are installed; `render` adds the renderer named `RENDERER`.
     """
     rebuild = partial(
@@ -73,12 +86,12 @@ def build_diagram(
     config = MultibodyPlantConfig(time_step=time_step_s, discrete_contact_approximation="sap")
     plant, scene_graph = AddMultibodyPlant(config, builder)
     if render:
-        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams()))
+        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(renderer_parameters or RenderEngineVtkParams()))
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
-    parser.package_map().Add(PACKAGE, str(Path(__file__).parent))
+    parser.package_map().Add(PACKAGE, Path(__file__).parent)
     if directives is not None:
-        ProcessModelDirectives(LoadModelDirectives(str(directives)), parser)
+        ProcessModelDirectives(LoadModelDirectives(directives), parser)
     instances = {model.name: _add_model(plant, parser, model) for model in models}
     robots = {name: SpotModel(plant, name, looks=looks, carried=carried) for name in sorted(robot_names)}
     plant.Finalize()
@@ -108,7 +121,19 @@ def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> Mode
 
 
 def _floor_geometries(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[GeometryId]:
-    """Collision shapes whose name says that they are floor."""
+    """Fixed collision boxes that end at the floor's height, and half spaces."""
     inspector = scene_graph.model_inspector()
-    every = inspector.GetAllGeometryIds(Role.kProximity)
-    return [geometry for geometry in every if "floor" in inspector.GetName(geometry).split("::")[-1]]
+    context = plant.CreateDefaultContext()
+    floor = []
+    for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
+        if not plant.IsAnchored(body):
+            continue
+        X_WB = plant.EvalBodyPoseInWorld(context, body)
+        for geometry in plant.GetCollisionGeometriesForBody(body):
+            shape = inspector.GetShape(geometry)
+            top_m = (X_WB @ inspector.GetPoseInFrame(geometry)).translation()[2]
+            if isinstance(shape, Box):
+                top_m += shape.height() / 2
+            if isinstance(shape, Box | HalfSpace) and top_m <= FLOOR_TOP_M:
+                floor.append(geometry)
+    return floor

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
+import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from plant.diagram import RENDERER, WorldDiagram
+from plant.diagram import RENDERER, LooseModel, WorldDiagram, build_diagram
+from plant.recording import Recorder, save_html
+from plant.referee.referee import Referee
 from plant.spot.model import SpotModel
 from plant.spot.robot import SpotRobot
 from plant.spot.sensing import SpotSensors
+from plant.worlds.lights import render_parameters
+from plant.worlds.placement import Placement, place_objects, place_people
+from plant.worlds.world import World
 from skills.robot import Pose2D, Robot
 
 CONTROL_PERIOD_S = 0.01
+REFEREE_PERIOD_STEPS = 5
 
 
 class Engine:
@@ -32,7 +40,7 @@ class Engine:
             for name, model in sorted(world.robots.items())
         }
         self._steps = 0
-        self._observers: list[Callable[[float], None]] = []
+        self._observers: list[tuple[int, Callable[[float], None]]] = []
         self._command_robots()
         self._simulator.Initialize()
 
@@ -45,9 +53,9 @@ class Engine:
         """The robots by name."""
         return self._spots
 
-    def observe(self, observer: Callable[[float], None]) -> None:
-        """Call `observer(now_s)` after every control period."""
-        self._observers.append(observer)
+    def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
+        """Call `observer(now_s)` after every control period, or every so many."""
+        self._observers.append((every, observer))
 
     def now(self) -> float:
         """Simulated seconds since the start."""
@@ -59,11 +67,83 @@ class Engine:
             self._command_robots()
             self._steps += 1
             self._simulator.AdvanceTo(self.now())
-            for observer in self._observers:
-                observer(self.now())
+            for every, observer in self._observers:
+                if self._steps % every == 0:
+                    observer(self.now())
         for spot in self._spots.values():
             spot.sense(self.now())
 
     def _command_robots(self) -> None:
         for spot in self._spots.values():
             spot.control(self.now(), CONTROL_PERIOD_S)
+
+
+class Simulation:
+    """A world with its robots at a seed: clock, robots, referee and, where wanted, a recording."""
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        seed: int,
+        robot_names: Sequence[str] = ("Alice",),
+        record: bool = False,
+        looks: bool = True,
+    ) -> None:
+        """Build the plant of `world`; things and people stand where the seed puts them.
+
+        The first robot stands at the world's start pose, others a robot's length behind one another. Raises WorldError
+        when the things do not fit into the world.
+        """
+        self.seed, self.world = seed, world
+        things, people = place_objects(world, seed), place_people(world, seed)
+        built = build_diagram(
+            directives=world.directives_path,
+            models=[*(_loose(each) for each in things), *(_loose(each, fixed=True) for each in people)],
+            robot_names=robot_names,
+            looks=looks,
+            renderer_parameters=render_parameters(),
+        )
+        self.engine = Engine(built, _starts(world.start, robot_names), seed=seed)
+        self.referee = Referee(
+            built.plant, [*things, *people], robots=sorted(robot_names), persons=[each.name for each in people]
+        )
+        self.recorder = Recorder(built, self.engine.context) if record else None
+        self._watch()
+
+    def _watch(self) -> None:
+        self.referee.observe(self.engine.context, 0.0)
+        self.engine.observe(self._referee_looks, every=REFEREE_PERIOD_STEPS)
+        if self.recorder is not None:
+            self.engine.observe(self.recorder)
+
+    def _referee_looks(self, now_s: float) -> None:
+        self.referee.observe(self.engine.context, now_s)
+
+    @property
+    def clock(self) -> Engine:
+        """The only clock; advancing it steps the plant."""
+        return self.engine
+
+    @property
+    def robots(self) -> Mapping[str, Robot]:
+        """The robots by name."""
+        return self.engine.robots
+
+    def save_recording(self, path: Path) -> None:
+        """Write what was recorded as one HTML file. Raises LookupError when nothing was."""
+        if self.recorder is None or not self.recorder.frames:
+            raise LookupError("nothing was recorded: build the simulation with record=True and advance its clock")
+        save_html(self.engine.world, self.recorder.frames, path)
+
+
+def _loose(placement: Placement, *, fixed: bool = False) -> LooseModel:
+    return LooseModel(placement.name, placement.model_path, placement.X_WO, fixed)
+
+
+def _starts(start: Pose2D, robot_names: Sequence[str]) -> Mapping[str, Pose2D]:
+    """Start poses in a row, the first at `start` and each next one 1.5 m behind."""
+    behind = [start.transform() @ np.array([-1.5 * index, 0.0, 0.0]) for index in range(len(robot_names))]
+    return {
+        name: Pose2D(float(p_W[0]), float(p_W[1]), start.yaw_rad) for name, p_W in zip(robot_names, behind, strict=True)
+    }

@@ -15,6 +15,8 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
+    Frame,
+    Joint,
     JointActuator,
     ModelInstanceIndex,
     PdControllerGains,
@@ -73,35 +75,32 @@ class Carrier:
         self._target = np.zeros(5)
         self._posture = np.zeros(2)
 
-    def _add_joints(self, name: str, body: RigidBody) -> Sequence[PrismaticJoint | RevoluteJoint]:
-        directions = {"x": [1, 0, 0], "y": [0, 1, 0], "yaw": [0, 0, 1], "height": [0, 0, 1], "pitch": [0, 1, 0]}
+    def _add_joints(self, name: str, body: RigidBody) -> Sequence[Joint]:
+        directions = {"x": (1, 0, 0), "y": (0, 1, 0), "yaw": (0, 0, 1), "height": (0, 0, 1), "pitch": (0, 1, 0)}
         efforts = self._efforts()
-        parent = self._plant.world_body()
-        joints = []
+        parent: RigidBody = self._plant.world_body()
+        joints: list[Joint] = []
         for axis in _AXES:
-            is_last = axis == _AXES[-1]
-            child = (
-                body
-                if is_last
-                else self._plant.AddRigidBody(
-                    f"{name}_carrier_{axis}", self.instance, SpatialInertia.SolidSphereWithMass(0.05, 0.05)
-                )
+            child = body if axis == _AXES[-1] else self._add_link(f"{name}_carrier_{axis}")
+            frames = (
+                self._add_frame(f"{name}_carrier_{axis}_F", parent),
+                self._add_frame(f"{name}_carrier_{axis}_M", child),
             )
             kind = RevoluteJoint if axis in ("yaw", "pitch") else PrismaticJoint
-            frame_on_parent = self._plant.AddFrame(
-                FixedOffsetFrame(f"{name}_carrier_{axis}_F", parent.body_frame(), RigidTransform(), self.instance)
-            )
-            frame_on_child = self._plant.AddFrame(
-                FixedOffsetFrame(f"{name}_carrier_{axis}_M", child.body_frame(), RigidTransform(), self.instance)
-            )
-            joint = self._plant.AddJoint(
-                kind(f"{name}_carrier_{axis}", frame_on_parent, frame_on_child, directions[axis])
-            )
+            direction = np.array(directions[axis], dtype=np.float64)
+            joint = self._plant.AddJoint(kind(f"{name}_carrier_{axis}", *frames, direction))
             actuator: JointActuator = self._plant.AddJointActuator(f"{name}_carrier_{axis}", joint, efforts[axis])
             actuator.set_controller_gains(PdControllerGains(p=_GAINS[axis][0], d=_GAINS[axis][1]))
             joints.append(joint)
             parent = child
         return joints
+
+    def _add_link(self, name: str) -> RigidBody:
+        inertia = SpatialInertia.SolidSphereWithMass(0.05, 0.05)
+        return self._plant.AddRigidBody(name, self.instance, inertia)
+
+    def _add_frame(self, name: str, body: RigidBody) -> Frame:
+        return self._plant.AddFrame(FixedOffsetFrame(name, body.body_frame(), RigidTransform(), self.instance))
 
     def _efforts(self) -> dict[str, float]:
         limits = self._limits
@@ -121,15 +120,12 @@ class Carrier:
     def place(self, context: Context, pose: Pose2D, height_m: float) -> None:
         """Set the body's pose at the beginning of a run."""
         values = (pose.x_m, pose.y_m, pose.yaw_rad, height_m, 0.0)
+        positions = self._plant.GetPositions(context)
         for joint, value in zip(self._joints, values, strict=True):
-            self._plant.SetPositions(context, self._positions_with(context, joint, value))
+            positions[joint.position_start()] = value
+        self._plant.SetPositions(context, positions)
         self._target = np.array(values)
         self._posture = np.array([height_m, 0.0])
-
-    def _positions_with(self, context: Context, joint: PrismaticJoint | RevoluteJoint, value: float) -> FloatArray:
-        positions: FloatArray = self._plant.GetPositions(context)
-        positions[joint.position_start()] = value
-        return positions
 
     def state(self, positions: FloatArray) -> FloatArray:
         """(x, y, yaw, height, pitch) out of the plant's positions."""

@@ -49,7 +49,7 @@ class SpotModel:
         parser.SetAutoRenaming(True)
         meshes = looks_folder() if looks else None
         if meshes is not None:
-            parser.package_map().Add(LOOKS_PACKAGE, str(meshes))
+            parser.package_map().Add(LOOKS_PACKAGE, meshes)
         (self.instance,) = parser.AddModelsFromString(spot_urdf(looks=meshes is not None), "urdf")
         plant.RenameModelInstance(self.instance, name)
         self.body = plant.GetBodyByName("body", self.instance)
@@ -100,7 +100,8 @@ class SpotModel:
             self.plant.SetFreeBodyPose(context, self.body, pose.transform(height))
 
     def _joint(self, name: str) -> RevoluteJoint:
-        joint: RevoluteJoint = self.plant.GetJointByName(name, self.instance)
+        joint = self.plant.GetJointByName(name, self.instance)
+        assert isinstance(joint, RevoluteJoint)
         return joint
 
 

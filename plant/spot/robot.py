@@ -129,7 +129,8 @@ class SpotRobot:
         least, most = self._capabilities.pitch_range_rad
         if not (low <= height_m <= high and least <= pitch_rad <= most):
             return self._book.refuse(
-                f"stand: height {height_m:.2f} m must lie in [{low}, {high}] and pitch {pitch_rad:.2f} in [{least}, {most}]"
+                f"stand: height {height_m:.2f} m must lie in [{low}, {high}] "
+                f"and pitch {pitch_rad:.2f} rad in [{least}, {most}]"
             )
         return self._begin(Part.POSTURE, (height_m, pitch_rad), until_s, lease)
 

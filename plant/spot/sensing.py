@@ -36,7 +36,14 @@ class SpotSensors:
     """All sensors of one Spot. Pictures are taken when asked for, all else at `update`."""
 
     def __init__(
-        self, model: SpotModel, scene_graph: SceneGraph, root_context: Context, context: Context, *, seed: int, renderer: str
+        self,
+        model: SpotModel,
+        scene_graph: SceneGraph,
+        root_context: Context,
+        context: Context,
+        *,
+        seed: int,
+        renderer: str,
     ) -> None:
         """`context` is the plant's part of `root_context`. The seed and the robot's name give the noise."""
         self._model, self._scene_graph = model, scene_graph
@@ -72,17 +79,18 @@ class SpotSensors:
         plant, index = self._model.plant, self._index
         self._now_s = now_s
         X_WB = plant.EvalBodyPoseInWorld(self._context, self._model.body)
-        motion = plant.EvalBodySpatialVelocityInWorld(self._context, self._model.body)
-        self._odometry = self._odometry_model.update(now_s, X_WB, motion.rotational(), motion.translational())
-        self._imu = self._imu_model.update(now_s, X_WB, motion.rotational(), motion.translational())
-        positions = plant.GetPositions(self._context)[index.positions]
-        rates = plant.GetVelocities(self._context)[index.velocities]
-        efforts = plant.get_net_actuation_output_port(self._model.instance).Eval(self._context)
+        V_WB = plant.EvalBodySpatialVelocityInWorld(self._context, self._model.body)
+        w_WB, v_WB = _array(V_WB.rotational()), _array(V_WB.translational())
+        self._odometry = self._odometry_model.update(now_s, X_WB, w_WB, v_WB)
+        self._imu = self._imu_model.update(now_s, X_WB, w_WB, v_WB)
+        positions = _array(plant.GetPositions(self._context)[index.positions])
+        rates = _array(plant.GetVelocities(self._context)[index.velocities])
+        efforts = _array(plant.get_net_actuation_output_port(self._model.instance).Eval(self._context))
         self._joints = self._joint_model.update(now_s, positions, rates, efforts)
         self._gripper = self._gripper_model.update(
             now_s, -float(positions[index.jaw]), self._clamp_force_n(rates, efforts)
         )
-        load = min(1.0, float(np.linalg.norm(motion.translational())) + float(np.abs(rates[index.arm]).sum()) / 4.0)
+        load = min(1.0, float(np.linalg.norm(v_WB)) + float(np.abs(rates[index.arm]).sum()) / 4.0)
         self._battery = self._battery_model.update(now_s, load)
         if self._scan is None or now_s - self._scan.stamp_s >= _LIDAR_PERIOD_S - 1e-6:
             self._scan = self._lidar.scan(self._context, now_s, self._odometry.X_OB)
@@ -121,9 +129,10 @@ class SpotSensors:
         """Take a picture now. Raises ValueError for an unknown source."""
         if source not in self._cameras:
             raise ValueError(f"{self._model.name} has no camera {source!r}; it has {', '.join(self._cameras)}")
-        query: QueryObject = self._scene_graph.get_query_output_port().Eval(
+        query = self._scene_graph.get_query_output_port().Eval(
             self._scene_graph.GetMyContextFromRoot(self._root_context)
         )
+        assert isinstance(query, QueryObject)
         return self._cameras[source].take(query, self._now_s, self._frames())
 
     def _frames(self) -> FrameTree:
@@ -140,7 +149,9 @@ class SpotSensors:
     def _X_BHand(self) -> RigidTransform:
         plant = self._model.plant
         for name in arm_joint_names():
-            plant.GetJointByName(name, self._model.instance).set_angle(self._kinematics, self._joints.position_rad[name])
+            plant.GetJointByName(name, self._model.instance).set_angle(
+                self._kinematics, self._joints.position_rad[name]
+            )
         hand = plant.GetBodyByName(HAND_LINK, self._model.instance).body_frame()
         X_BHand: RigidTransform = plant.CalcRelativeTransform(self._kinematics, self._model.body.body_frame(), hand)
         return X_BHand
@@ -152,3 +163,7 @@ def _generators(seed: int, robot_name: str) -> Iterator[np.random.Generator]:
     while True:
         (child,) = sequence.spawn(1)
         yield np.random.default_rng(child)
+
+
+def _array(values: object) -> FloatArray:
+    return np.asarray(values, dtype=np.float64)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from py_trees.behaviour import Behaviour
 
@@ -16,6 +17,9 @@ from executive.compiling.workshop import Registry, Workshop, slug
 from executive.errors import InputError
 from executive.knowledge import Knowledge
 
+if TYPE_CHECKING:  # the module brings the language's parser along, which a tree has no need of
+    from executive.mission import Mission
+
 
 @dataclass(frozen=True)
 class Step:
@@ -27,7 +31,7 @@ class Step:
 
 @dataclass(frozen=True)
 class CompiledTree:
-    """A mission's tree for one robot, as data. `answers` are the path ids of its status checks."""
+    """A mission's tree for one robot, as data."""
 
     robot_name: str
     mission_name: str
@@ -42,6 +46,20 @@ class CompiledTree:
     def path_ids(self) -> tuple[str, ...]:
         """All path ids, parents first."""
         return tuple(node.path_id for node in self.root.walk())
+
+
+def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> CompiledTree:
+    """Compile a mission; each node keeps the line of the mission file that it comes from.
+
+    Raises:
+        InputError: as `compile_commands`.
+    """
+    steps = [
+        Step(command, None if step.source is None else Source(step.source.file, step.source.line))
+        for step in mission.steps
+        for command in step.commands
+    ]
+    return compile_commands(mission.name, steps, knowledge=knowledge, registry=registry, robot_name=mission.robot_name)
 
 
 def compile_commands(

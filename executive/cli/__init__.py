@@ -1,0 +1,6 @@
+"""The command line: the only package that puts executive, skills and plant together."""
+
+import os
+
+for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_variable, "1")  # sums come out the same to the last bit, and two missions share two cores

@@ -1,0 +1,76 @@
+"""Puts a world, a simulation and the estimators together; the one place that knows the plant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from executive.cli.promises import promises
+from executive.compiler import CompiledTree
+from executive.errors import InputError
+from executive.knowledge import Knowledge, load_knowledge
+from executive.outcome import RobotResult
+from executive.runner import RunEntry
+from plant.referee import Verdict
+from plant.simulation import Simulation
+from plant.worlds.world import World, WorldError, load_world
+from skills.estimate.costmap import LayeredCostmap
+from skills.estimate.grid_map import MapError, load_grid_map
+from skills.estimate.localiser import ScanMatchingLocaliser
+
+
+def open_world(name: str) -> World:
+    """A world by its name or folder. Raises InputError."""
+    try:
+        return load_world(name)
+    except WorldError as error:
+        raise InputError(str(error)) from error
+
+
+def knowledge_of(world: World) -> Knowledge:
+    """What the robot is told of a world. Raises InputError."""
+    return load_knowledge(world.knowledge_path)
+
+
+def simulate(world: World, *, seed: int, robot_name: str, record: bool) -> Simulation:
+    """The plant of a world, things set by the seed. Raises InputError when they do not fit into it."""
+    try:
+        return Simulation(world, seed=seed, robot_names=(robot_name,), record=record)
+    except WorldError as error:
+        raise InputError(str(error)) from error
+
+
+def run_entry(simulation: Simulation, world: World, tree: CompiledTree) -> RunEntry:
+    """The robot of a tree's name with its estimators.
+
+    Raises:
+        InputError: there is no such robot, or the world's maps cannot be read.
+    """
+    if tree.robot_name not in simulation.robots:
+        known = ", ".join(simulation.robots)
+        raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", mend=f"known: {known}")
+    try:
+        scan_map, keepout_map = load_grid_map(world.scan_map_path), load_grid_map(world.keepout_map_path)
+    except (MapError, OSError) as error:
+        raise InputError(str(error)) from error
+    return RunEntry(
+        tree=tree,
+        robot=simulation.robots[tree.robot_name],
+        localiser=ScanMatchingLocaliser(scan_map, world.start),
+        costmap=LayeredCostmap(keepout_map),
+    )
+
+
+def judge(simulation: Simulation, tree: CompiledTree, knowledge: Knowledge, result: RobotResult) -> Verdict:
+    """What the referee says of the mission's promises."""
+    answers = [result.answers.get(node.path_id) for node in tree.root.walk() if node.kind == "answer"]
+    promised = promises(tree.commands, knowledge=knowledge, robot=tree.robot_name, answers=answers)
+    verdict: Verdict = simulation.referee.judge(promised)
+    return verdict
+
+
+def save_recording(simulation: Simulation, folder: Path) -> Mapping[str, Path]:
+    """Write the recording and the pictures of a run into `folder`; gives what was written by name."""
+    path = folder / "recording.html"
+    simulation.save_recording(path)
+    return {"recording": path}

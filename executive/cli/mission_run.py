@@ -1,0 +1,105 @@
+"""Runs one request from beginning to end: plant, tree, log, verdicts, and what is left in the output folder."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+from executive.cli.assembly import judge, run_entry, save_recording, simulate
+from executive.cli.report import RefereeReport, RunReport
+from executive.cli.requests import Request
+from executive.compiler import CompiledTree
+from executive.outcome import RunResult
+from executive.record.announce import announce
+from executive.record.event_log import EventLog
+from executive.runner import CancelToken, Observer, RunSettings, run
+from executive.view.model import NodeView, node_view
+from executive.view.svg import to_svg
+from executive.worker import LockStepWorker
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A run that has ended: its report, and the tree in its last state."""
+
+    report: RunReport
+    tree: NodeView
+
+
+def run_request(
+    request: Request, tree: CompiledTree, *, seed: int, out: Path, record: bool, observer: Observer | None = None
+) -> Finished:
+    """Run a compiled request in the plant and write log, tree, recording and pictures into `out`.
+
+    Raises:
+        InputError: the world cannot be used.
+    """
+    simulation = simulate(request.world, seed=seed, robot_name=request.mission.robot_name, record=record)
+    entry = run_entry(simulation, request.world, tree)
+    clock = simulation.clock
+    log = EventLog(out / "log.mcap", clock)
+    try:
+        announce(log, clock, tree, request.knowledge, world=request.world.name, seed=seed)
+        with cancelled_by_signals() as cancel:
+            result = run(
+                [entry],
+                clock=clock,
+                worker=LockStepWorker(clock),
+                publish=log,
+                settings=RunSettings(seed=seed),
+                cancel=cancel,
+                observer=observer,
+            )
+    finally:
+        log.close()
+    verdict = judge(simulation, tree, request.knowledge, result.worst)
+    view = node_view(tree.root, result.worst.states)
+    (out / "tree.svg").write_text(to_svg(view, title=request.mission.name), encoding="utf-8")
+    if record:
+        save_recording(simulation, out)
+    referee = RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops)
+    return Finished(_report(request, result, referee, seed=seed, log=log.path), view)
+
+
+def _report(request: Request, result: RunResult, referee: RefereeReport, *, seed: int, log: Path) -> RunReport:
+    worst = result.worst
+    return RunReport(
+        outcome=worst.outcome.value,
+        cause=None if worst.cause is None else worst.cause.value,
+        message=worst.message,
+        referee=referee,
+        commands=tuple(map(str, request.mission.commands)),
+        world=request.world.name,
+        seed=seed,
+        sim_time_s=round(result.sim_time_s, 3),
+        wall_time_s=round(result.wall_time_s, 3),
+        real_time_factor=round(result.sim_time_s / max(result.wall_time_s, 1e-6), 2),
+        ticks=result.ticks,
+        log=str(log),
+    )
+
+
+@contextmanager
+def cancelled_by_signals() -> Iterator[CancelToken]:
+    """A token that Ctrl-C and a polite kill set; a second Ctrl-C breaks in at once."""
+    cancel = CancelToken()
+
+    def on_signal(number: int, _frame: FrameType | None) -> None:
+        if cancel.reason is not None:
+            raise KeyboardInterrupt
+        cancel.request(f"cancelled by {signal.Signals(number).name}")
+
+    if threading.current_thread() is not threading.main_thread():
+        yield cancel
+        return
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield cancel
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

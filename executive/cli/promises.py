@@ -1,0 +1,99 @@
+"""What a mission promises, in the referee's words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+
+from executive.command import Command, Task, Thing
+from executive.compiling.search import surfaces_to_search
+from executive.compiling.steps import START
+from executive.knowledge import Knowledge, Pose
+from plant.referee import Promise, PromiseKind, Region
+
+BELOW_TOP_M: Final = 0.05
+ABOVE_TOP_M: Final = 0.30
+NEAR_M: Final = 0.75
+
+
+def promises(
+    commands: Sequence[Command], *, knowledge: Knowledge, robot: str, answers: Sequence[bool | None]
+) -> tuple[Promise, ...]:
+    """One promise for each command; `answers` are those of its status checks in order, None where none was given."""
+    given = iter(answers)
+    return tuple(_PROMISE[command.task](command, knowledge, robot, given) for command in commands)
+
+
+def surface_region(knowledge: Knowledge, surface: str) -> Region:
+    """The space on top of a surface in which the origin of a thing lies that rests there."""
+    facts = knowledge.surfaces[surface]
+    return Region(surface, facts.polygon, facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M)
+
+
+def _regions(knowledge: Knowledge, thing: Thing, goal: str | None) -> tuple[Region, ...]:
+    place = None if goal is None else knowledge.place(goal)
+    return tuple(surface_region(knowledge, name) for name in surfaces_to_search(knowledge, thing.name, place))
+
+
+def _grasped(command: Command, knowledge: Knowledge, robot: str, _: Iterator[bool | None]) -> Promise:
+    thing = command.object
+    assert thing is not None
+    return Promise(
+        kind=PromiseKind.GRASPED,
+        classes=knowledge.classes(knowledge.thing(thing.name) or thing.name),
+        count=command.object_count,
+        source=_regions(knowledge, thing, command.goal),
+        robot=robot,
+    )
+
+
+def _answered(command: Command, knowledge: Knowledge, robot: str, given: Iterator[bool | None]) -> Promise:
+    thing = command.object
+    assert thing is not None
+    return Promise(
+        kind=PromiseKind.ANSWERED,
+        classes=knowledge.classes(knowledge.thing(thing.name) or thing.name),
+        source=_regions(knowledge, thing, command.goal),
+        answer=next(given, None),
+        robot=robot,
+    )
+
+
+def _carried(command: Command, knowledge: Knowledge, robot: str, _: Iterator[bool | None]) -> Promise:
+    item, goal = command.item or command.object, command.goal
+    assert item is not None and goal is not None
+    classes = knowledge.classes(knowledge.thing(item.name) or item.name)
+    person = knowledge.person(goal)
+    if goal == START or person is not None:
+        return Promise(PromiseKind.HANDED_OVER, classes, command.item_count, person=person, robot=robot)
+    place = knowledge.place(goal)
+    assert place is not None
+    goals = tuple(surface_region(knowledge, name) for name in knowledge.surfaces_in(place))
+    return Promise(PromiseKind.PLACED, classes, command.item_count, goal=goals, robot=robot)
+
+
+def _went(command: Command, knowledge: Knowledge, robot: str, given: Iterator[bool | None]) -> Promise:
+    if command.item is not None:
+        return _carried(command, knowledge, robot, given)
+    assert command.goal is not None
+    return Promise(PromiseKind.WENT, goal=(_place_region(knowledge, command.goal),), robot=robot)
+
+
+def _place_region(knowledge: Knowledge, goal: str) -> Region:
+    """A room's outline; for a surface or the start a square about where the robot is to stand."""
+    person = knowledge.person(goal)
+    place = knowledge.people[person].at if person is not None else knowledge.place(goal)
+    if place in knowledge.places:
+        return Region(place, knowledge.places[place].polygon)
+    return _square(goal, knowledge.start if goal == START or place is None else knowledge.place_pose(place))
+
+
+def _square(name: str, pose: Pose) -> Region:
+    sides = ((-NEAR_M, -NEAR_M), (NEAR_M, -NEAR_M), (NEAR_M, NEAR_M), (-NEAR_M, NEAR_M))
+    return Region(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
+
+
+_PROMISE: Final[Mapping[Task | None, Callable[[Command, Knowledge, str, Iterator[bool | None]], Promise]]] = (
+    MappingProxyType({Task.GRASP: _grasped, Task.FIND: _answered, Task.PLACE: _carried, None: _went})
+)

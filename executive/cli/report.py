@@ -1,0 +1,78 @@
+"""The report of one run: what the tree claimed and what the referee saw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rich.markup import escape
+
+
+@dataclass(frozen=True)
+class RefereeReport:
+    """The referee's verdict with its counts."""
+
+    success: bool
+    why: str
+    collisions: int
+    drops: int
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """One run, with the keys that scripts rely on. Times in seconds; `log` is the event log's path."""
+
+    outcome: str
+    cause: str | None
+    message: str
+    referee: RefereeReport
+    commands: tuple[str, ...]
+    world: str
+    seed: int
+    sim_time_s: float
+    wall_time_s: float
+    real_time_factor: float
+    ticks: int
+    log: str
+
+    @property
+    def claimed(self) -> bool:
+        """The tree says that the mission is achieved."""
+        return self.outcome == "success"
+
+    @property
+    def achieved(self) -> bool:
+        """The tree says so and the referee agrees."""
+        return self.claimed and self.referee.success
+
+    @property
+    def false_claim(self) -> bool:
+        """The tree says so and the referee does not agree."""
+        return self.claimed and not self.referee.success
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as JSON values."""
+        return {**asdict(self), "commands": list(self.commands)}
+
+    @staticmethod
+    def from_json(values: Mapping[str, Any]) -> RunReport:
+        """A report that another process has printed."""
+        fields = {key: values[key] for key in RunReport.__dataclass_fields__}
+        referee = RefereeReport(**fields.pop("referee"))
+        return RunReport(**{**fields, "referee": referee, "commands": tuple(values["commands"])})
+
+    def lines(self) -> tuple[str, ...]:
+        """The two verdicts and the figures, with rich markup."""
+        cause = f" ({self.cause})" if self.cause else ""
+        seen = "the mission is fulfilled" if self.referee.success else "the mission is not fulfilled"
+        return (
+            f"[bold]The tree claims:[/bold] {_mark(self.claimed)} {self.outcome}{cause}: {escape(self.message)}",
+            f"[bold]The referee saw:[/bold] {_mark(self.referee.success)} {seen}: {escape(self.referee.why)}",
+            f"{self.referee.collisions} collisions, {self.referee.drops} drops; {self.sim_time_s:.1f} s simulated in "
+            f"{self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), {self.ticks} ticks",
+        )
+
+
+def _mark(good: bool) -> str:
+    return "[green]✓[/green]" if good else "[red]✗[/red]"

@@ -1,0 +1,61 @@
+"""What the user asks for, a sentence or a mission file, in one world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from executive.cli.assembly import knowledge_of, open_world
+from executive.compiler import CompiledTree, compile_mission
+from executive.errors import InputError
+from executive.knowledge import Knowledge
+from executive.language import load_parser
+from executive.mission import DEFAULT_WORLD, Mission, load_mission, mission_from_file, mission_from_sentence
+from executive.registry import built_in_skills
+from plant.worlds.world import World
+
+
+@dataclass(frozen=True)
+class Request:
+    """A mission, the world that it runs in, and what is known of that."""
+
+    mission: Mission
+    world: World
+    knowledge: Knowledge
+
+    def compile(self) -> CompiledTree:
+        """The mission's tree. Raises InputError."""
+        return compile_mission(self.mission, knowledge=self.knowledge, registry=built_in_skills())
+
+
+def said(text: str, *, world: str | None, require_wake: bool) -> Request:
+    """The request of a sentence.
+
+    Raises:
+        InputError: the world is unknown or its knowledge broken, or the sentence was not understood.
+    """
+    opened = open_world(world or DEFAULT_WORLD)
+    knowledge = knowledge_of(opened)
+    mission = mission_from_sentence(
+        text, parser=load_parser(), knowledge=knowledge, world=opened.name, require_wake=require_wake
+    )
+    return Request(mission, opened, knowledge)
+
+
+def filed(file: Path, *, world: str | None) -> Request:
+    """The request of a mission file; `world` stands in for the file's own.
+
+    Raises:
+        InputError: with file and line: the file is broken, its world unknown, or a step not understood.
+    """
+    loaded = load_mission(file)
+    opened = open_world(world) if world is not None else _own_world(loaded.world, file)
+    knowledge = knowledge_of(opened)
+    return Request(mission_from_file(loaded, parser=load_parser(), knowledge=knowledge), opened, knowledge)
+
+
+def _own_world(name: str, file: Path) -> World:
+    try:
+        return open_world(name)
+    except InputError as error:
+        raise load_mission(file).error(("world",), error.message, error.mend) from error

@@ -1,0 +1,108 @@
+"""Many seeds: each in a process of its own, several at a time, so that one that dies takes no other along."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from executive.cli.report import RefereeReport, RunReport
+from executive.errors import InputError
+
+
+def seed_range(text: str) -> tuple[int, ...]:
+    """Seeds from "1-20", "3" or "1,4,7-9".
+
+    Raises:
+        InputError: anything else.
+    """
+    try:
+        seeds = tuple(seed for part in text.split(",") for seed in _span(part))
+    except ValueError as error:
+        raise InputError(f"'{text}' is no range of seeds", mend="write it like 1-20 or 1,4,7") from error
+    if not seeds:
+        raise InputError(f"'{text}' holds no seed", mend="write it like 1-20")
+    return seeds
+
+
+def _span(part: str) -> range:
+    first, dash, last = part.partition("-")
+    return range(int(first), int(last if dash else first) + 1)
+
+
+def sweep(
+    arguments: Sequence[str], seeds: Sequence[int], *, jobs: int, out: Path, done: Callable[[RunReport], None]
+) -> tuple[RunReport, ...]:
+    """Run `errand run ARGUMENTS` for each seed; `done` is called as each ends. In the order of the seeds."""
+    with ThreadPoolExecutor(max_workers=jobs) as pool:
+        futures = {pool.submit(_run_one, tuple(arguments), seed, out / f"seed-{seed:03d}"): seed for seed in seeds}
+        try:
+            reports = {futures[future]: _told(future.result(), done) for future in as_completed(futures)}
+        except KeyboardInterrupt:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+    return tuple(reports[seed] for seed in seeds)
+
+
+def _told(report: RunReport, done: Callable[[RunReport], None]) -> RunReport:
+    done(report)
+    return report
+
+
+def _run_one(arguments: tuple[str, ...], seed: int, out: Path) -> RunReport:
+    own = ("--seed", str(seed), "--out", str(out), "--json", "--quiet", "--no-record")
+    command = [sys.executable, "-m", "executive.cli", "run", *arguments, *own]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    last = ended.stdout.strip().rpartition("\n")[2]
+    try:
+        return RunReport.from_json(json.loads(last))
+    except (ValueError, KeyError, TypeError):
+        return _died(seed, out, ended.returncode, ended.stderr)
+
+
+def _died(seed: int, out: Path, status: int, errors: str) -> RunReport:
+    """The report of a process that gave none."""
+    why = errors.strip().rpartition("\n")[2] or "it said nothing"
+    return RunReport(
+        outcome="error",
+        cause="ERROR",
+        message=f"the process ended with status {status}: {why}",
+        referee=RefereeReport(False, "the run gave no report", 0, 0),
+        commands=(),
+        world="",
+        seed=seed,
+        sim_time_s=0.0,
+        wall_time_s=0.0,
+        real_time_factor=0.0,
+        ticks=0,
+        log=str(out / "log.mcap"),
+    )
+
+
+def totals(reports: Sequence[RunReport]) -> dict[str, Any]:
+    """The sweep as JSON values: all runs, and the counts."""
+    return {
+        "runs": [report.to_json() for report in reports],
+        "successes": sum(report.claimed for report in reports),
+        "referee_successes": sum(report.referee.success for report in reports),
+        "false_claims": sum(report.false_claim for report in reports),
+    }
+
+
+def rows(reports: Sequence[RunReport]) -> Iterator[tuple[str, ...]]:
+    """The table of a sweep, one row for each run."""
+    for report in reports:
+        yield (
+            str(report.seed),
+            report.outcome,
+            "yes" if report.referee.success else "no",
+            str(report.referee.collisions),
+            str(report.referee.drops),
+            f"{report.sim_time_s:.1f}",
+            f"{report.real_time_factor:.1f}",
+            report.message if report.referee.success else f"{report.message} / {report.referee.why}",
+        )

@@ -1,0 +1,282 @@
+"""Pictures of a run: the world from above with the way walked, a detection in the hand's view, and views from outside.
+
+Pictures are (H, W, 3) uint8 RGB arrays until `save_png` writes them. Drawing is antialiased; text stands on a plate, so
+that it reads on any ground. All lengths in metres, all poses in the world frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydrake.geometry import QueryObject
+from pydrake.math import RigidTransform, RotationMatrix
+
+from plant.sensors.camera_spec import FAR_M, NEAR_M, colour_render_camera, depth_render_camera
+from skills.robot import Intrinsics
+
+Picture = NDArray[np.uint8]
+FloatArray = NDArray[np.float64]
+Colour = tuple[int, int, int]
+Bounds = tuple[float, float, float, float]
+
+PATH_COLOUR: Colour = (225, 60, 30)
+START_COLOUR: Colour = (30, 140, 60)
+BOX_COLOUR: Colour = (255, 190, 0)
+INK: Colour = (25, 25, 25)
+PLATE: Colour = (255, 255, 255)
+
+_CAMERA_ABOVE_M = 60.0
+_CUT_HEIGHT_M = 1.9
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_SUBPIXEL_BITS = 4
+
+
+@dataclass(frozen=True)
+class MapView:
+    """The world from above, and the camera that saw it: up in the picture is the world's y, right its x."""
+
+    picture: Picture
+    X_WC: RigidTransform
+    intrinsics: Intrinsics
+
+    def pixels(self, points_W: FloatArray, z_m: float = 0.0) -> FloatArray:
+        """Pixels (N, 2) of points (N, 2 or more columns: x, y) at a height."""
+        points = np.asarray(points_W, dtype=np.float64).reshape(len(points_W), -1)[:, :2]
+        at_height = np.column_stack([points, np.full(len(points), z_m)])
+        x, y, z = (self.X_WC.inverse() @ at_height.T).reshape(3, -1)
+        k = self.intrinsics
+        return np.stack([k.fx * x / z + k.cx, k.fy * y / z + k.cy], axis=-1)
+
+    @property
+    def pixels_per_m(self) -> float:
+        """Scale at the floor."""
+        return self.intrinsics.fx / float(self.X_WC.translation()[2])
+
+
+def render_view(
+    query_object: QueryObject,
+    X_WC: RigidTransform,
+    size: tuple[int, int] = (960, 720),
+    *,
+    fov_y_rad: float = float(np.radians(50.0)),
+    renderer: str = "vtk",
+) -> Picture:
+    """What a free camera at X_WC (z forward, x right, y down) sees; `size` is (width, height)."""
+    intrinsics = _centred_intrinsics(size, size[1] / 2.0 / float(np.tan(fov_y_rad / 2.0)))
+    return _render(query_object, X_WC, intrinsics, renderer, NEAR_M, FAR_M)
+
+
+def look_at(eye_W: ArrayLike, target_W: ArrayLike) -> RigidTransform:
+    """X_WC of a camera at eye_W that looks at target_W with the horizon level. Raises ValueError when they coincide."""
+    forward = np.asarray(target_W, dtype=np.float64) - np.asarray(eye_W, dtype=np.float64)
+    if float(np.linalg.norm(forward)) < 1e-6:
+        raise ValueError("look_at: eye and target are the same point")
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([1.0, 0.0, 0.0])
+    R_WC = RotationMatrix(np.column_stack([right, np.cross(forward, right), forward]))
+    return RigidTransform(R_WC, np.asarray(eye_W, dtype=np.float64))
+
+
+def best_view(
+    query_object: QueryObject,
+    target_W: ArrayLike,
+    *,
+    distance_m: float = 1.8,
+    height_m: float = 0.7,
+    facing_W: Sequence[float] | None = None,
+    renderer: str = "vtk",
+) -> RigidTransform:
+    """X_WC of a camera around the target, from a side where nothing near the line of sight hides it.
+
+    `facing_W` (x, y) is the side preferred, for a robot the way to its left or right. The clearest side wins.
+    """
+    target = np.asarray(target_W, dtype=np.float64)
+    first = float(np.arctan2(facing_W[1], facing_W[0])) if facing_W is not None else 0.0
+    views = []
+    for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6, 2.3, -2.3, np.pi):
+        side = np.array([np.cos(first + turn), np.sin(first + turn), 0.0])
+        views.append(look_at(target + distance_m * side + [0.0, 0.0, height_m], target))
+    clear = [_clear_share(query_object, X_WC, target, renderer) for X_WC in views]
+    good = [X_WC for X_WC, share in zip(views, clear, strict=True) if share > 0.9]
+    return good[0] if good else views[int(np.argmax(clear))]
+
+
+def _clear_share(query_object: QueryObject, X_WC: RigidTransform, target_W: FloatArray, renderer: str) -> float:
+    """Share of the lines of sight around the target that reach almost as far as it does."""
+    intrinsics = _centred_intrinsics((48, 48), 90.0)
+    distance = float(np.linalg.norm(X_WC.translation() - target_W))
+    camera = depth_render_camera(intrinsics, renderer, (NEAR_M, distance + 5.0))
+    world = query_object.inspector().world_frame_id()
+    depth = query_object.RenderDepthImage(camera, world, X_WC).data[..., 0]
+    return float(np.mean(depth > distance - 0.45))
+
+
+def top_view(
+    query_object: QueryObject,
+    bounds_W: Bounds,
+    *,
+    width: int = 1600,
+    cut_height_m: float = _CUT_HEIGHT_M,
+    renderer: str = "vtk",
+) -> MapView:
+    """The world from far above, cut open at a height; `bounds_W` is (x_min, y_min, x_max, y_max) on the floor.
+
+    Raises ValueError for bounds without an area.
+    """
+    x_min, y_min, x_max, y_max = bounds_W
+    if not (x_min < x_max and y_min < y_max):
+        raise ValueError(f"top_view: bounds must be (x_min, y_min, x_max, y_max) with an area, not {bounds_W}")
+    scale = width / (x_max - x_min)
+    intrinsics = _centred_intrinsics((width, round(scale * (y_max - y_min))), scale * _CAMERA_ABOVE_M)
+    down = RotationMatrix(np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]))
+    X_WC = RigidTransform(down, np.array([(x_min + x_max) / 2.0, (y_min + y_max) / 2.0, _CAMERA_ABOVE_M]))
+    near = _CAMERA_ABOVE_M - cut_height_m
+    picture = _render(query_object, X_WC, intrinsics, renderer, near, _CAMERA_ABOVE_M + 1.0)
+    return MapView(picture, X_WC, intrinsics)
+
+
+def draw_map(
+    view: MapView,
+    path_W: FloatArray,
+    *,
+    labels: Mapping[str, tuple[float, float]] | None = None,
+    marks: Mapping[str, tuple[float, float]] | None = None,
+) -> Picture:
+    """The map with the way walked (N, 2 or more columns: x, y), place names, marked points and a scale bar."""
+    picture = view.picture.copy()
+    for text, centre in (labels or {}).items():
+        _centred_label(picture, text, view.pixels(np.array([centre]))[0])
+    draw_path(picture, view.pixels(path_W) if len(path_W) else np.zeros((0, 2)))
+    for text, point in (marks or {}).items():
+        pixel = view.pixels(np.array([point]))[0]
+        _dot(picture, pixel, BOX_COLOUR)
+        label(picture, text, (int(pixel[0]) + 14, int(pixel[1]) - 14), ground=BOX_COLOUR)
+    _scale_bar(picture, view.pixels_per_m)
+    return picture
+
+
+def draw_path(picture: Picture, pixels: FloatArray) -> None:
+    """Draw a way given in pixels (N, 2): a light seam below the line, a dot at its start, an arrow at its end."""
+    if len(pixels) < 1:
+        return
+    thick = max(3, picture.shape[1] // 320)
+    line = [_fixed_point(pixels)]
+    for colour, width in ((PLATE, thick + 4), (PATH_COLOUR, thick)):
+        cv2.polylines(picture, line, False, colour, width, cv2.LINE_AA, _SUBPIXEL_BITS)
+    _arrow_head(picture, pixels, 5.0 * thick)
+    _dot(picture, pixels[0], START_COLOUR)
+
+
+def draw_detection(picture: Picture, box: tuple[float, float, float, float], name: str, score: float) -> Picture:
+    """A copy of a picture with a box (left, top, right, bottom in pixels) and its label with the score from 0 to 1."""
+    drawn = np.ascontiguousarray(picture).copy()
+    corners = np.array([[box[0], box[1]], [box[2], box[1]], [box[2], box[3]], [box[0], box[3]]])
+    for colour, width in ((INK, 5), (BOX_COLOUR, 2)):
+        cv2.polylines(drawn, [_fixed_point(corners)], True, colour, width, cv2.LINE_AA, _SUBPIXEL_BITS)
+    text = f"{name} {score:.2f}"
+    height = _text_size(text, drawn)[1]
+    above = box[1] - 8 if box[1] - height - 16 > 0 else box[3] + height + 10
+    label(drawn, text, (int(box[0]), int(above)), ground=BOX_COLOUR)
+    return drawn
+
+
+def label(picture: Picture, text: str, origin: tuple[int, int], *, ground: Colour = PLATE) -> None:
+    """Write text with its lower left corner at a pixel, moved inside the picture where needed, on a plate."""
+    width, height = _text_size(text, picture)
+    pad = 5
+    x = int(np.clip(origin[0], pad, max(pad, picture.shape[1] - width - pad)))
+    y = int(np.clip(origin[1], height + pad, max(height + pad, picture.shape[0] - 2 * pad)))
+    cv2.rectangle(picture, (x - pad, y - height - pad), (x + width + pad, y + pad + 2), ground, cv2.FILLED, cv2.LINE_AA)
+    cv2.putText(picture, text, (x, y), _FONT, _font_scale(picture), INK, _stroke(picture), cv2.LINE_AA)
+
+
+def save_png(path: Path, picture: Picture) -> None:
+    """Write a picture as PNG, making its folder. Raises OSError when it cannot be written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    coded, data = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    if not coded:
+        raise OSError(f"{path}: the picture could not be coded as PNG")
+    path.write_bytes(data.tobytes())
+
+
+def _centred_intrinsics(size: tuple[int, int], focal_px: float) -> Intrinsics:
+    return Intrinsics(size[0], size[1], focal_px, focal_px, size[0] / 2.0 - 0.5, size[1] / 2.0 - 0.5)
+
+
+def _render(
+    query_object: QueryObject, X_WC: RigidTransform, intrinsics: Intrinsics, renderer: str, near_m: float, far_m: float
+) -> Picture:
+    """Render at twice the size and shrink, since the renderer leaves jagged edges."""
+    k = intrinsics
+    double = Intrinsics(2 * k.width, 2 * k.height, 2 * k.fx, 2 * k.fy, 2 * k.cx + 0.5, 2 * k.cy + 0.5)
+    camera = colour_render_camera(double, renderer, near_m=near_m, far_m=far_m)
+    image = query_object.RenderColorImage(camera, query_object.inspector().world_frame_id(), X_WC)
+    small = cv2.resize(image.data[..., :3], (k.width, k.height), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.uint8)
+
+
+def _fixed_point(pixels: FloatArray) -> NDArray[np.int32]:
+    """Pixels in OpenCV's fixed-point form."""
+    return np.asarray(np.round(pixels * 2.0**_SUBPIXEL_BITS), dtype=np.int32).reshape(-1, 1, 2)
+
+
+def _arrow_head(picture: Picture, pixels: FloatArray, length: float) -> None:
+    """A filled triangle at the end of a way, pointing along its last stretch."""
+    tip = pixels[-1]
+    behind = pixels[np.linalg.norm(pixels - tip, axis=1) > length / 2.0]
+    if not len(behind):
+        _dot(picture, tip, PATH_COLOUR)
+        return
+    along = (tip - behind[-1]) / np.linalg.norm(tip - behind[-1])
+    across = np.array([-along[1], along[0]])
+    head = np.array([tip + 0.6 * length * along, tip + 0.5 * length * across, tip - 0.5 * length * across])
+    cv2.fillPoly(picture, [_fixed_point(head)], PATH_COLOUR, cv2.LINE_AA, _SUBPIXEL_BITS)
+    cv2.polylines(picture, [_fixed_point(head)], True, PLATE, 2, cv2.LINE_AA, _SUBPIXEL_BITS)
+
+
+def _dot(picture: Picture, pixel: FloatArray, colour: Colour) -> None:
+    """A filled dot with a light rim."""
+    radius = max(5, picture.shape[1] // 180)
+    centre = (round(float(pixel[0])), round(float(pixel[1])))
+    cv2.circle(picture, centre, radius + 2, PLATE, cv2.FILLED, cv2.LINE_AA)
+    cv2.circle(picture, centre, radius, colour, cv2.FILLED, cv2.LINE_AA)
+
+
+def _centred_label(picture: Picture, text: str, centre: FloatArray) -> None:
+    width, height = _text_size(text, picture)
+    label(picture, text, (round(float(centre[0]) - width / 2), round(float(centre[1]) + height / 2)))
+
+
+def _scale_bar(picture: Picture, pixels_per_m: float) -> None:
+    """A bar of a round length at the lower left, at most a quarter of the picture wide."""
+    longest = picture.shape[1] / 4.0 / pixels_per_m
+    length_m = max([step for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if step <= longest], default=0.1)
+    left, bottom = 24, picture.shape[0] - 24
+    right = left + round(length_m * pixels_per_m)
+    cv2.rectangle(picture, (left - 14, bottom - 44), (right + 14, bottom + 14), PLATE, cv2.FILLED)
+    cv2.line(picture, (left, bottom), (right, bottom), INK, 3, cv2.LINE_AA)
+    for x in (left, right):
+        cv2.line(picture, (x, bottom - 7), (x, bottom + 7), INK, 3, cv2.LINE_AA)
+    text = f"{length_m:g} m"
+    width = _text_size(text, picture)[0]
+    origin = (left + (right - left - width) // 2, bottom - 14)
+    cv2.putText(picture, text, origin, _FONT, _font_scale(picture), INK, _stroke(picture), cv2.LINE_AA)
+
+
+def _font_scale(picture: Picture) -> float:
+    return float(np.clip(picture.shape[1] / 1600.0, 0.5, 1.2))
+
+
+def _stroke(picture: Picture) -> int:
+    return 2 if picture.shape[1] >= 1000 else 1
+
+
+def _text_size(text: str, picture: Picture) -> tuple[int, int]:
+    (width, height), _ = cv2.getTextSize(text, _FONT, _font_scale(picture), _stroke(picture))
+    return int(width), int(height)

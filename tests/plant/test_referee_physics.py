@@ -1,0 +1,102 @@
+"""The referee sees a grasp by friction, and a drop, in a plant that really moves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from pydrake.geometry import Box
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
+from pydrake.multibody.tree import PdControllerGains, PrismaticJoint, SpatialInertia
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from plant.referee import Promise, PromiseKind, Referee, Region
+
+FRICTION = CoulombFriction(0.9, 0.9)
+TABLE = Region("the table", ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)), 0.7, 1.0)
+GRASPED = Promise(PromiseKind.GRASPED, ("coke",), source=(TABLE,))
+ON_TABLE = Promise(PromiseKind.ANSWERED, ("coke",), source=(TABLE,), answer=True)
+
+
+@dataclass(frozen=True)
+class Placement:
+    name: str
+    class_name: str
+
+
+class Press:
+    """A hand on a lift (z) with a jaw (y) that closes on a block which lies on a table 0.75 m high."""
+
+    def __init__(self):
+        builder = DiagramBuilder()
+        config = MultibodyPlantConfig(time_step=0.005, discrete_contact_approximation="sap")
+        plant, _ = AddMultibodyPlant(config, builder)
+        world = plant.world_body()
+        plant.RegisterCollisionGeometry(world, RigidTransform([0, 0, -0.5]), Box(9, 9, 1), "floor", FRICTION)
+        plant.RegisterCollisionGeometry(world, RigidTransform([0, 0, 0.725]), Box(0.6, 0.6, 0.05), "table", FRICTION)
+        alice = plant.AddModelInstance("alice")
+        inertia = SpatialInertia.SolidSphereWithMass(0.5, 0.05)
+        base, hand, jaw = (plant.AddRigidBody(name, alice, inertia) for name in ("body", "arm_wr1", "arm_f1x"))
+        plant.WeldFrames(plant.world_frame(), base.body_frame(), RigidTransform([0, -0.05, 0.8]))
+        joints = [
+            PrismaticJoint("lift", base.body_frame(), hand.body_frame(), [0, 0, 1]),
+            PrismaticJoint("close", hand.body_frame(), jaw.body_frame(), [0, 1, 0]),
+        ]
+        for joint in joints:
+            actuator = plant.AddJointActuator(joint.name(), plant.AddJoint(joint), 40.0)
+            actuator.set_controller_gains(PdControllerGains(p=2000.0, d=100.0))
+        for body in (hand, jaw):
+            plant.RegisterCollisionGeometry(body, RigidTransform(), Box(0.06, 0.02, 0.06), body.name(), FRICTION)
+        coke = plant.AddRigidBody("coke", plant.AddModelInstance("coke"), SpatialInertia.SolidSphereWithMass(0.3, 0.03))
+        plant.RegisterCollisionGeometry(coke, RigidTransform(), Box(0.06, 0.06, 0.1), "coke", FRICTION)
+        plant.Finalize()
+        plant.SetDefaultFloatingBaseBodyPose(coke, RigidTransform([0, 0, 0.81]))
+        diagram = builder.Build()
+        self.simulator = Simulator(diagram)
+        self.context = plant.GetMyContextFromRoot(self.simulator.get_mutable_context())
+        self.desired = plant.get_desired_state_input_port(alice)
+        plant.SetPositions(self.context, alice, [0.0, 0.12])
+        self.referee = Referee(plant, [Placement("coke", "coke")], robots=["alice"])
+
+    def run(self, lift_m, jaw_m, seconds):
+        """Move lift and jaw towards positions; the referee looks on at 20 Hz."""
+        start = self.simulator.get_context().get_time()
+        self.desired.FixValue(self.context, np.array([lift_m, jaw_m, 0, 0]))
+        for t in start + np.arange(1, round(seconds / 0.05) + 1) * 0.05:
+            self.simulator.AdvanceTo(t)
+            self.referee.observe(self.context, t)
+        return self
+
+
+@pytest.fixture(scope="module")
+def grasped():
+    """A block taken up by friction."""
+    return Press().run(0.0, 0.12, 0.5).run(0.0, 0.07, 0.5).run(0.2, 0.07, 0.8)
+
+
+def test_block_taken_up_by_friction_is_grasped(grasped):
+    verdict = grasped.referee.judge([GRASPED])
+    assert verdict.success, verdict.why
+    assert (verdict.collisions, verdict.drops) == (0, 0)
+
+
+def test_block_that_only_lies_there_is_seen_at_rest_and_not_grasped():
+    press = Press().run(0.0, 0.12, 0.6)
+    assert press.referee.judge([ON_TABLE]).success
+    assert not press.referee.judge([GRASPED]).success
+
+
+def test_block_let_go_in_the_air_is_dropped_once():
+    press = Press().run(0.0, 0.12, 0.3).run(0.0, 0.07, 0.5).run(0.2, 0.07, 0.8).run(0.2, 0.14, 0.8)
+    assert press.referee.drops == 1
+    assert press.referee.judge([ON_TABLE]).success
+
+
+def test_block_set_down_and_let_go_is_not_dropped():
+    press = Press().run(0.0, 0.12, 0.3).run(0.0, 0.07, 0.5).run(0.2, 0.07, 0.8).run(0.0, 0.07, 0.8)
+    press.run(0.0, 0.14, 0.4).run(0.3, 0.14, 0.8)
+    placed = Promise(PromiseKind.PLACED, ("coke",), source=(TABLE,), goal=(TABLE,))
+    verdict = press.referee.judge([GRASPED, placed])
+    assert verdict.success, verdict.why
+    assert verdict.drops == 0

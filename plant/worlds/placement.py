@@ -77,7 +77,7 @@ def _place(
             clear = all(polygon_distance(outline, other) >= rules.clear_m for other in obstacles)
             if clear and _inside(outline, surface.polygon_W, rules.rim_m):
                 z = surface.height_m + model.rest_height_m + rules.drop_m
-                X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z]))
+                X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z], dtype=np.float64))
                 return Placement(rule.name, rule.model, model.path(), X_WO, name), outline
     raise WorldError(f"{world.folder / 'objects.yaml'}: {rule.name} finds no free spot on {', '.join(rule.surfaces)}")
 
@@ -101,7 +101,7 @@ def _place_person(world: World, rule: PersonRule, model: ModelClass, seed: int, 
     yaw = direction + np.pi + rng.uniform(*rule.turned_rad)
     x = world.start.x_m + distance * np.cos(direction)
     y = world.start.y_m + distance * np.sin(direction)
-    X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, model.rest_height_m]))
+    X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, model.rest_height_m], dtype=np.float64))
     return Placement(rule.name, rule.model, model.path(), X_WO)
 
 

@@ -185,9 +185,18 @@ def _read(path: Path, schema: type[ModelT]) -> ModelT:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise WorldError(f"{path}:{line}: broken YAML, {error.problem}; mend the syntax there") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise WorldError(f"{path}:{_line_of(root, first['loc'])}: {key}: {first['msg']}") from error
+        raise WorldError(f"{path}:{_complaint(root, error)}") from error
+
+
+def _complaint(root: yaml.Node | None, error: ValidationError) -> str:
+    """Line, key and mend of the first fault; unknown keys first, since they often explain a missing one."""
+    faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+    where, message = faults[0]["loc"], faults[0]["msg"]
+    if faults[0]["type"] == "extra_forbidden":
+        missing = [str(f["loc"][-1]) for f in faults if f["type"] == "missing" and f["loc"][:-1] == where[:-1]]
+        close = difflib.get_close_matches(str(where[-1]), missing, n=1)
+        message = f"unknown key; did you mean {close[0]!r}?" if close else "unknown key; take it out"
+    return f"{_line_of(root, where)}: {'.'.join(str(part) for part in where)}: {message}"
 
 
 def _line_of(node: yaml.Node | None, location: tuple[int | str, ...]) -> int:

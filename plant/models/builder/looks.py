@@ -59,7 +59,7 @@ def _can_label() -> FloatArray:
 def _lettering(text: str, corner: tuple[int, int], font: int, thick: int) -> NDArray[np.bool_]:
     """Which pixels of a label a word covers."""
     canvas = np.zeros(LABEL_SHAPE, np.uint8)
-    cv2.putText(canvas, text, corner, font, 1.9, 255, thick, cv2.LINE_AA)
+    cv2.putText(canvas, text, corner, font, 1.7, 255, thick, cv2.LINE_AA)
     return np.asarray(canvas > 127)
 
 
@@ -91,8 +91,8 @@ def _bottle_label() -> FloatArray:
     image = np.zeros((height, width, 3)) + np.array([0.93, 0.90, 0.80])
     for edge in (slice(0, 10), slice(-10, None)):
         image[edge] = (0.72, 0.58, 0.22)
-    for x in (16, 208):
-        image[_lettering("BEER", (x, 116), cv2.FONT_HERSHEY_DUPLEX, 5)] = (0.10, 0.26, 0.14)
+    for x in (20, 212):
+        image[_lettering("BEER", (x, 112), cv2.FONT_HERSHEY_DUPLEX, 4)] = (0.10, 0.26, 0.14)
         image[138:142, x : x + 150] = (0.72, 0.58, 0.22)
     image[:, width // 2 - 6 : width // 2 + 6] = (0.06, 0.27, 0.10)
     return np.asarray(image)
@@ -176,7 +176,7 @@ def _claw(mesh: Mesh, sign: int) -> Mesh:
     """One of the two prongs, which narrow towards -y."""
     claw = Mesh(mesh.materials)
     inner, outer = sign * 0.001, sign * 0.0145
-    steps = [(-0.012, 0.015), (-0.030, 0.012), (-0.048, 0.008), (-0.060, 0.003)]
+    steps = [(-0.012 - 0.004 * k, 0.0150 - 0.001 * k) for k in range(13)]
     for (y0, w0), (y1, w1) in itertools.pairwise(steps):
         x0 = sorted((inner, np.sign(sign) * min(abs(outer), w0)))
         low = (x0[0], y1, -0.014 + (0.015 - w1) * 0.4)

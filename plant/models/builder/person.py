@@ -65,8 +65,8 @@ def _leg(mesh: Mesh, side: int) -> None:
 def _arm(mesh: Mesh, side: int) -> None:
     shoulder, elbow, wrist = (0.0, 0.205, 1.40), (-0.02, 0.252, 1.12), (0.045, 0.250, 0.87)
     a, b, c = ((p[0], p[1] * side, p[2]) for p in (shoulder, elbow, wrist))
-    _ellipsoid(mesh, "sweater", a, (0.066, 0.062, 0.066))
-    _limb(mesh, "sweater", b, a, (0.048, 0.052, 0.060))
+    _ellipsoid(mesh, "sweater", a, (0.064, 0.056, 0.062))
+    _limb(mesh, "sweater", b, a, (0.048, 0.052, 0.056))
     _ellipsoid(mesh, "sweater", b, (0.048, 0.048, 0.048))
     _limb(mesh, "sweater", c, b, (0.036, 0.042, 0.047))
     _ellipsoid(mesh, "skin", (c[0] + 0.02, c[1], c[2] - 0.065), (0.038, 0.024, 0.075))
@@ -74,7 +74,7 @@ def _arm(mesh: Mesh, side: int) -> None:
 
 def _head(mesh: Mesh) -> None:
     _ellipsoid(mesh, "skin", (0.015, 0, 1.625), (0.095, 0.078, 0.120))
-    _ellipsoid(mesh, "hair", (-0.012, 0, 1.665), (0.098, 0.086, 0.092))
+    _ellipsoid(mesh, "hair", (-0.016, 0, 1.668), (0.102, 0.087, 0.095))
     _ellipsoid(mesh, "skin", (0.112, 0, 1.610), (0.018, 0.013, 0.022))
     mesh.add_box("mouth", (0.085, -0.022, 1.560), (0.101, 0.022, 1.568))
     for side in (-1, 1):

@@ -14,10 +14,14 @@ Colour = tuple[float, float, float]
 
 
 def noise(rng: np.random.Generator, shape: tuple[int, int], sigma: tuple[float, float]) -> FloatArray:
-    """Smooth periodic noise of unit deviation, (H, W); `sigma` is the blur along rows and columns in pixels."""
+    """Smooth periodic noise of zero mean and unit deviation, (H, W).
+
+    `sigma` is the blur along rows and columns in pixels.
+    """
     frequencies = np.fft.fftfreq(shape[0])[:, None], np.fft.fftfreq(shape[1])[None, :]
     exponent = sum((2 * np.pi * f * s) ** 2 for f, s in zip(frequencies, sigma, strict=True)) / 2
     field = np.fft.ifft2(np.fft.fft2(rng.standard_normal(shape)) * np.exp(-exponent)).real
+    field -= field.mean()
     return np.asarray(field / (field.std() + 1e-12))
 
 
@@ -45,13 +49,13 @@ def cloth(rng: np.random.Generator, shape: tuple[int, int], colour: Colour, cont
     """Woven cloth: values (H, W, 3)."""
     rows, columns = np.indices(shape)
     weave = np.sin(rows * np.pi / 2) * np.sin(columns * np.pi / 2)
-    brightness = 1 + contrast * (0.5 * weave + 0.5 * noise(rng, shape, (0.8, 0.8)) + 0.6 * noise(rng, shape, (20, 20)))
+    brightness = 1 + contrast * (0.5 * weave + 0.5 * noise(rng, shape, (0.8, 0.8)) + 0.2 * noise(rng, shape, (20, 20)))
     return shaded(colour, brightness)
 
 
 def speckle(rng: np.random.Generator, shape: tuple[int, int], colour: Colour, contrast: float = 0.05) -> FloatArray:
     """Stone, plaster or concrete: values (H, W, 3)."""
-    brightness = 1 + contrast * (0.5 * noise(rng, shape, (1, 1)) + noise(rng, shape, (25, 25)))
+    brightness = 1 + contrast * (0.5 * noise(rng, shape, (1, 1)) + 0.5 * noise(rng, shape, (25, 25)))
     return shaded(colour, brightness)
 
 

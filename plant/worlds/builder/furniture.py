@@ -260,8 +260,8 @@ def plant(m: Materials, *, height: float, seed: int) -> Piece:
 def floor_lamp(m: Materials) -> Piece:
     """A standing lamp."""
     piece = Piece(m)
-    piece.solid_cylinder("charcoal", 0.14, (0, -0.18, 0), 0.03)
-    piece.solid_cylinder("charcoal", 0.015, (0, -0.18, 0.03), 1.35)
+    piece.solid_cylinder("charcoal", 0.14, (0, -0.18, 0), 0.06)
+    piece.solid_cylinder("charcoal", 0.015, (0, -0.18, 0.06), 1.32)
     piece.block_cylinder(0.18, (0, -0.18, 1.35), 0.28)
     piece.mesh.add_lathe("lamp", [(0.18, 1.35), (0.12, 1.63)], centre=(0, -0.18, 0))
     piece.mesh.add_lathe("lamp", [(0.12, 1.63), (0.0, 1.63)], centre=(0, -0.18, 0))

@@ -53,7 +53,7 @@ def materials() -> dict[str, Material]:
 
 
 COLOURS = {
-    "white": (0.93, 0.93, 0.92),
+    "white": (0.88, 0.88, 0.87),
     "cream": (0.90, 0.87, 0.80),
     "skirting": (0.96, 0.96, 0.95),
     "cap": (0.55, 0.55, 0.54),

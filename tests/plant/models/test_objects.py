@@ -1,0 +1,116 @@
+"""The loose things: they rest still, weigh what they should, and their files are those that the builder makes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.geometry import Box, Role
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from plant.models.builder import objects
+from plant.models.builder.__main__ import build
+from plant.models.builder.shapes import Cylinder, Part, mass_properties
+from plant.models.catalogue import MODELS_FOLDER, load_catalogue
+
+LOOSE = ("coke", "beer", "hammer", "cube")
+MASSES_KG = {"coke": 0.35, "beer": 0.55, "hammer": 0.55, "cube": 0.12}
+
+
+@pytest.fixture(scope="module")
+def poses() -> dict[str, list[RigidTransform]]:
+    """Each thing's pose on a table after 0.5 s and after 5.5 s, dropped from one millimetre."""
+    builder, catalogue = DiagramBuilder(), load_catalogue()
+    config = MultibodyPlantConfig(time_step=0.005, discrete_contact_approximation="sap")
+    plant, _ = AddMultibodyPlant(config, builder)
+    friction = CoulombFriction(0.8, 0.8)
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform([0.0, 0.0, 0.70]), Box(4, 4, 0.1), "table", friction
+    )
+    for index, name in enumerate(LOOSE):
+        Parser(plant).AddModels(str(catalogue[name].path()))
+        z = 0.75 + catalogue[name].rest_height_m + 0.001
+        X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, 0.4 + index), np.array([0.5 * index, 0.3, z]))
+        plant.SetDefaultFloatingBaseBodyPose(plant.GetBodyByName(name), X_WO)
+    plant.Finalize()
+    simulator = Simulator(builder.Build())
+    context = plant.GetMyContextFromRoot(simulator.get_context())
+    seen: dict[str, list[RigidTransform]] = {name: [] for name in LOOSE}
+    for time_s in (0.5, 5.5):
+        simulator.AdvanceTo(time_s)
+        for name in LOOSE:
+            seen[name].append(plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(name)))
+    return seen
+
+
+@pytest.mark.parametrize("name", LOOSE)
+def test_rests_still_on_a_table(name: str, poses: dict[str, list[RigidTransform]]) -> None:
+    early, late = poses[name]
+    assert np.linalg.norm(late.translation() - early.translation()) < 1e-3
+    assert np.degrees(early.InvertAndCompose(late).rotation().ToAngleAxis().angle()) < 0.1
+
+
+@pytest.mark.parametrize("name", LOOSE)
+def test_rests_at_the_height_that_the_catalogue_says(name: str, poses: dict[str, list[RigidTransform]]) -> None:
+    height = poses[name][1].translation()[2] - 0.75
+    assert height == pytest.approx(load_catalogue()[name].rest_height_m, abs=3e-4)
+    assert poses[name][1].rotation().matrix()[2, 2] > 0.9999
+
+
+@pytest.mark.parametrize("name", LOOSE)
+def test_has_its_mass_and_friction(name: str) -> None:
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(time_step=0.005), builder)
+    Parser(plant).AddModels(str(load_catalogue()[name].path()))
+    plant.Finalize()
+    body = plant.GetBodyByName(name)
+    assert body.default_mass() == pytest.approx(MASSES_KG[name])
+    inspector = scene_graph.model_inspector()
+    for geometry in plant.GetCollisionGeometriesForBody(body):
+        friction = inspector.GetProximityProperties(geometry).GetProperty("material", "coulomb_friction")
+        assert friction.dynamic_friction() == pytest.approx(0.8)
+    assert inspector.NumGeometriesWithRole(Role.kPerception) == 1
+
+
+def test_the_hammer_is_heavy_at_its_head() -> None:
+    hammer = objects.hammer()
+    assert hammer.mass is not None
+    assert hammer.mass.com[0] > 0.05
+
+
+def test_mass_properties_follow_the_parallel_axis_theorem() -> None:
+    rod = Cylinder(radius=0.01, length=0.2, p=(0, 0, 0.1))
+    other = Cylinder(radius=0.01, length=0.2, p=(0, 0, -0.1))
+    both, whole = Cylinder(radius=0.01, length=0.4), mass_properties([Part(rod, 1.0), Part(other, 1.0)])
+    np.testing.assert_allclose(whole.com, 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.diag(whole.inertia), 2.0 * np.array(both.unit_inertia()), rtol=1e-9)
+
+
+def test_mass_properties_without_mass_are_refused() -> None:
+    with pytest.raises(ValueError, match="no mass"):
+        mass_properties([Part(Cylinder(radius=0.01, length=0.2), 0.0)])
+
+
+def test_class_ids_are_distinct_and_leave_zero_to_nothing() -> None:
+    ids = [entry.id for entry in load_catalogue().values()]
+    assert len(set(ids)) == len(ids)
+    assert min(ids) > 0
+
+
+def test_a_class_without_a_model_says_so() -> None:
+    with pytest.raises(FileNotFoundError, match="no model file"):
+        load_catalogue()["wrench"].path()
+
+
+def test_committed_models_are_what_the_builder_writes(tmp_path: Path) -> None:
+    build(tmp_path)
+    written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl")]
+    assert len(written) == 15
+    for path in written:
+        committed = MODELS_FOLDER / path.relative_to(tmp_path)
+        assert committed.read_text(encoding="utf-8") == path.read_text(encoding="utf-8"), committed.name

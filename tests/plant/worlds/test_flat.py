@@ -1,0 +1,232 @@
+"""The flat is fit for the robot: doors, free poses, surfaces at their heights, maps that agree with the shapes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from pydrake.geometry import QueryObject
+from pydrake.multibody.parsing import LoadModelDirectives, Parser, ProcessModelDirectives
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+
+from plant.worlds.builder.__main__ import build
+from plant.worlds.builder.plan import DOORS
+from plant.worlds.placement import place_objects, place_people
+from plant.worlds.world import World, add_package, load_world
+
+FOOTPRINT_M = (1.1, 0.6)  # the standing outline of 1.0 by 0.5 with 5 cm around
+FREE, UNKNOWN, OCCUPIED = 254, 205, 0
+
+
+class Map:
+    """A map_server grid, read on its own here."""
+
+    def __init__(self, path: Path) -> None:
+        self.header: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
+        picture = cv2.imread(str(path.parent / self.header["image"]), cv2.IMREAD_GRAYSCALE)
+        assert picture is not None
+        self.cells = picture[::-1]
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        index = np.floor((points - self.header["origin"][:2]) / self.header["resolution"]).astype(int)
+        return self.cells[index[..., 1], index[..., 0]]
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return load_world("flat")
+
+
+@pytest.fixture(scope="module")
+def knowledge(world: World) -> dict[str, Any]:
+    return dict(yaml.safe_load(world.knowledge_path.read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module")
+def keepout(world: World) -> Map:
+    return Map(world.keepout_map_path)
+
+
+@pytest.fixture(scope="module")
+def furnished(world: World) -> tuple[Diagram, Context]:
+    """The flat with all things of seed 1 in Drake."""
+    builder = DiagramBuilder()
+    config = MultibodyPlantConfig(time_step=0.005, discrete_contact_approximation="sap")
+    plant, _ = AddMultibodyPlant(config, builder)
+    parser = Parser(plant)
+    add_package(parser.package_map())
+    ProcessModelDirectives(LoadModelDirectives(str(world.directives_path)), plant, parser)
+    for thing in place_objects(world, 1):
+        parser.AddModels(str(thing.model_path))
+        plant.SetDefaultFloatingBaseBodyPose(plant.GetBodyByName(thing.class_name), thing.X_WO)
+    for one in place_people(world, 1):
+        parser.AddModels(str(one.model_path))
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(one.class_name), one.X_WO)
+    plant.Finalize()
+    diagram = builder.Build()
+    return diagram, diagram.CreateDefaultContext()
+
+
+def query(diagram: Diagram, context: Context) -> QueryObject:
+    scene_graph = diagram.GetSubsystemByName("scene_graph")
+    return scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(context))
+
+
+def footprint(pose: dict[str, float], size: tuple[float, float] = FOOTPRINT_M) -> np.ndarray:
+    x, y = (np.arange(-length / 2, length / 2 + 1e-9, 0.0125) for length in size)
+    local = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    c, s = np.cos(pose["yaw"]), np.sin(pose["yaw"])
+    return local @ np.array([[c, s], [-s, c]]) + [pose["x"], pose["y"]]
+
+
+def known_poses(knowledge: dict[str, Any]) -> dict[str, dict[str, float]]:
+    poses = {"start": knowledge["start"], "dock": knowledge["dock"]}
+    poses |= {name: place["pose"] for name, place in knowledge["places"].items()}
+    for name, surface in knowledge["surfaces"].items():
+        poses |= {f"{name} {i}": pose for i, pose in enumerate(surface["viewpoints"])}
+    return poses
+
+
+def test_every_known_pose_is_free(knowledge: dict[str, Any], keepout: Map) -> None:
+    taken = [name for name, pose in known_poses(knowledge).items() if np.any(keepout.at(footprint(pose)) != FREE)]
+    assert taken == []
+
+
+def test_every_room_has_a_free_circle_to_turn_in(knowledge: dict[str, Any], keepout: Map) -> None:
+    radius = cv2.distanceTransform((keepout.cells == FREE).astype(np.uint8), cv2.DIST_L2, 5)
+    x = (np.arange(keepout.cells.shape[1]) + 0.5) * keepout.header["resolution"] + keepout.header["origin"][0]
+    y = (np.arange(keepout.cells.shape[0]) + 0.5) * keepout.header["resolution"] + keepout.header["origin"][1]
+    for name, place in knowledge["places"].items():
+        low, high = np.min(place["polygon"], axis=0), np.max(place["polygon"], axis=0)
+        window = np.ix_((y > low[1]) & (y < high[1]), (x > low[0]) & (x < high[0]))
+        assert 2 * radius[window].max() * keepout.header["resolution"] >= 1.5, name
+
+
+@pytest.mark.parametrize("door", DOORS, ids=lambda door: door.name)
+def test_every_door_is_ninety_centimetres_wide_and_free_on_both_sides(door: Any, keepout: Map) -> None:
+    across = np.array([0.0, 1.0]) if door.along_x else np.array([1.0, 0.0])
+    along = across[::-1]
+    middle = np.array([door.x, door.y])
+    line = middle + np.arange(-0.7, 0.7, 0.005)[:, None] * along
+    assert np.sum(keepout.at(line) == FREE) * 0.005 == pytest.approx(0.9, abs=0.03)
+    way = middle + np.arange(-1.05, 1.05, 0.01)[:, None, None] * across + np.arange(-0.43, 0.43, 0.01)[:, None] * along
+    assert np.all(keepout.at(way) == FREE)
+
+
+def test_rooms_hang_together(knowledge: dict[str, Any], keepout: Map) -> None:
+    resolution = keepout.header["resolution"]
+    passable = cv2.erode((keepout.cells == FREE).astype(np.uint8), np.ones((2 * int(0.3 / resolution) + 1,) * 2))
+    _, parts = cv2.connectedComponents(passable)
+    centres = np.array([(p["pose"]["x"], p["pose"]["y"]) for p in knowledge["places"].values()])
+    index = np.floor((centres - keepout.header["origin"][:2]) / resolution).astype(int)
+    labels = set(parts[index[:, 1], index[:, 0]])
+    assert len(labels) == 1
+    assert 0 not in labels
+
+
+def test_known_places_hold_their_poses_and_surfaces(knowledge: dict[str, Any]) -> None:
+    places = {name: np.array(place["polygon"], dtype=np.float32) for name, place in knowledge["places"].items()}
+    inside = [(name, (p["pose"]["x"], p["pose"]["y"])) for name, p in knowledge["places"].items()]
+    for surface in knowledge["surfaces"].values():
+        inside += [(surface["place"], tuple(corner)) for corner in surface["polygon"]]
+        inside += [(surface["place"], (v["x"], v["y"])) for v in surface["viewpoints"]]
+    for name, point in inside:
+        assert cv2.pointPolygonTest(places[name], point, False) >= 0, (name, point)
+
+
+def test_viewpoints_face_their_surface_from_the_right_distance(knowledge: dict[str, Any]) -> None:
+    for name, surface in knowledge["surfaces"].items():
+        polygon = np.array(surface["polygon"], dtype=np.float32)
+        for view in surface["viewpoints"]:
+            distance = -cv2.pointPolygonTest(polygon, (view["x"], view["y"]), True)
+            assert 0.85 <= distance <= 1.0, name
+            ahead = (
+                view["x"] + (distance + 0.1) * np.cos(view["yaw"]),
+                view["y"] + (distance + 0.1) * np.sin(view["yaw"]),
+            )
+            assert cv2.pointPolygonTest(polygon, ahead, False) > 0, name
+
+
+def test_surfaces_are_solid_and_flat_at_their_heights(
+    knowledge: dict[str, Any], furnished: tuple[Diagram, Context]
+) -> None:
+    query_object = query(*furnished)
+    things = [t.X_WO.translation() for t in place_objects(load_world("flat"), 1)]
+    for name, surface in knowledge["surfaces"].items():
+        low, high = np.min(surface["polygon"], axis=0), np.max(surface["polygon"], axis=0)
+        for x in np.linspace(low[0] + 0.03, high[0] - 0.03, 7):
+            for y in np.linspace(low[1] + 0.03, high[1] - 0.03, 4):
+                if any(np.hypot(x - t[0], y - t[1]) < 0.25 for t in things):
+                    continue
+                below = query_object.ComputeSignedDistanceToPoint(np.array([x, y, surface["height"] - 0.01]), 0.0)
+                assert below, (name, x, y)
+                above = query_object.ComputeSignedDistanceToPoint(np.array([x, y, surface["height"] + 0.01]), 0.005)
+                assert not above, (name, x, y)
+
+
+@pytest.mark.parametrize("name", ["scan", "keepout"])
+def test_maps_agree_with_the_collision_shapes(name: str, world: World, furnished: tuple[Diagram, Context]) -> None:
+    grid, query_object = Map(world.folder / "map" / f"{name}.yaml"), query(*furnished)
+    moving = [p.X_WO.translation()[:2] for p in (*place_objects(world, 1), *place_people(world, 1))]
+    rng, (z0, z1) = np.random.default_rng(5), grid.header["height_band_m"]
+    occupied = 0
+    for point in rng.uniform([0.0, 0.0], [12.0, 9.0], (400, 2)):
+        if min(np.linalg.norm(point - m) for m in moving) < 0.5:
+            continue
+        depth = min(distance_m(query_object, point, z) for z in np.arange(z0 + 0.01, z1, 0.03))
+        if depth < -0.015:
+            assert grid.at(point) == OCCUPIED, point
+            occupied += 1
+        elif depth > 0.015:
+            assert grid.at(point) == FREE, point
+    assert occupied > 10
+
+
+def distance_m(query_object: QueryObject, point: np.ndarray, z: float) -> float:
+    """Horizontal reach is enough: the nearest shape within 5 cm, else 1."""
+    found = query_object.ComputeSignedDistanceToPoint(np.array([*point, z]), 0.03)
+    return min((f.distance for f in found), default=1.0)
+
+
+def test_outside_of_the_walls_is_unknown(keepout: Map) -> None:
+    assert np.all(keepout.at(np.array([(-0.3, 4.0), (12.3, 4.0), (6.0, 9.3), (6.0, -0.3)])) == UNKNOWN)
+
+
+def test_the_living_room_table_is_for_the_body_and_not_for_the_lidar(world: World, keepout: Map) -> None:
+    middle = np.mean(world.surfaces["coffee table"].polygon_W, axis=0)
+    assert keepout.at(middle) == OCCUPIED
+    assert Map(world.scan_map_path).at(middle) == FREE
+
+
+def test_people_and_things_are_not_surveyed(world: World, keepout: Map) -> None:
+    for seed in range(10):
+        (robin,) = place_people(world, seed)
+        around = {"x": robin.X_WO.translation()[0], "y": robin.X_WO.translation()[1], "yaw": 0.0}
+        assert np.all(keepout.at(footprint(around, (1.4, 1.4))) == FREE)
+
+
+def test_things_stay_where_the_seed_put_them(world: World, furnished: tuple[Diagram, Context]) -> None:
+    diagram, context = furnished
+    simulator = Simulator(diagram, context.Clone())
+    simulator.AdvanceTo(1.0)
+    plant = diagram.GetSubsystemByName("plant")
+    now = plant.GetMyContextFromRoot(simulator.get_context())
+    for thing in place_objects(world, 1):
+        X_WO = plant.EvalBodyPoseInWorld(now, plant.GetBodyByName(thing.class_name))
+        moved = X_WO.translation() - thing.X_WO.translation()
+        assert np.linalg.norm(moved[:2]) < 1e-3
+        assert moved[2] == pytest.approx(-0.001, abs=5e-4)
+
+
+def test_committed_world_is_what_the_builder_writes(world: World, tmp_path: Path) -> None:
+    build(tmp_path)
+    written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl", ".yaml", ".pgm")]
+    assert len(written) > 70
+    for path in written:
+        assert (world.folder / path.relative_to(tmp_path)).read_bytes() == path.read_bytes(), path.name

@@ -1,0 +1,118 @@
+"""Where the seed puts things in the flat, for seeds 0 to 50."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+
+from plant.models.catalogue import load_catalogue
+from plant.worlds.placement import Placement, outline_W, place_objects, place_people, polygon_distance
+from plant.worlds.world import World, WorldError, load_world
+from skills.robot import Pose2D
+
+SEEDS = range(51)
+HOME = {"coke": "kitchen", "beer": "kitchen", "hammer": "workshop", "cube": "workshop"}
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return load_world("flat")
+
+
+@pytest.fixture(scope="module")
+def placed(world: World) -> dict[int, tuple[Placement, ...]]:
+    return {seed: place_objects(world, seed) for seed in SEEDS}
+
+
+def outline(placement: Placement) -> np.ndarray:
+    pose = Pose2D.from_transform(placement.X_WO)
+    return outline_W(load_catalogue()[placement.class_name], (pose.x_m, pose.y_m), pose.yaw_rad)
+
+
+def test_each_thing_lies_in_its_room(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+    for things in placed.values():
+        assert {t.name: world.surface_places[t.surface or ""] for t in things} == HOME
+
+
+def test_each_thing_starts_a_millimetre_above_its_surface(
+    world: World, placed: dict[int, tuple[Placement, ...]]
+) -> None:
+    for thing in itertools.chain(*placed.values()):
+        top = world.surfaces[thing.surface or ""].height_m
+        rest = load_catalogue()[thing.class_name].rest_height_m
+        assert thing.X_WO.translation()[2] - rest - top == pytest.approx(0.001)
+        assert thing.X_WO.rotation().matrix()[2, 2] == pytest.approx(1.0)
+
+
+def test_each_thing_lies_within_reach_of_a_front_edge(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+    for thing in itertools.chain(*placed.values()):
+        centre = thing.X_WO.translation()[:2]
+        depths = []
+        for a, b in np.array(world.seed_rules.fronts[thing.surface or ""]):
+            along = (b - a) / np.linalg.norm(b - a)
+            if 0 <= (centre - a) @ along <= np.linalg.norm(b - a):
+                depths.append(abs(along[0] * (centre - a)[1] - along[1] * (centre - a)[0]))
+        assert min(depths) >= 0.08 - 1e-9
+        assert min(depths) <= 0.25 + 1e-9
+
+
+def test_outlines_stay_on_the_surface(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+    for thing in itertools.chain(*placed.values()):
+        corners = np.array(world.surfaces[thing.surface or ""].polygon_W)
+        assert np.all(outline(thing) >= corners.min(axis=0))
+        assert np.all(outline(thing) <= corners.max(axis=0))
+
+
+def test_things_keep_clear_of_each_other_and_of_fixtures(
+    world: World, placed: dict[int, tuple[Placement, ...]]
+) -> None:
+    for things in placed.values():
+        outlines = [outline(thing) for thing in things]
+        pairs = list(itertools.combinations(outlines, 2))
+        pairs += [(o, np.array(p)) for o in outlines for p in world.seed_rules.keep_clear]
+        assert min(polygon_distance(a, b) for a, b in pairs) >= 0.12 - 1e-9
+
+
+def test_every_allowed_surface_is_used(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+    used = {(thing.name, thing.surface) for thing in itertools.chain(*placed.values())}
+    assert used == {(rule.name, surface) for rule in world.seed_rules.objects for surface in rule.surfaces}
+
+
+def test_poses_differ_between_seeds_and_not_within_one(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+    assert len({tuple(things[0].X_WO.translation()) for things in placed.values()}) == len(SEEDS)
+    for first, second in zip(placed[7], place_objects(world, 7), strict=True):
+        assert first.X_WO.IsExactlyEqualTo(second.X_WO)
+
+
+def test_the_person_stands_before_the_robot_and_looks_at_it(world: World) -> None:
+    start = np.array([world.start.x_m, world.start.y_m])
+    for seed in SEEDS:
+        (robin,) = place_people(world, seed)
+        offset = robin.X_WO.translation()[:2] - start
+        assert 0.9 <= np.linalg.norm(offset) <= 1.3
+        assert robin.X_WO.rotation().matrix()[:2, 0] @ offset / np.linalg.norm(offset) < -0.9
+        assert robin.X_WO.translation()[2] == 0.0
+
+
+def test_things_that_do_not_fit_are_refused(world: World) -> None:
+    crowded = world.seed_rules.model_copy(update={"objects": world.seed_rules.objects[:1] * 60})
+    with pytest.raises(WorldError, match="coke finds no free spot on kitchen"):
+        place_objects(dataclasses.replace(world, seed_rules=crowded), 1)
+
+
+def test_a_model_that_does_not_exist_is_refused(world: World) -> None:
+    rule = world.seed_rules.objects[0].model_copy(update={"model": "sofa"})
+    wrong = world.seed_rules.model_copy(update={"objects": (rule,)})
+    with pytest.raises(WorldError, match="no model 'sofa'; there are coke, beer"):
+        place_objects(dataclasses.replace(world, seed_rules=wrong), 1)
+
+
+def test_polygon_distance_is_zero_for_overlap_and_the_gap_otherwise() -> None:
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+    assert polygon_distance(square, square + [0.5, 0.5]) == 0.0
+    assert polygon_distance(square, square * 0.2 + 0.4) == 0.0
+    assert polygon_distance(square, square + [1.3, 0.2]) == pytest.approx(0.3)
+    assert polygon_distance(square, square + [1.3, 1.4]) == pytest.approx(0.5)

@@ -83,21 +83,28 @@ class CameraSpec(BaseModel):
 
 
 def load_cameras(path: Path) -> dict[str, CameraSpec]:
-    """Camera specs by name, in the file's order. Raises ValueError that names the file, the camera and the field."""
-    entries = yaml.safe_load(path.read_text(encoding="utf-8"))
-    if not isinstance(entries, dict):
-        raise ValueError(f"{path}: must be a mapping from camera names to their data")
-    return {name: _spec(path, name, entry) for name, entry in entries.items()}
+    """Camera specs by name, in the file's order. Raises ValueError that names file, line, camera and field."""
+    text = path.read_text(encoding="utf-8")
+    try:
+        entries, tree = yaml.safe_load(text), yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise ValueError(f"{path}:{line}: not valid YAML: {error.problem}") from error
+    if not isinstance(entries, dict) or tree is None:
+        raise ValueError(f"{path}:1: must be a mapping from camera names to their data")
+    places = {key.value: f"{path}:{key.start_mark.line + 1}" for key, _ in tree.value}
+    return {name: _spec(places[name], name, entry) for name, entry in entries.items()}
 
 
-def _spec(path: Path, name: str, entry: object) -> CameraSpec:
+def _spec(place: str, name: str, entry: object) -> CameraSpec:
+    """One camera's data, read at a place "file:line"."""
     if not isinstance(entry, dict):
-        raise ValueError(f"{path}: camera {name}: must be a mapping")
+        raise ValueError(f"{place}: camera {name}: must be a mapping")
     try:
         return CameraSpec(name=name, **entry)
     except ValidationError as error:
         first = error.errors()[0]
-        raise ValueError(f"{path}: camera {name}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        raise ValueError(f"{place}: camera {name}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
 
 
 def colour_render_camera(

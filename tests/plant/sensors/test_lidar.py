@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from pydrake.geometry import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Sphere
+from pydrake.geometry import Box, Capsule, Convex, Cylinder, Ellipsoid, HalfSpace, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
 from pydrake.multibody.tree import SpatialInertia
@@ -118,6 +118,16 @@ def test_floor_half_space_is_seen_by_the_lower_rings_only():
     scan = Scene([(HalfSpace(), RigidTransform())]).scan(RigidTransform([0, 0, 0.9]))
     np.testing.assert_allclose(scan.ranges_m[0], 0.9 / np.sin(np.radians(15)), rtol=1e-4)
     assert not np.isfinite(scan.ranges_m[8:]).any()
+
+
+def test_convex_mesh_is_seen_by_its_bounding_box(tmp_path):
+    corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-1, 1) for z in (-2, 2)]
+    faces = ["1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"]
+    path = tmp_path / "block.obj"
+    path.write_text("".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "".join(f"f {face}\n" for face in faces))
+    scan = Scene([(Convex(str(path)), RigidTransform([3, 0, 0]))]).scan()
+    assert scan.ranges_m[8, 900] == pytest.approx(2.5, abs=2e-3)
+    assert np.isfinite(scan.ranges_m[8]).sum() == pytest.approx(2 * np.degrees(np.arctan2(1, 2.5)) / 0.2, abs=2)
 
 
 def test_own_body_is_not_seen_and_a_moving_body_is():

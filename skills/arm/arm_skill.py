@@ -21,6 +21,7 @@ PICTURE_LATENCY_S = 0.1
 SETTLE_S = 0.15
 HAND_CAMERA = "hand"
 LINE_SPEED_RAD_S = 0.6
+JAW_FORCE_N = 20.0
 
 
 class ArmSkill(RoutineSkill[InputsT]):
@@ -98,9 +99,25 @@ class ArmSkill(RoutineSkill[InputsT]):
         """Move the hand straight by an offset in the body frame."""
         yield from self.move_straight(self.model.X_BH(self.q_rad()).translation() + offset_B, message)
 
+    @property
+    def open_rad(self) -> float:
+        """How far the jaw opens."""
+        gripper = self.context.robot.capabilities().gripper
+        assert gripper is not None
+        return gripper.open_rad
+
+    def clear_view(self, message: str) -> Routine[None]:
+        """Open an empty jaw, which else stands before the hand camera."""
+        gripper = self.context.robot.gripper()
+        if not gripper.holding and gripper.opening_rad < 0.9 * self.open_rad:
+            yield from self.move_gripper(0.98 * self.open_rad, JAW_FORCE_N, message)
+
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
-        """Fold the arm onto the body; nothing is done where it lies there already."""
+        """Close the jaw and fold the arm onto the body; nothing is done where it lies there already."""
         stowed = self.model.stowed_rad
+        gripper = self.context.robot.gripper()
+        if not gripper.holding and gripper.opening_rad > 0.05:
+            yield from self.move_gripper(0.0, JAW_FORCE_N, message)
         if np.max(np.abs(self.q_rad() - stowed)) > 0.05:
             yield from self.move_to(lambda scene, q: stowed, message)
 

@@ -43,12 +43,12 @@ _COMFORT = np.array([1.0, 1.0, 1.0, 2.0, 1.0, 1.0])
 
 
 def overview_stations(model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
-    """Camera places above the shoulder on the side of p_BT, high ones first; shift_rad turns them about the shoulder."""
+    """Camera places above the shoulder on p_BT's side, high ones first; shift_rad turns them about the shoulder."""
     direction = np.arctan2(p_BT[1] - model.p_BS[1], p_BT[0] - model.p_BS[0]) + shift_rad
     heading = np.array([np.cos(direction), np.sin(direction), 0.0])
     return [
         model.p_BS + radius * heading + height * _UP
-        for height, radius in itertools.product((0.55, 0.48, 0.4, 0.3), (0.4, 0.5, 0.32))
+        for height, radius in itertools.product((0.5, 0.44, 0.36), (0.22, 0.32, 0.42))
     ]
 
 
@@ -79,11 +79,11 @@ def carry_configuration(scene: ArmScene, R_BH: RotationMatrix, q_near_rad: Float
     raise PlanningError("no pose to carry the thing near the body is free of contact")
 
 
-_CARRY_PLACES = tuple(itertools.product((0.3, 0.35, 0.4, 0.45, 0.5), (0.26, 0.3, 0.35, 0.4, 0.46, 0.54)))
+_CARRY_PLACES = tuple(itertools.product((0.3, 0.35, 0.4, 0.45, 0.5), (0.26, 0.29, 0.32, 0.36, 0.41, 0.46, 0.54)))
 
 
 def _carry_cost(x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: FloatArray) -> float:
-    return abs(x_m - 0.36) + z_m + 0.04 * float(np.max(np.abs(q_rad - q_near_rad))) + 0.05 * abs(float(q_rad[0]))
+    return 3.0 * abs(x_m - 0.35) + z_m + 0.04 * float(np.max(np.abs(q_rad - q_near_rad))) + 0.05 * abs(float(q_rad[0]))
 
 
 def _turned(R_BH: RotationMatrix) -> list[RotationMatrix]:
@@ -98,5 +98,5 @@ def _turned(R_BH: RotationMatrix) -> list[RotationMatrix]:
 def _forward() -> list[RotationMatrix]:
     return [
         RollPitchYaw(roll, pitch, 0.0).ToRotationMatrix()
-        for roll, pitch in itertools.product((0.0, np.pi / 2, -np.pi / 2), (0.0, 0.4, 0.8))
+        for roll, pitch in itertools.product((0.0, np.pi), (0.0, 0.4, 0.8))
     ]

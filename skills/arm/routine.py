@@ -10,6 +10,7 @@ from skills.api import Cause, Failed, InputsT, Running, Skill, SkillContext, Ste
 from skills.robot import ArmTrajectory, CommandId, CommandState
 
 ResultT = TypeVar("ResultT")
+OtherT = TypeVar("OtherT")
 Routine = Generator[Running, None, ResultT]
 
 ARM_EXPIRY_MARGIN_S = 3.0
@@ -96,6 +97,18 @@ class RoutineSkill(Skill[InputsT]):
         until_s = context.clock.now() + GRIPPER_EXPIRY_S
         command = context.robot.set_gripper(opening_rad, force_n, until_s=until_s, lease=context.lease)
         yield from self.finish(self.issue(command), message, "the gripper")
+
+    def perform(self, skill: Skill[OtherT], inputs: OtherT) -> Routine[Succeeded]:
+        """Let another skill do its work as part of this one. Raises SkillFailure with its cause and message."""
+        skill.begin(inputs)
+        try:
+            while isinstance(step := skill.step(), Running):
+                yield step
+        finally:
+            skill.end()
+        if isinstance(step, Failed):
+            raise SkillFailure(step.cause, step.message)
+        return step
 
     def finish(self, command: CommandId, message: str, what: str) -> Routine[None]:
         """Wait until a command is done. Raises SkillFailure with cause EXECUTION when it was stopped or refused."""

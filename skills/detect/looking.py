@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Surface
@@ -16,12 +17,15 @@ from skills.robot import FloatArray
 
 NEAREST_M = 0.35
 FURTHEST_M = 3.2
-_HALF_VIEW_RAD = 0.4
+_HALF_WIDTH_RAD = 0.42
+_HALF_HEIGHT_RAD = 0.34
+_CAMERA_HEIGHT_M = 0.5
+_CAMERA_RADIUS_M = 0.22
 _BEARING_LIMIT_RAD = 2.3
 
 
 def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
-    """Points p_BT on a surface whose views cover what is seen of it from the shoulder, the middle one first.
+    """Points p_BT on a surface whose views cover what is seen of it from the shoulder, the middle ones first.
 
     Empty when nothing of it lies between NEAREST_M and FURTHEST_M and within the arm's turn.
     """
@@ -30,18 +34,30 @@ def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> li
     seen = (distance > NEAREST_M) & (distance < FURTHEST_M) & (np.abs(bearing) < _BEARING_LIMIT_RAD)
     if not np.any(seen):
         return []
-    low, high = float(bearing[seen].min()), float(bearing[seen].max())
-    count = max(1, int(np.ceil((high - low) / (2 * _HALF_VIEW_RAD))))
-    aims = low + (np.arange(count) + 0.5) * (high - low) / count
-    targets = []
-    for aim in sorted(aims, key=lambda a: abs(a - 0.5 * (low + high))):
-        column = seen & (np.abs(bearing - aim) <= 0.5 * (high - low) / count + 1e-9)
-        if np.any(column):
-            pitch = np.arctan2(0.45 - offsets[column, 2], distance[column])
-            middle = (0.45 - float(offsets[column, 2].mean())) / np.tan(0.5 * float(pitch.min() + pitch.max()))
-            reach = float(np.clip(middle, NEAREST_M, FURTHEST_M))
-            targets.append(p_BS + [reach * np.cos(aim), reach * np.sin(aim), float(offsets[column, 2].mean())])
-    return targets
+    height = float(offsets[:, 2].mean())
+    pitch = np.arctan2(_CAMERA_HEIGHT_M - height, np.maximum(distance - _CAMERA_RADIUS_M, 0.05))
+    aims = [
+        (aim, tilt)
+        for aim, column in _bins(bearing, seen, _HALF_WIDTH_RAD)
+        for tilt, _ in _bins(pitch, column, _HALF_HEIGHT_RAD)
+    ]
+    middle = float(np.median(bearing[seen]))
+    reaches = [_CAMERA_RADIUS_M + (_CAMERA_HEIGHT_M - height) / np.tan(tilt) for _, tilt in aims]
+    targets = [
+        (abs(aim - middle), p_BS + [reach * np.cos(aim), reach * np.sin(aim), height])
+        for (aim, _), reach in zip(aims, reaches, strict=True)
+    ]
+    return [target for _, target in sorted(targets, key=lambda entry: entry[0])]
+
+
+def _bins(values: FloatArray, among: NDArray[np.bool_], half_rad: float) -> list[tuple[float, NDArray[np.bool_]]]:
+    """Middles of the fewest angle ranges that cover the values chosen, each with the mask of its own."""
+    low, high = float(values[among].min()), float(values[among].max())
+    count = max(1, int(np.ceil((high - low) / (2 * half_rad))))
+    half = max(0.5 * (high - low) / count, 1e-6)
+    middles = [low + (2 * k + 1) * half for k in range(count)]
+    masks = [among & (np.abs(values - middle) <= half + 1e-9) for middle in middles]
+    return [(middle, mask) for middle, mask in zip(middles, masks, strict=True) if np.any(mask)]
 
 
 def _samples(surface: Surface, step_m: float = 0.1) -> FloatArray:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -23,15 +23,20 @@ from skills.robot import FloatArray, Image
 SEGMENTATION_LATENCY_S = 0.15
 _CONFIRM_SHIFT_RAD = 0.14
 _CONFIRM_DISTANCE_M = 0.08
+_EXPECTED_WITHIN_M = 0.35
 
 
 @dataclass(frozen=True)
 class DetectInputs:
-    """What to look for (any of `classes`, with all `attributes`) and on which surfaces."""
+    """What to look for (any of `classes`, with all `attributes`) and on which surfaces.
+
+    With `expected_W` only that place is looked at, and only what is within 0.35 m of it counts.
+    """
 
     classes: tuple[str, ...]
     surfaces: tuple[Surface, ...]
     attributes: tuple[str, ...] = ()
+    expected_W: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,7 @@ class Detect(ArmSkill[DetectInputs]):
         self.context.publish("object_to_detect", object_to_detect_message(self.context, inputs.classes))
         X_WB = self.X_WB()
         self.boxes = surface_boxes(inputs.surfaces, X_WB)
-        targets = [t for s in _by_distance(inputs.surfaces, X_WB) for t in look_targets(s, X_WB, self.model.p_BS)]
+        targets = self._targets(inputs, X_WB)
         if not targets:
             raise SkillFailure(Cause.PRECONDITION, f"{_names(inputs)} is out of sight from here")
         X_HC = hand_camera_in_hand((yield from self.picture("looking")))
@@ -75,6 +80,12 @@ class Detect(ArmSkill[DetectInputs]):
             yield Running(f"looking for {_wanted(inputs)}", (k + 1) / len(targets))
         yield from self.try_stow()
         raise SkillFailure(Cause.POSTCONDITION, f"no {_wanted(inputs)} seen on {_names(inputs)} from here")
+
+    def _targets(self, inputs: DetectInputs, X_WB: RigidTransform) -> list[FloatArray]:
+        """Points p_BT to look at, one after the other."""
+        if inputs.expected_W is not None:
+            return [X_WB.inverse() @ np.array(inputs.expected_W)]
+        return [t for s in _by_distance(inputs.surfaces, X_WB) for t in look_targets(s, X_WB, self.model.p_BS)]
 
     def _check(self, inputs: DetectInputs) -> None:
         """Raise SkillFailure with cause PRECONDITION for what cannot be looked for."""
@@ -91,7 +102,7 @@ class Detect(ArmSkill[DetectInputs]):
         self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray
     ) -> Routine[ObjectObservation | None]:
         first = yield from self.look(inputs, X_HC, p_BT, 0.0)
-        for sighting in first.sightings[:2]:
+        for sighting in _expected(first.sightings, inputs.expected_W)[:2]:
             seen = observation(sighting, first.image.stamp_s, inputs.attributes)
             p_BO = self.X_WB().inverse() @ np.array(seen.position_W)
             second = yield from self.look(inputs, X_HC, p_BO, _CONFIRM_SHIFT_RAD)
@@ -111,6 +122,7 @@ class Detect(ArmSkill[DetectInputs]):
             return look_configuration(scene, X_HC, overview_stations(self.model, p_BT, shift_rad), p_BT, q)
 
         yield from self.move_to(goal, message)
+        yield from self.clear_view(message)
         image = yield from self.picture(message)
         X_WO = self.context.localiser.estimate().X_WO
         look = yield from self.compute(
@@ -126,6 +138,14 @@ def _examine(inputs: DetectInputs, image: Image, X_WO: RigidTransform) -> Look:
     clusters = tuple(cluster for view in views for cluster in view.clusters)
     found = sightings(clusters, load_appearance(), inputs.classes, inputs.attributes)
     return Look(image, X_WO, views, tuple(found))
+
+
+def _expected(found: Sequence[Sighting], place_W: tuple[float, float, float] | None) -> list[Sighting]:
+    """The sightings near an expected place, the nearest first; all where none is expected."""
+    if place_W is None:
+        return list(found)
+    off = {id(s): float(np.linalg.norm(np.subtract(s.cluster.shape.centre, place_W[:2]))) for s in found}
+    return sorted((s for s in found if off[id(s)] < _EXPECTED_WITHIN_M), key=lambda s: off[id(s)])
 
 
 def _by_distance(surfaces: tuple[Surface, ...], X_WB: RigidTransform) -> list[Surface]:
@@ -145,7 +165,7 @@ def _names(inputs: DetectInputs) -> str:
     return " or ".join(f"the {surface.name}" for surface in inputs.surfaces)
 
 
-def _describe(seen: ObjectObservation) -> Any:
+def _describe(seen: ObjectObservation) -> str:
     x, y, z = seen.position_W
     place = f" on the {seen.surface}" if seen.surface else ""
     return f"a {seen.thing}{place} at ({x:.2f}, {y:.2f}, {z:.2f}), score {seen.score:.2f}"

@@ -48,7 +48,7 @@ class Target:
 
 @dataclass(frozen=True)
 class GraspCandidate:
-    """A hand pose about a thing, the width between the jaws there (m), what speaks against it, its tilt (rad, 0 level)."""
+    """A hand pose about a thing, the width between the jaws (m), what speaks against it, its tilt (rad, 0 level)."""
 
     X_BH: RigidTransform
     width_m: float
@@ -86,7 +86,7 @@ def grasp_candidates(target: Target, p_BS: FloatArray, jaw: JawGeometry | None =
 
 def _tilts(target: Target) -> Sequence[float]:
     """How far the fingers may point down, rad."""
-    degrees = (10.0, 0.0, 20.0, 32.0, 45.0) if target.upright else (90.0, 78.0, 66.0, 54.0)
+    degrees = (10.0, 0.0, 20.0, 32.0, 45.0) if target.upright else (90.0, 78.0, 66.0, 54.0, 44.0)
     return [float(np.radians(d)) for d in degrees]
 
 

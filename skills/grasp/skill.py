@@ -10,10 +10,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, ObjectObservation, Succeeded, Surface
-from skills.arm.arm_skill import ArmSkill, first_solution, hand_camera_in_hand
+from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
 from skills.arm.collision import ArmScene, Box
 from skills.arm.poses import carry_configuration, close_stations, look_configuration, overview_stations
-from skills.arm.routine import PlanningError, Routine, SkillFailure
+from skills.arm.routine import Routine, SkillFailure
 from skills.detect.appearance import load_appearance
 from skills.detect.interim_segmentation import Cluster, SurfaceView, sightings, view_surface
 from skills.detect.looking import cluster_boxes, surface_boxes
@@ -22,12 +22,12 @@ from skills.grasp.planning import LIFT_M, PREGRASP_M, GraspPlan, Surroundings, p
 from skills.robot import FloatArray, Image
 
 GRASP_FORCE_N = 60.0
-OPEN_FORCE_N = 20.0
 _LOOK_HALF_SIDE_M = 0.4
 _SAME_THING_M = 0.12
 _CLOSED_RAD = 0.06
 _SLIP_RAD = 0.12
 _PULL_BACK_M = 0.12
+_SURFACE_AROUND_M = 0.2
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Grasp(ArmSkill[GraspInputs]):
     name = "grasp"
     Inputs = GraspInputs
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "the thing is no longer where it was seen, the jaw holds something already, or there is no arm",
+        Cause.PRECONDITION: "the thing is not where it was seen, the jaw holds something already, or there is no arm",
         Cause.PLANNING: "no grasp is within reach and free",
         Cause.EXECUTION: "the arm or the jaw did not get to where it was sent",
         Cause.POSTCONDITION: "the jaw closed on nothing, or the thing slipped out",
@@ -89,6 +89,7 @@ class Grasp(ArmSkill[GraspInputs]):
             return look_configuration(scene, X_HC, stations, p_BT, q)
 
         yield from self.move_to(goal, message)
+        yield from self.clear_view(message)
         image = yield from self.picture(message)
         X_WO, X_WB = self.context.localiser.estimate().X_WO, self.X_WB()
         view = yield from self.compute(
@@ -104,8 +105,8 @@ class Grasp(ArmSkill[GraspInputs]):
         candidates = grasp_candidates(view.target, self.model.p_BS)
         if not candidates:
             raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the jaw")
-        opening = 0.9 * _open_rad(self)
-        yield from self.move_gripper(opening, OPEN_FORCE_N, "opening the jaw")
+        opening = 0.9 * self.open_rad
+        yield from self.move_gripper(opening, JAW_FORCE_N, "opening the jaw")
 
         def plan() -> GraspPlan:
             scene = self.prepared_scene()
@@ -163,21 +164,15 @@ class Grasp(ArmSkill[GraspInputs]):
                 continue
 
     def _open(self) -> Routine[None]:
-        yield from self.move_gripper(0.9 * _open_rad(self), OPEN_FORCE_N, "opening the jaw after the failure")
+        yield from self.move_gripper(0.9 * self.open_rad, JAW_FORCE_N, "opening the jaw after the failure")
 
     def _draw_back(self) -> Routine[None]:
         ahead = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
         yield from self.shift_hand(-PREGRASP_M * ahead, "drawing back after the failure")
-        yield from self.move_gripper(0.0, OPEN_FORCE_N, "closing the empty jaw")
+        yield from self.move_gripper(0.0, JAW_FORCE_N, "closing the empty jaw")
 
     def _up_B(self) -> FloatArray:
         return np.asarray(self.X_WB().rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
-
-
-def _open_rad(skill: Grasp) -> float:
-    gripper = skill.context.robot.capabilities().gripper
-    assert gripper is not None
-    return gripper.open_rad
 
 
 def _square(
@@ -198,14 +193,15 @@ def _examine(
         return None
     others = [each for each in view.clusters if each is not cluster]
     (target_box,) = cluster_boxes([cluster], X_WB)
-    boxes = (*surface_boxes([_seen_surface(view, surface)], X_WB), *cluster_boxes(others, X_WB))
+    boxes = (*surface_boxes([_seen_surface(view, surface, cluster.shape.centre)], X_WB), *cluster_boxes(others, X_WB))
     return CloseView(_target(cluster, X_WB), boxes, target_box, X_WB)
 
 
-def _seen_surface(view: SurfaceView, surface: Surface) -> Surface:
-    """The surface as far as its own points show it."""
+def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:
+    """The surface as far as its own points show it, and the same all around the thing, since its edge may be unseen."""
     xy = view.plane_points.p_W[:, :2]
     low, high = np.percentile(xy, [0.2, 99.8], axis=0)
+    low, high = np.minimum(low, np.array(centre) - _SURFACE_AROUND_M), np.maximum(high, np.array(centre) + _SURFACE_AROUND_M)
     corners = ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
     return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), view.plane.height_m)
 

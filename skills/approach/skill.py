@@ -1,0 +1,118 @@
+"""The approach skill: stand where the thing seen can be grasped, then look at it again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import Cause, ObjectObservation, Running, Succeeded, Surface
+from skills.approach.standing import Standing, is_comfortable, standing_poses
+from skills.arm.arm_skill import ArmSkill
+from skills.arm.kinematics import ArmModel
+from skills.arm.routine import Routine, SkillFailure
+from skills.detect.skill import Detect, DetectInputs
+from skills.grasp.candidates import Target, grasp_candidates
+from skills.grasp.planning import PREGRASP_M
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.robot import Pose2D
+
+POSITION_TOLERANCE_M = 0.06
+YAW_TOLERANCE_RAD = 0.08
+SPEED_M_S = 0.5
+_MOST_TRIES = 3
+
+
+@dataclass(frozen=True)
+class ApproachInputs:
+    """The thing as it was seen, and the surfaces around (at least the one that it lies on)."""
+
+    observation: ObjectObservation
+    surfaces: tuple[Surface, ...]
+
+
+class Approach(ArmSkill[ApproachInputs]):
+    """Drives with the arm stowed, at low speed; the observation that comes out is fresh."""
+
+    name = "approach"
+    Inputs = ApproachInputs
+    outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PLANNING: "no free place to stand is near enough to the thing, or no way leads there",
+        Cause.EXECUTION: "the robot did not get to where it should stand",
+        Cause.POSTCONDITION: "the thing is not seen again from there",
+    }
+    default_timeout_s = 150.0
+
+    def run(self, inputs: ApproachInputs) -> Routine[Succeeded]:
+        """Choose a place, go, look again."""
+        seen = inputs.observation
+        point_W = (seen.position_W[0], seen.position_W[1])
+        if not (is_comfortable(self.context.pose(), point_W) and self._reachable(seen)(self.context.pose())):
+            places = yield from self.compute(
+                lambda: self._places(seen), latency_s=0.2, name="choose a place", message="choosing where to stand"
+            )
+            if not places:
+                raise SkillFailure(Cause.PLANNING, f"there is no free place to stand from which the {seen.thing} is within reach")
+            yield from self.stow()
+            yield from self.go_to_one([place.pose for place in places[:_MOST_TRIES]])
+        return (yield from self._look_again(inputs))
+
+    def go_to_one(self, poses: list[Pose2D]) -> Routine[None]:
+        """Drive to the first of some poses to which there is a way."""
+        for k, pose in enumerate(poses):
+            goal = NavigateInputs(pose, POSITION_TOLERANCE_M, YAW_TOLERANCE_RAD, SPEED_M_S)
+            try:
+                yield from self.perform(Navigate(self.context), goal)
+                return
+            except SkillFailure as failure:
+                if k + 1 == len(poses) or failure.cause is not Cause.PLANNING:
+                    raise
+            yield Running("choosing another place to stand")
+
+    def _look_again(self, inputs: ApproachInputs) -> Routine[Succeeded]:
+        seen = inputs.observation
+        surfaces = tuple(s for s in inputs.surfaces if s.name == seen.surface) or inputs.surfaces
+        again = DetectInputs((seen.thing.name,), surfaces, seen.thing.attributes, seen.position_W)
+        found = yield from self.perform(Detect(self.context), again)
+        return Succeeded(f"standing before the {seen.thing}", found.outputs)
+
+    def _places(self, seen: ObjectObservation) -> list[Standing]:
+        context = self.context
+        point_W = (seen.position_W[0], seen.position_W[1])
+        return standing_poses(
+            point_W, context.pose(), context.costmap, context.robot.capabilities(), self._reachable(seen)
+        )
+
+    def _reachable(self, seen: ObjectObservation) -> Callable[[Pose2D], bool]:
+        model, height_m = self.model, float(self.X_WB().translation()[2])
+        return lambda pose: grasp_reachable(model, pose.transform(height_m), seen)
+
+
+def grasp_reachable(model: ArmModel, X_WB: RigidTransform, seen: ObjectObservation) -> bool:
+    """Whether the arm reaches some grasp of a thing, and its pre-grasp, with the body at X_WB."""
+    target = observed_target(seen, X_WB)
+    for candidate in grasp_candidates(target, model.p_BS):
+        if model.inverse(candidate.X_BH, 0.08) and model.inverse(candidate.retreated(PREGRASP_M), 0.08):
+            return True
+    return False
+
+
+def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
+    """An observation as a grasp target: its box filled with points."""
+    length, width, height = seen.size_m
+    X_BW = X_WB.inverse()
+    base_m = float((X_BW @ np.array(seen.position_W))[2]) - 0.5 * height
+    turn = RigidTransform(X_BW.rotation())
+    axis = turn @ np.array([np.cos(seen.yaw_rad), np.sin(seen.yaw_rad), 0.0])
+    yaw = float(np.arctan2(axis[1], axis[0]))
+    grid = np.stack(np.meshgrid(np.linspace(-0.5, 0.5, 9), np.linspace(-0.5, 0.5, 5)), axis=-1).reshape(-1, 2)
+    along = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    centre = (X_BW @ np.array(seen.position_W))[:2]
+    xy = centre + (grid * [length, min(width, 0.06)]) @ along
+    points = np.column_stack([xy, np.full(len(xy), base_m + height)])
+    is_round = height > 0.075 and length < 1.2 * width
+    return Target(points, (float(centre[0]), float(centre[1])), yaw, length, width, height, base_m, is_round)

@@ -1,0 +1,60 @@
+"""Standing poses from which a point on a surface is within the arm's reach."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from skills.api import Costmap
+from skills.navigate.footprint import Footprint, footprint_clear
+from skills.robot import Capabilities, Pose2D
+
+DISTANCES_M = (0.90, 0.95, 0.86, 1.0, 0.82, 1.06)
+BEARINGS = 24
+COMFORTABLE_M = (0.80, 1.02)
+COMFORTABLE_BEARING_RAD = 0.35
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A pose of the body and what speaks against it."""
+
+    pose: Pose2D
+    cost: float
+
+
+def is_comfortable(pose: Pose2D, point_W: tuple[float, float]) -> bool:
+    """Whether the point lies before the robot at a good distance already."""
+    dx, dy = point_W[0] - pose.x_m, point_W[1] - pose.y_m
+    bearing = (math.atan2(dy, dx) - pose.yaw_rad + math.pi) % (2 * math.pi) - math.pi
+    return COMFORTABLE_M[0] <= math.hypot(dx, dy) <= COMFORTABLE_M[1] and abs(bearing) < COMFORTABLE_BEARING_RAD
+
+
+def standing_poses(
+    point_W: tuple[float, float],
+    here: Pose2D,
+    costmap: Costmap,
+    capabilities: Capabilities,
+    reachable: Callable[[Pose2D], bool],
+) -> list[Standing]:
+    """Free poses around point_W that face it and from which it is `reachable`, the best first."""
+    footprint = Footprint.of(capabilities)
+    found = []
+    for k, distance in itertools.product(range(BEARINGS), DISTANCES_M):
+        yaw = 2 * math.pi * k / BEARINGS
+        pose = Pose2D(point_W[0] - distance * math.cos(yaw), point_W[1] - distance * math.sin(yaw), yaw)
+        if footprint_clear(costmap, footprint, pose):
+            found.append(Standing(pose, _cost(pose, here, distance)))
+    found.sort(key=lambda standing: standing.cost)
+    return list(itertools.islice((each for each in found if reachable(each.pose)), 5))
+
+
+def _cost(pose: Pose2D, here: Pose2D, distance_m: float) -> float:
+    """Metres to go, turning, and how far the distance is from the best."""
+    turn = abs((pose.yaw_rad - here.yaw_rad + math.pi) % (2 * math.pi) - math.pi)
+    way = float(np.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
+    return way + 0.3 * turn + 4.0 * abs(distance_m - DISTANCES_M[0])

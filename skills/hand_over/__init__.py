@@ -1,0 +1,1 @@
+"""Holding a thing out to a person."""

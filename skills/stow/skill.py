@@ -1,0 +1,48 @@
+"""The stow skill: the arm folded onto the body, or, with a thing in the jaw, the thing held near the body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from skills.api import Cause, Succeeded
+from skills.arm.arm_skill import ArmSkill
+from skills.arm.poses import carry_configuration
+from skills.arm.routine import Routine
+
+_NEAR_BODY_X_M = 0.55
+_NEAR_BODY_Z_M = 0.6
+
+
+@dataclass(frozen=True)
+class StowInputs:
+    """Nothing is needed."""
+
+
+class Stow(ArmSkill[StowInputs]):
+    """Leaves the arm where it is when it is near the body already."""
+
+    name = "stow"
+    Inputs = StowInputs
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PLANNING: "the arm finds no free way",
+        Cause.EXECUTION: "the arm did not get there",
+    }
+    default_timeout_s = 30.0
+
+    def run(self, inputs: StowInputs) -> Routine[Succeeded]:
+        """Stow, or carry."""
+        if not self.context.robot.gripper().holding:
+            yield from self.stow()
+            return Succeeded("the arm is stowed")
+        X_BH = self.model.X_BH(self.q_rad())
+        p_BH = X_BH.translation()
+        if p_BH[0] > _NEAR_BODY_X_M or p_BH[2] > _NEAR_BODY_Z_M or np.abs(p_BH[1]) > 0.3:
+            rotation = X_BH.rotation()
+            yield from self.move_to(
+                lambda scene, q: carry_configuration(scene, rotation, q), "drawing in the arm", speed_rad_s=0.9
+            )
+        return Succeeded("the thing is held near the body")

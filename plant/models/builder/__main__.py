@@ -29,7 +29,7 @@ def write_model(folder: Path, model: Model, looks: Looks) -> None:
     """Write SDF, OBJ, material file and pictures of one model."""
     write_text(folder / f"{model.name}.sdf", model_sdf(model))
     write_text(folder / f"{model.name}.obj", obj_text(looks.mesh, f"{model.name}.mtl"))
-    write_text(folder / f"{model.name}.mtl", mtl_text(looks.mesh.materials, "palette.png"))
+    write_text(folder / f"{model.name}.mtl", mtl_text(looks.mesh, "palette.png"))
     for name, picture in looks.pictures.items():
         write_png(folder / name, picture)
     if plain_colours(looks.mesh.materials):

@@ -227,10 +227,12 @@ def palette_picture(materials: Mapping[str, Material], cell: int = 4) -> NDArray
     return cells.repeat(cell, axis=0).repeat(cell, axis=1)
 
 
-def mtl_text(materials: Mapping[str, Material], palette_file: str, shared_texture: str = "palette") -> str:
-    """The material file for meshes written by `obj_text`."""
-    entries = {name: m for name, m in sorted(materials.items()) if m.texture is not None}
-    entries[shared_texture] = Material(texture=palette_file)
+def mtl_text(mesh: Mesh, palette_file: str, shared_texture: str = "palette") -> str:
+    """The material file for a mesh written by `obj_text`: only what it uses, since viewers load every texture."""
+    used = {name: mesh.materials[name] for name, *_ in mesh.groups()}
+    entries = {name: material for name, material in used.items() if material.texture is not None}
+    if len(entries) < len(used):
+        entries[shared_texture] = Material(texture=palette_file)
     return "".join(_mtl_entry(name, material) for name, material in entries.items())
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from plant.models.builder.mesh import mtl_text, obj_text, palette_picture, write_text
+from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, write_text
 from plant.models.builder.pictures import write_png
 from plant.models.builder.sdf import Model, model_sdf
 from plant.worlds.builder.layout import Placed, layout
@@ -24,18 +24,20 @@ def build(folder: Path) -> None:
     for name, picture in pictures().items():
         write_png(folder / "furniture" / name, picture)
     write_png(folder / "furniture" / "palette.png", palette_picture(palette))
-    write_text(folder / "furniture" / "flat.mtl", mtl_text(palette, "palette.png"))
-    _write_model(folder, Model("shell", "shell.obj", shell_collisions(), comment="floor and walls"))
-    write_text(folder / "furniture" / "shell.obj", obj_text(shell_mesh(palette), "flat.mtl"))
+    _write_model(
+        folder, Model("shell", "shell.obj", shell_collisions(), comment="floor and walls"), shell_mesh(palette)
+    )
     for placed in pieces:
-        _write_model(folder, Model(placed.name, f"{placed.name}.obj", placed.piece.collisions))
-        write_text(folder / "furniture" / f"{placed.name}.obj", obj_text(placed.piece.mesh, "flat.mtl"))
+        _write_model(folder, Model(placed.name, f"{placed.name}.obj", placed.piece.collisions), placed.piece.mesh)
     write_text(folder / "world.dmd.yaml", _directives(pieces))
     _write_maps(folder, pieces)
 
 
-def _write_model(folder: Path, model: Model) -> None:
-    write_text(folder / "furniture" / f"{model.name}.sdf", model_sdf(model))
+def _write_model(folder: Path, model: Model, mesh: Mesh) -> None:
+    base = folder / "furniture" / model.name
+    write_text(base.with_suffix(".sdf"), model_sdf(model))
+    write_text(base.with_suffix(".obj"), obj_text(mesh, f"{model.name}.mtl"))
+    write_text(base.with_suffix(".mtl"), mtl_text(mesh, "palette.png"))
 
 
 def _directives(pieces: list[Placed]) -> str:

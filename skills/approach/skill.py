@@ -56,7 +56,9 @@ class Approach(ArmSkill[ApproachInputs]):
                 lambda: self._places(seen), latency_s=0.2, name="choose a place", message="choosing where to stand"
             )
             if not places:
-                raise SkillFailure(Cause.PLANNING, f"there is no free place to stand from which the {seen.thing} is within reach")
+                raise SkillFailure(
+                    Cause.PLANNING, f"there is no free place to stand from which the {seen.thing} is within reach"
+                )
             yield from self.stow()
             yield from self.go_to_one([place.pose for place in places[:_MOST_TRIES]])
         return (yield from self._look_again(inputs))

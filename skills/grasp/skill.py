@@ -201,7 +201,10 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
     """The surface as far as its own points show it, and the same all around the thing, since its edge may be unseen."""
     xy = view.plane_points.p_W[:, :2]
     low, high = np.percentile(xy, [0.2, 99.8], axis=0)
-    low, high = np.minimum(low, np.array(centre) - _SURFACE_AROUND_M), np.maximum(high, np.array(centre) + _SURFACE_AROUND_M)
+    low, high = (
+        np.minimum(low, np.array(centre) - _SURFACE_AROUND_M),
+        np.maximum(high, np.array(centre) + _SURFACE_AROUND_M),
+    )
     corners = ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
     return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), view.plane.height_m)
 

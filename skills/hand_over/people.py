@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.robot import FloatArray, Scan
@@ -48,7 +49,7 @@ def people_in_scan(scan: Scan, furthest_m: float = 3.5) -> list[SeenPerson]:
     return sorted((p for p in people if p.distance_m < furthest_m), key=lambda person: person.distance_m)
 
 
-def _own(points_B: FloatArray) -> FloatArray:
+def _own(points_B: FloatArray) -> NDArray[np.bool_]:
     """Points of the robot's own arm and what it holds."""
     return np.asarray((np.abs(points_B[:, 1]) < 0.3) & (points_B[:, 0] > -0.6) & (points_B[:, 0] < 0.75))
 
@@ -69,7 +70,8 @@ def _clusters(points_B: FloatArray) -> list[FloatArray]:
 def _person_sized(points_B: FloatArray) -> bool:
     spans = np.ptp(points_B[:, :2] - points_B[:, :2].mean(axis=0), axis=0)
     width = float(np.hypot(*spans))
-    return len(points_B) >= _FEWEST_POINTS and _WIDTH_M[0] < width < _WIDTH_M[1] and np.ptp(points_B[:, 2]) > 0.1
+    tall = float(np.ptp(points_B[:, 2])) > 0.1
+    return len(points_B) >= _FEWEST_POINTS and _WIDTH_M[0] < width < _WIDTH_M[1] and tall
 
 
 def _alone(points_B: FloatArray, others: list[FloatArray]) -> bool:

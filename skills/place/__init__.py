@@ -1,0 +1,1 @@
+"""Putting a held thing down on a surface."""

@@ -1,0 +1,44 @@
+"""Free spots on a surface: seen to be flat and empty, away from the edges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from skills.api import Surface
+from skills.detect.interim_segmentation import SurfaceView
+from skills.detect.points import inside_polygon
+from skills.robot import FloatArray
+
+CLEARANCE_M = 0.12
+EDGE_M = 0.09
+_GRID_M = 0.04
+
+
+def spots(surface: Surface) -> FloatArray:
+    """Points (N, 2) of a surface at least EDGE_M from its edges, or its middle when it is small."""
+    corners = np.asarray(surface.polygon_W, dtype=float)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    axes = np.meshgrid(np.arange(low[0], high[0], _GRID_M), np.arange(low[1], high[1], _GRID_M))
+    grid = np.stack(axes, axis=-1).reshape(-1, 2)
+    kept = grid[inside_polygon(grid, surface.polygon_W, -EDGE_M)]
+    return kept if len(kept) else np.asarray([corners.mean(axis=0)])
+
+
+def free_spots(view: SurfaceView, candidates: FloatArray, avoid_W: Sequence[FloatArray] = ()) -> FloatArray:
+    """Candidates (N, 2) around which the surface is seen, with nothing on it within CLEARANCE_M.
+
+    `avoid_W` holds more points (M, 2) of things that stand there.
+    """
+    if len(candidates) == 0 or len(view.plane_points) == 0:
+        return np.empty((0, 2))
+    seen = cKDTree(view.plane_points.p_W[:, :2])
+    around = np.array([len(found) for found in seen.query_ball_point(candidates, 0.04)])
+    things = [cluster.points.p_W[:, :2] for cluster in view.clusters] + list(avoid_W)
+    free = around > 15
+    if things:
+        distance, _ = cKDTree(np.concatenate(things)).query(candidates)
+        free &= distance > CLEARANCE_M
+    return candidates[free]

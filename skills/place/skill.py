@@ -1,0 +1,233 @@
+"""The place skill: find a free spot on a surface, lower the thing until it stands, let go, look whether it is there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from skills.api import Cause, Succeeded, Surface
+from skills.approach.standing import COMFORTABLE_M, standing_poses
+from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
+from skills.arm.collision import ArmScene
+from skills.arm.motion import plan_line, time_path
+from skills.arm.poses import look_configuration, overview_stations
+from skills.arm.routine import PlanningError, Routine, SkillFailure
+from skills.detect.interim_segmentation import SurfaceView, view_surface
+from skills.detect.looking import cluster_boxes, surface_boxes
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.place.free_spot import free_spots, spots
+from skills.robot import FloatArray, Pose2D
+
+HAND_TO_THING_M = 0.185
+ABOVE_M = 0.22
+_LOWEST_M = 0.02
+_STEP_M = 0.006
+_STEP_S = 0.2
+_CONTACT_M = 0.005
+_SEEN_AGAIN_M = 0.12
+
+
+@dataclass(frozen=True)
+class PlaceInputs:
+    """Where to put the thing down."""
+
+    surface: Surface
+
+
+class Place(ArmSkill[PlaceInputs]):
+    """Goes nearer when no spot is within reach. Ends with the jaw empty and the arm stowed."""
+
+    name = "place"
+    Inputs = PlaceInputs
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "nothing is held",
+        Cause.PLANNING: "no free spot is seen within reach, or the arm finds no way to it",
+        Cause.EXECUTION: "the robot or its arm did not get there",
+        Cause.POSTCONDITION: "the thing is not seen where it was put down, or is still in the jaw",
+    }
+    default_timeout_s = 150.0
+
+    def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
+        """Go near, look, put down, look again."""
+        surface = inputs.surface
+        if not self.context.robot.gripper().holding:
+            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the jaw to put down")
+        carried = self.model.X_BH(self.q_rad()).rotation()
+        yield from self._go_near(surface)
+        view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
+        yield from self._go_above(surface, view, carried)
+        spot_W = self._below_hand_W()
+        yield from self._lower(surface)
+        yield from self._let_go()
+        yield from self._check(surface, spot_W)
+        yield from self.stow()
+        return Succeeded(f"put the thing down on the {surface.name}")
+
+    def _go_near(self, surface: Surface) -> Routine[None]:
+        """Drive nearer when the surface is out of the arm's reach."""
+        spot = _nearest_spot(surface, self.X_WB())
+        pose = self.context.pose()
+        offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
+        bearing = (math.atan2(offset[1], offset[0]) - pose.yaw_rad + math.pi) % (2 * math.pi) - math.pi
+        if np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6:
+            return
+        context = self.context
+        places = standing_poses((spot[0], spot[1]), pose, context.costmap, context.robot.capabilities(), lambda _: True)
+        if not places:
+            raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
+        yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))
+
+    def _look(self, surface: Surface, spot_W: FloatArray) -> Routine[SurfaceView]:
+        """A picture of the surface; the thing in the jaw hides its lower half, so the camera looks low."""
+        message = f"looking for a free spot on the {surface.name}"
+        X_WB = self.X_WB()
+        self.boxes = surface_boxes([surface], X_WB)
+        X_HC = hand_camera_in_hand((yield from self.picture(message)))
+        p_BT = X_WB.inverse() @ np.array([spot_W[0], spot_W[1], surface.height_m])
+        low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
+
+        def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
+            return look_configuration(scene, X_HC, overview_stations(self.model, low_BT), low_BT, q)
+
+        yield from self.move_to(goal, message, speed_rad_s=0.9)
+        yield from self.clear_view(message)
+        image = yield from self.picture(message)
+        X_WO = self.context.localiser.estimate().X_WO
+        view = yield from self.compute(
+            lambda: view_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
+        )
+        if view is None:
+            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
+        return view
+
+    def _go_above(self, surface: Surface, view: SurfaceView, carried: RotationMatrix) -> Routine[None]:
+        """Bring the thing above the best free spot."""
+        X_WB = self.X_WB()
+        free = free_spots(view, spots(surface))
+        if len(free) == 0:
+            raise SkillFailure(Cause.PLANNING, f"no free spot is seen on the {surface.name}")
+        X_BW = X_WB.inverse()
+        tops = [X_BW @ np.array([x, y, view.plane.height_m + ABOVE_M]) for x, y in _by_distance(free, X_WB)]
+        self.boxes = [*surface_boxes([surface], X_WB), *cluster_boxes(view.clusters, X_WB)]
+        goal = above_goal(tops, carried)
+        yield from self.move_to(goal, f"bringing the thing over the {surface.name}", speed_rad_s=0.8)
+
+    def _lower(self, surface: Surface) -> Routine[None]:
+        """Go down in small steps until the arm is held up, by contact, or the height is that of the surface."""
+        message = f"putting the thing down on the {surface.name}"
+        q_wanted = self.q_rad()
+        X_BH = self.model.X_BH(q_wanted)
+        rest_m = float(X_BH.translation()[2]) - self._hand_z()
+        lowest_m = surface.height_m + _LOWEST_M - float(self.X_WB().translation()[2])
+        while self._below_hand_m() > lowest_m:
+            X_BH = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, _STEP_M])
+            try:
+                path = plan_line(self.model, q_wanted, X_BH)
+            except PlanningError as error:
+                raise SkillFailure(Cause.PLANNING, str(error)) from error
+            q_wanted = path[-1]
+            yield from self.follow(time_path(path, speed_rad_s=0.3), message)
+            if self._hand_z() - float(X_BH.translation()[2]) + rest_m > _CONTACT_M:
+                return
+
+    def _let_go(self) -> Routine[None]:
+        """Open, and draw the hand back along its fingers."""
+        yield from self.move_gripper(0.75 * self.open_rad, JAW_FORCE_N, "letting go")
+        yield from self.pause(0.3, "letting go")
+        fingers = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
+        try:
+            yield from self.shift_hand(-0.16 * fingers, "drawing the hand back")
+        except SkillFailure as failure:
+            if failure.cause is not Cause.PLANNING:
+                raise
+            yield from self.shift_hand(-0.08 * fingers, "drawing the hand back")
+
+    def _check(self, surface: Surface, spot_W: FloatArray) -> Routine[None]:
+        """Raise SkillFailure with cause POSTCONDITION unless something stands where the thing was put."""
+        if self.context.robot.gripper().holding:
+            raise SkillFailure(Cause.POSTCONDITION, "the thing is still in the jaw")
+        self.boxes = surface_boxes([surface], self.X_WB())
+        view = yield from self._look(surface, spot_W)
+        off = [float(np.min(np.linalg.norm(c.points.p_W[:, :2] - spot_W, axis=1))) for c in view.clusters]
+        if not off or min(off) > _SEEN_AGAIN_M:
+            yield from self.try_stow()
+            raise SkillFailure(
+                Cause.POSTCONDITION, f"the thing is not seen on the {surface.name} where it was put down"
+            )
+
+    def _hand_z(self) -> float:
+        return float(self.model.X_BH(self.q_rad()).translation()[2])
+
+    def _below_hand_m(self) -> float:
+        """Height in B of the thing's middle as it is held."""
+        return float((self.model.X_BH(self.q_rad()) @ np.array([HAND_TO_THING_M, 0.0, 0.0]))[2])
+
+    def _below_hand_W(self) -> FloatArray:
+        p_BT = self.model.X_BH(self.q_rad()) @ np.array([HAND_TO_THING_M, 0.0, 0.0])
+        return np.asarray((self.X_WB() @ p_BT)[:2])
+
+
+def above_goal(tops_B: list[FloatArray], carried: RotationMatrix) -> Callable[[ArmScene, FloatArray], FloatArray]:
+    """A goal with the thing above the first of some points that the arm can reach, tilted as fits how it is held.
+
+    A thing taken from the side (jaw closing level) keeps its tilt; one taken from above is held below the hand again.
+    """
+    side = abs(carried.matrix()[2, 2]) < 0.5
+
+    def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
+        for p_BT in tops_B:
+            azimuth = math.atan2(p_BT[1] - scene.model.p_BS[1], p_BT[0] - scene.model.p_BS[0])
+            for rotation in _side(carried, azimuth) if side else _from_above(azimuth):
+                offset = rotation.matrix() @ np.array([HAND_TO_THING_M if side else 0.22, 0.0, 0.0])
+                for q_above in scene.model.inverse(RigidTransform(rotation, p_BT - offset), margin_rad=0.05):
+                    if scene.free(q_above) and _can_lower(scene, q_above):
+                        return q_above
+        raise PlanningError("no free spot is within the arm's reach")
+
+    return goal
+
+
+def _can_lower(scene: ArmScene, q_rad: FloatArray) -> bool:
+    X_BH = scene.model.X_BH(q_rad)
+    lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M - 0.03])
+    try:
+        plan_line(scene.model, q_rad, lowered)
+    except PlanningError:
+        return False
+    return True
+
+
+def _side(carried: RotationMatrix, azimuth: float) -> list[RotationMatrix]:
+    """The tilt as carried, turned about the vertical towards the spot and a little aside."""
+    x_axis = carried.matrix()[:, 0]
+    ahead = azimuth - math.atan2(x_axis[1], x_axis[0])
+    return [RotationMatrix.MakeZRotation(ahead + turn) @ carried for turn in (0.0, 0.4, -0.4)]
+
+
+def _from_above(azimuth: float) -> list[RotationMatrix]:
+    """Fingers down, or as far down as may be; the jaw closes level."""
+    rotations = []
+    for tilt in np.radians([90.0, 75.0, 60.0, 45.0]):
+        x_axis = np.array([np.cos(tilt) * np.cos(azimuth), np.cos(tilt) * np.sin(azimuth), -np.sin(tilt)])
+        for z_axis in (
+            np.array([-np.sin(azimuth), np.cos(azimuth), 0]),
+            np.array([np.sin(azimuth), -np.cos(azimuth), 0]),
+        ):
+            rotations.append(RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1)))
+    return rotations
+
+
+def _nearest_spot(surface: Surface, X_WB: RigidTransform) -> FloatArray:
+    """The spot on the surface nearest to the robot."""
+    return np.asarray(_by_distance(spots(surface), X_WB)[0])
+
+
+def _by_distance(points_W: FloatArray, X_WB: RigidTransform) -> FloatArray:
+    here = Pose2D.from_transform(X_WB)
+    ahead = np.array([here.x_m + 0.2 * math.cos(here.yaw_rad), here.y_m + 0.2 * math.sin(here.yaw_rad)])
+    return points_W[np.argsort(np.linalg.norm(points_W - ahead, axis=1))]

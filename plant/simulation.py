@@ -21,7 +21,7 @@ from plant.worlds.world import World
 from skills.robot import Pose2D, Robot
 
 CONTROL_PERIOD_S = 0.01
-REFEREE_PERIOD_STEPS = 5
+REFEREE_PERIOD_STEPS = 2
 
 
 class Engine:

@@ -1,0 +1,114 @@
+"""Planned arm paths: free of contact, within limits, refused where they must be."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from plant.spot.robot import spot_capabilities
+from skills.arm.collision import ArmScene, Box
+from skills.arm.kinematics import arm_model
+from skills.arm.motion import plan_joint_path, plan_line, time_path
+from skills.arm.routine import PlanningError
+
+CAPABILITIES = spot_capabilities()
+MODEL = arm_model(CAPABILITIES)
+LEFT = np.array([0.9, -1.6, 1.6, 0.0, 0.4, 0.0])
+RIGHT = np.array([-0.9, -1.6, 1.6, 0.0, 0.4, 0.0])
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return ArmScene(CAPABILITIES, MODEL, {})
+
+
+@pytest.fixture(autouse=True)
+def nothing_around(scene):
+    scene.set_boxes(())
+    scene.hold(())
+
+
+def _wall_ahead():
+    return Box(RigidTransform([0.85, 0.0, 0.35]), (0.7, 0.1, 0.9))
+
+
+def test_the_stowed_arm_is_free(scene):
+    assert scene.free(MODEL.stowed_rad)
+
+
+def test_an_arm_in_the_body_is_not_free(scene):
+    assert not scene.free(np.array([0.0, 0.45, 2.2, 0.0, 0.0, 0.0]))
+
+
+def test_a_box_in_the_arms_place_is_named_as_what_stands_around(scene):
+    scene.set_boxes([Box(RigidTransform(MODEL.X_BH(LEFT).translation()), (0.2, 0.2, 0.2))])
+    with pytest.raises(PlanningError, match="what stands around"):
+        plan_joint_path(scene, MODEL.stowed_rad, LEFT, np.random.default_rng(1))
+
+
+def test_a_held_box_counts_as_part_of_the_arm(scene):
+    beyond = MODEL.X_BH(LEFT) @ np.array([0.45, 0.0, 0.0])
+    scene.set_boxes([Box(RigidTransform(beyond), (0.1, 0.1, 0.1))])
+    assert scene.free(LEFT)
+    scene.hold([Box(RigidTransform([0.35, 0.0, 0.0]), (0.3, 0.05, 0.05))])
+    assert not scene.free(LEFT)
+
+
+def test_a_free_motion_is_straight(scene):
+    assert len(plan_joint_path(scene, MODEL.stowed_rad, LEFT, np.random.default_rng(1))) == 2
+
+
+def test_a_wall_between_is_gone_round(scene):
+    scene.set_boxes([_wall_ahead()])
+    path = plan_joint_path(scene, LEFT, RIGHT, np.random.default_rng(3))
+    assert not scene.edge_free(LEFT, RIGHT)
+    assert all(scene.edge_free(a, b) for a, b in zip(path, path[1:], strict=False))
+    assert np.allclose(path[0], LEFT)
+    assert np.allclose(path[-1], RIGHT)
+
+
+def test_the_same_seed_plans_the_same_path(scene):
+    scene.set_boxes([_wall_ahead()])
+    first, second = (plan_joint_path(scene, LEFT, RIGHT, np.random.default_rng(5)) for _ in range(2))
+    assert np.array_equal(first, second)
+
+
+def test_timing_keeps_speed_and_acceleration_limits_from_rest_to_rest(scene):
+    scene.set_boxes([_wall_ahead()])
+    path = plan_joint_path(scene, LEFT, RIGHT, np.random.default_rng(3))
+    trajectory = time_path(path, speed_rad_s=1.2, acceleration_rad_s2=3.0, scene=scene)
+    times = np.arange(0.0, trajectory.times_s[-1], 0.08)
+    q = np.stack([np.interp(times, trajectory.times_s, column) for column in trajectory.positions_rad.T], axis=1)
+    speeds = np.diff(q, axis=0) / 0.08
+    assert np.abs(speeds).max() < 1.25
+    assert np.abs(speeds[0]).max() < 0.2
+    assert np.abs(np.diff(speeds, axis=0) / 0.08).max() < 5.0
+    assert np.allclose(trajectory.positions_rad[-1], RIGHT)
+
+
+def test_timing_a_motion_of_no_length_is_a_short_stay():
+    trajectory = time_path(np.array([LEFT, LEFT]))
+    assert np.allclose(trajectory.positions_rad[-1], LEFT)
+
+
+def test_a_straight_line_keeps_the_hands_orientation_and_its_way():
+    X_from = MODEL.X_BH(LEFT)
+    X_to = RigidTransform(X_from.rotation(), X_from.translation() + [0.0, 0.0, 0.1])
+    hands = [MODEL.X_BH(q) for q in plan_line(MODEL, LEFT, X_to)]
+    for hand in hands:
+        assert np.allclose(hand.rotation().matrix(), X_from.rotation().matrix(), atol=1e-6)
+        assert np.allclose(hand.translation()[:2], X_from.translation()[:2], atol=1e-6)
+    assert hands[-1].IsNearlyEqualTo(X_to, 1e-6)
+
+
+def test_a_straight_line_out_of_reach_is_refused():
+    X_to = MODEL.X_BH(LEFT) @ RigidTransform([1.5, 0.0, 0.0])
+    with pytest.raises(PlanningError, match="reach"):
+        plan_line(MODEL, LEFT, X_to)
+
+
+def test_a_straight_line_into_a_box_is_refused(scene):
+    X_from = MODEL.X_BH(LEFT)
+    ahead = RigidTransform(X_from.rotation(), X_from @ np.array([0.15, 0.0, 0.0]))
+    scene.set_boxes([Box(RigidTransform(X_from @ np.array([0.38, 0.0, 0.0])), (0.1, 0.1, 0.1))])
+    with pytest.raises(PlanningError, match="meets"):
+        plan_line(MODEL, LEFT, ahead, scene)

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from skills.api import Thing
 
-__all__ = ["Command", "Task", "Thing", "is_attribute", "parse_command"]
+__all__ = ["Command", "Task", "Thing", "is_attribute", "may_be_attribute", "parse_command", "thing"]
 
 _ATTRIBUTE: Final = re.compile(
     r"red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver|golden|dark|bright|light"
@@ -67,7 +67,7 @@ class Command:
         for thing, count in ((self.item, self.item_count), (self.object, self.object_count)):
             if count < 0 or (thing is None and count != 1):
                 raise ValueError(f"{count} cannot be the count of {thing or _NOTHING}")
-            if any(_NO_ATTRIBUTE.fullmatch(word) for word in _words(thing)[1:]):
+            if not all(map(may_be_attribute, _words(thing)[1:])):
                 raise ValueError(f"{thing} has an attribute that is no single word, or a number")
         if self.goal_at is not None and self.goal is None:
             raise ValueError(f"a goal is missing at {self.goal_at!r}")
@@ -111,6 +111,11 @@ class Command:
 def is_attribute(word: str) -> bool:
     """Whether a leading `word` is read as an attribute of what follows ("red", "biggest")."""
     return _ATTRIBUTE.fullmatch(word) is not None
+
+
+def may_be_attribute(word: str) -> bool:
+    """Whether `word` can be an attribute in a command: one word, and no number."""
+    return _NO_ATTRIBUTE.fullmatch(word) is None
 
 
 def thing(text: str) -> Thing:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from executive.language.clauses import Clause
-from executive.language.items import Being, Chunk, Item, Unknown, Verb
+from executive.language.items import Being, Verb, spoken_words
 from executive.language.lexicon import Lexicon, VerbKind
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, Location, Roles, read_roles
@@ -30,13 +30,19 @@ class Action:
     unknown: tuple[str, ...] = ()
 
 
-_DESCRIBED: Final = frozenset(VerbKind) - {VerbKind.GO}
+_QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 
 def read_actions(clauses: Sequence[Clause], words: Lexicon) -> tuple[Action, ...]:
     """The actions of all clauses, in order."""
-    merged = _without_checks(clauses)
-    return tuple(action for clause in merged for action in _actions(clause, words))
+    merged = list(_without_checks(clauses))
+    found = [action for clause in merged for action in _actions(clause, words)]
+    return tuple(action for action in found[:-1] if not _goes_nowhere(action)) + tuple(found[-1:])
+
+
+def _goes_nowhere(action: Action) -> bool:
+    """Whether it is the "go" of "go and find", which says nothing of its own."""
+    return action.kind is VerbKind.GO and action.goal is None and action.unknown == (action.verb,)
 
 
 def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
@@ -49,20 +55,11 @@ def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
 
 def _actions(clause: Clause, words: Lexicon) -> Iterator[Action]:
     if clause.verb is None:
-        yield Action(None, "", unknown=tuple(_spoken(clause.items)))
+        yield Action(None, "", unknown=(spoken_words(clause.items),))
     elif isinstance(clause.verb, Being):
         yield _being(clause, clause.verb, words)
     else:
         yield from _acting(clause, clause.verb, words)
-
-
-def _spoken(items: Sequence[Item]) -> Iterator[str]:
-    """The words of items that no verb takes."""
-    for item in items:
-        if isinstance(item, Chunk):
-            yield " ".join(filter(None, (item.preposition, item.phrase.text)))
-        elif isinstance(item, Unknown):
-            yield item.word
 
 
 def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
@@ -71,11 +68,12 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     objects = [*([clause.subject.phrase] if clause.subject else []), *roles.objects]
     places = [*roles.ats, *roles.sources, *roles.goals]
     place = next(iter(places), None)
-    unknown = [*roles.unknown, *(p.text for p in objects[1:]), *(other.text for other in places[1:])]
-    if place is None and not being.existential:
-        unknown.append("be")
+    fits = len(objects) == 1 and len(places) <= 1 and not roles.unknown and (place or being.existential)
+    asked_for = any(t.tag in _QUESTION_TAGS for phrase in objects for t in phrase.tokens)
+    before = [clause.subject] if clause.subject else []
+    unknown = () if fits and not asked_for else (spoken_words([*before, being, *clause.items]),)
     asked = being.asked or clause.whether
-    return Action(VerbKind.FIND if asked else None, "be", tuple(objects[:1]), place, unknown=tuple(unknown))
+    return Action(VerbKind.FIND if asked else None, "be", tuple(objects[:1]), place, unknown=unknown)
 
 
 def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
@@ -88,7 +86,7 @@ def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
     elif kind is VerbKind.FIND:
         yield _finding(blank, roles)
     elif kind is VerbKind.CHECK:
-        yield replace(blank, unknown=(*blank.unknown, verb.text))
+        yield replace(blank, unknown=(spoken_words([verb, *clause.items]),))
     else:
         yield _carrying(blank, roles, words)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from executive.language.items import Being, Chunk, Item, Separator, Verb, Whether
 
-__all__ = ["Clause", "split_clauses"]
+__all__ = ["Clause", "split_clauses", "without_name"]
 
 
 @dataclass(frozen=True)
@@ -53,3 +53,11 @@ def _begin_being(last: Clause, being: Being) -> list[Clause]:
     asked = being.asked and subject is None
     before = replace(last, items=rest[: len(rest) - whether])
     return [before, Clause(replace(being, asked=asked), (), subject, whether)]
+
+
+def without_name(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
+    """Leave out a bare name before the first verb: it calls somebody ("Michael go to the kitchen")."""
+    first, *rest = clauses or [Clause(None)]
+    content = [item for item in first.items if not isinstance(item, Separator)]
+    called = len(content) == 1 and isinstance(content[0], Chunk) and content[0].phrase.named_person
+    return tuple(rest if first.verb is None and called and rest else clauses)

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from executive.command import Command, Task, Thing
-from executive.language.lexicon import VerbKind
+from executive.language.lexicon import VerbKind, lexicon
 from executive.language.phrases import Phrase
 from executive.language.reference import Deed
+from executive.language.refusal import RefusalError
 from executive.language.roles import HERE, Location
 
 __all__ = ["Draft", "draft_commands", "spoken_command"]
@@ -33,11 +34,16 @@ def draft_commands(deeds: Sequence[Deed]) -> tuple[Draft, ...]:
 
     A place that the robot is sent to first is where the next deed's thing is looked for; a thing in the hand is not
     gone for again.
+
+    Raises:
+        RefusalError: it is not said where something is to go.
     """
     drafts: list[Draft] = []
     held: Phrase | None = None
     for index, deed in enumerate(joined := _join_going(deeds)):
         later = any(other.again and other.target == deed.target for other in joined[index + 1 :])
+        if _goal(deed, later) is None and deed.verb in lexicon().goal_wanted and not later:
+            raise RefusalError(f"{deed.verb} {_name(deed)}: where to?", question=True)
         drafts += _drafts(deed, held, later)
         held = _held_after(deed, held, later)
     return tuple(drafts)
@@ -104,6 +110,10 @@ def spoken_command(draft: Draft) -> Command:
         object_count=1 if draft.object is None else draft.object.count,
         verb=draft.verb,
     )
+
+
+def _name(deed: Deed) -> str:
+    return "it" if deed.target is None else f"the {deed.target.text}"
 
 
 def _thing(phrase: Phrase | None) -> Thing | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from executive.command import Command, Task, Thing, is_attribute
+from executive.command import Command, Task, Thing
 from executive.errors import did_you_mean, listing
 from executive.knowledge import Knowledge
 from executive.language.drafts import Draft
@@ -51,14 +51,15 @@ def _ground(draft: Draft, knowledge: Knowledge) -> Command:
 
 def _thing(phrase: Phrase, knowledge: Knowledge) -> Thing:
     """The known thing or category, with the adjectives before it."""
+    if phrase.person and knowledge.person(phrase.text):
+        raise RefusalError(f"I can look for things, not for people like {phrase.text!r}", [phrase.text])
     *left, head = phrase.tokens
     words = [t for t in left if t.text in phrase.text.split()]
     for first in range(len(words) + 1):
         attributes, name = words[:first], [t.text for t in words[first:]]
         forms = (" ".join([*name, form, *phrase.extra]) for form in (head.text, head.lemma))
         known = next(filter(None, map(knowledge.thing, forms)), None)
-        adjectives = all(is_attribute(t.text) or t.pos in ("ADJ", "ADV") for t in attributes)
-        if known and adjectives:
+        if known and all(t.adjective for t in attributes):
             return Thing(known, tuple(t.word for t in attributes))
     raise _unknown("thing", phrase.text, knowledge.thing_names())
 

@@ -14,7 +14,7 @@ from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
 
-__all__ = ["Adverb", "Being", "Chunk", "Item", "Separator", "Unknown", "Verb", "Whether", "split_items"]
+__all__ = ["Adverb", "Being", "Chunk", "Item", "Separator", "Unknown", "Verb", "Whether", "split_items", "spoken_words"]
 
 _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
@@ -37,6 +37,11 @@ class Chunk:
     preposition: str = ""
     role: PrepositionRole | None = None
 
+    @property
+    def spoken(self) -> str:
+        """All words as spoken."""
+        return f"{self.preposition} {self.phrase.spoken}".strip()
+
 
 @dataclass(frozen=True)
 class Adverb:
@@ -44,11 +49,17 @@ class Adverb:
 
     here: bool
 
+    @property
+    def word(self) -> str:
+        """The word as spoken."""
+        return "here" if self.here else "there"
+
 
 @dataclass(frozen=True)
 class Being:
-    """A form of "to be"; `existential` with "there"."""
+    """A form of "to be" as spoken; `existential` with "there", `asked` when it stands before its subject."""
 
+    text: str
     existential: bool
     asked: bool
 
@@ -119,15 +130,20 @@ class _Reader:
     def _being(self, items: list[Item]) -> Item | None:
         token = self.tokens[self.at]
         after = self.tokens[self.at + 1 : self.at + 2]
-        if token.lemma == "be" and token.pos in ("AUX", "VERB") and self._match(self.words.fillers) is None:
-            existential = bool(after) and after[0].tag == "EX"
-            self.at += 1 + existential
-            return Being(existential, asked=True)
+        modal = int(token.tag == "MD" and bool(after) and after[0].word == "be")
+        if modal or (token.lemma == "be" and token.pos in ("AUX", "VERB") and self._match(self.words.fillers) is None):
+            second = self.tokens[self.at + 1 + modal : self.at + 2 + modal]
+            existential = bool(second) and second[0].tag == "EX"
+            return Being(self._words(1 + modal + existential), existential, asked=not modal)
         if token.tag == "EX" or (token.word == "there" and after and after[0].lemma == "be"):
             verb = next((t.index for t in self.tokens[self.at + 1 : self.at + 4] if t.lemma == "be"), self.at)
-            self.at = verb + 1
-            return Being(existential=True, asked=False)
+            return Being(self._words(verb + 1 - self.at), existential=True, asked=False)
         return None
+
+    def _words(self, count: int) -> str:
+        """The next words, which are then read."""
+        self.at += count
+        return " ".join(t.text for t in self.tokens[self.at - count : self.at])
 
     def _chunk(self, items: list[Item]) -> Item | None:
         preposition = self._match(self.words.prepositions) or ()
@@ -186,11 +202,21 @@ class _Reader:
         if token.word in ("if", "whether"):
             self.at += 1
             return Whether()
-        filler = self._match(self.words.fillers)
+        filler = self._particle(items) or self._match(self.words.fillers)
         if filler is None:
             return None
         self.at += len(filler)
         return Separator(" ".join(filler))
+
+    def _particle(self, items: list[Item]) -> tuple[str, ...] | None:
+        """Join a particle to its verb: "put the cup down"."""
+        at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Verb)), None)
+        verb = None if at is None else items[at]
+        particle = self.tokens[self.at].word
+        if at is None or not isinstance(verb, Verb) or (*verb.text.split(), particle) not in self.words.verbs:
+            return None
+        items[at] = Verb(f"{verb.text} {particle}", self.words.verbs[(*verb.text.split(), particle)])
+        return (particle,)
 
     def _unknown(self) -> Unknown:
         token = self.tokens[self.at]
@@ -206,3 +232,13 @@ def _command_position(items: Sequence[Item]) -> bool:
 def split_items(tokens: Sequence[Token], phrases: Mapping[int, Phrase], words: Lexicon) -> tuple[Item, ...]:
     """The sentence as items, in order; every word is in one of them."""
     return tuple(_Reader(tokens, phrases, words).read())
+
+
+def spoken_words(items: Iterable[Item]) -> str:
+    """The words of the items as spoken, small words left out."""
+    words = (
+        item.spoken if isinstance(item, Chunk) else getattr(item, "word", getattr(item, "text", ""))
+        for item in items
+        if not isinstance(item, Separator)
+    )
+    return " ".join(filter(None, words))

@@ -57,6 +57,7 @@ class Lexicon:
     people: frozenset[str]
     everyone: frozenset[str]
     directions: frozenset[str]
+    intangible: frozenset[str]
 
 
 @cache
@@ -77,7 +78,7 @@ def lexicon() -> Lexicon:
         requests=_longest_first(words["requests"]),
         **{
             name: frozenset(words[name])
-            for name in ("speaker", "pronouns", "here", "there", "people", "everyone", "directions")
+            for name in ("speaker", "pronouns", "here", "there", "people", "everyone", "directions", "intangible")
         },
     )
 

@@ -24,11 +24,13 @@ def clean(text: str) -> str:
 def open_commands(text: str) -> str:
     """Turn polite forms into plain commands: "could you please get it" becomes "get it".
 
-    Where such a form stands inside the sentence, a comma takes its place. "I would like a coke" becomes "bring me a
-    coke".
+    Where such a form stands inside the sentence, a comma takes its place. "I would like something to drink" becomes
+    "bring me a drink".
     """
     requests = "|".join(map(re.escape, lexicon().requests))
+    text = re.sub(r"^\W*(please\s+)?robot\b[\s,]*", r"\1", text, flags=re.IGNORECASE)
     text = re.sub(rf"\b(?:{requests})\s+(?!you\b|to\b)", ", bring me ", text, flags=re.IGNORECASE)
+    text = re.sub(r"\b(?:something|anything) to (?=\w)", "a ", text, flags=re.IGNORECASE)
     openers = "|".join(map(re.escape, lexicon().openers))
     text = re.sub(rf"(?:(?:\b(?:{openers}))\b[\s,]*)+", _break, text, flags=re.IGNORECASE)
     return text.strip(" ,;:-.")

@@ -12,6 +12,7 @@ import spacy
 from spacy.language import Language
 from spacy.tokens import Token as SpacyToken
 
+from executive.command import is_attribute, may_be_attribute
 from executive.errors import InputError
 
 __all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
@@ -43,6 +44,11 @@ class Token:
     def word(self) -> str:
         """The text in lower case."""
         return self.text.lower()
+
+    @property
+    def adjective(self) -> bool:
+        """Whether it can be an attribute of a thing ("red", "heaviest")."""
+        return is_attribute(self.text) or (self.pos in ("ADJ", "ADV") and may_be_attribute(self.text))
 
 
 class DependencyParser(Protocol):

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from executive.command import Thing, is_attribute
+from executive.command import Thing
 from executive.language.lexicon import lexicon
 from executive.language.parser import Token
 
@@ -20,6 +20,7 @@ _NUMBERS: Final[Mapping[str, int]] = {
     word: number
     for number, word in enumerate("zero one two three four five six seven eight nine ten eleven twelve".split())  # noqa: SIM905
 } | {"couple": 2, "dozen": 12}
+_DEEPEST: Final = 6
 _HEADLIKE: Final = frozenset({"obj", "iobj", "obl", "nsubj", "attr", "conj", "root"})
 
 
@@ -50,7 +51,7 @@ class Phrase:
     def thing(self) -> Thing:
         """The phrase as a thing: leading adjectives are attributes."""
         words = self._content()
-        leads = (n for n, t in enumerate(words[:-1]) if not (is_attribute(t.text) or t.pos in ("ADJ", "ADV")))
+        leads = (n for n, t in enumerate(words[:-1]) if not t.adjective)
         first = next(leads, len(words) - 1)
         name = " ".join((*(t.text for t in words[first:]), *self.extra))
         return Thing(name, tuple(t.text for t in words[:first]))
@@ -90,6 +91,17 @@ class Phrase:
     def universal(self) -> bool:
         """Whether it means all of a kind ("everyone", "all the men")."""
         return any(t.word in lexicon().everyone for t in self.tokens)
+
+    @property
+    def intangible(self) -> bool:
+        """Whether it is nothing that a hand can hold or that one can go to ("the news", "six o'clock")."""
+        words = lexicon().intangible
+        return any(word in words for word in (self.head.lemma, self.head.word, *self.extra))
+
+    @property
+    def spoken(self) -> str:
+        """All words as spoken."""
+        return " ".join((*(t.text for t in self.tokens), *self.extra))
 
     def with_extra(self, *words: str) -> Phrase:
         """The phrase with more words behind the noun."""
@@ -144,8 +156,17 @@ def _joined(token: Token, parent: Token, tokens: Sequence[Token]) -> bool:
 def _first(head: Token, tokens: Sequence[Token]) -> int:
     """Where the phrase of `head` begins: the words before it that depend on it, directly or not."""
     first = head.index
-    while first > 0 and tokens[first - 1].relation in _LEFT and first <= tokens[first - 1].head <= head.index:
-        if tokens[first - 1].word == ",":
-            break
+    while first > 0 and _belongs(tokens[first - 1], head, tokens):
         first -= 1
     return first
+
+
+def _belongs(token: Token, head: Token, tokens: Sequence[Token]) -> bool:
+    """Whether a word before `head` depends on it through words of its own phrase only."""
+    for _ in range(_DEEPEST):
+        if token.relation not in _LEFT or token.word == ",":
+            return False
+        token = tokens[token.head]
+        if token.index >= head.index:
+            return token.index == head.index
+    return False

@@ -10,7 +10,7 @@ from typing import Any
 from executive.command import Command
 from executive.knowledge import Knowledge
 from executive.language.actions import Action, read_actions
-from executive.language.clauses import split_clauses
+from executive.language.clauses import split_clauses, without_name
 from executive.language.drafts import draft_commands, spoken_command
 from executive.language.grounding import ground, known_line
 from executive.language.items import split_items
@@ -105,7 +105,8 @@ def _commands(text: str, parser: DependencyParser, knowledge: Knowledge | None) 
         raise RefusalError(f"{len(words)} words are too many for one sentence; say it in {MAX_WORDS} at most")
     tokens = parse_with_names(open_commands(text), parser, None if knowledge is None else name_table(knowledge))
     items = split_items(tokens, noun_phrases(tokens), lexicon())
-    actions = read_actions(split_clauses(items), lexicon())
+    clauses = split_clauses(items)
+    actions = read_actions(clauses if knowledge else without_name(clauses), lexicon())
     _check(actions, knowledge)
     deeds = resolve(actions)
     _check_deeds(deeds, knowledge)
@@ -129,15 +130,15 @@ def _not_understood(words: Sequence[str], knowledge: Knowledge | None) -> Refusa
 
 
 def _check_deeds(deeds: Sequence[Deed], knowledge: Knowledge | None) -> None:
-    """Refuse to carry people, and to serve all of a kind."""
+    """Refuse to carry people, to serve all of a kind, and what no hand can hold."""
     carries = (deed for deed in deeds if deed.kind not in (VerbKind.GO, VerbKind.FIND))
     people = [f"{d.verb} {d.target.text}" for d in carries if d.target is not None and d.target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
     phrases = (p for deed in deeds for p in _phrases(deed))
-    everyone = [" ".join(t.text for t in p.tokens) for p in phrases if p.universal]
-    if everyone:
-        raise _not_understood(everyone, knowledge)
+    outside = [p.spoken for p in phrases if p.universal or p.intangible]
+    if outside:
+        raise _not_understood(outside, knowledge)
 
 
 def _phrases(deed: Deed) -> Iterator[Phrase]:

@@ -16,7 +16,7 @@ from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.candidates import Target, grasp_candidates
-from skills.grasp.planning import PREGRASP_M
+from skills.grasp.planning import PREGRASPS_M
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 
@@ -98,7 +98,7 @@ def grasp_reachable(model: ArmModel, X_WB: RigidTransform, seen: ObjectObservati
     """Whether the arm reaches some grasp of a thing, and its pre-grasp, with the body at X_WB."""
     target = observed_target(seen, X_WB)
     for candidate in grasp_candidates(target, model.p_BS):
-        if model.inverse(candidate.X_BH, 0.08) and model.inverse(candidate.retreated(PREGRASP_M), 0.08):
+        if model.inverse(candidate.X_BH, 0.08) and model.inverse(candidate.retreated(PREGRASPS_M[-1]), 0.08):
             return True
     return False
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.robot import FloatArray
@@ -77,17 +78,23 @@ def grasp_candidates(target: Target, p_BS: FloatArray, jaw: JawGeometry | None =
     ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
     stations = _round_stations(target, ahead) if target.round else list(_long_stations(target, ahead))
     found = [
-        _candidate(target, station, tilt, side, jaw)
-        for station, tilt, side in itertools.product(stations, _tilts(target), (1.0, -1.0))
+        _candidate(target, station, attitude, side, jaw)
+        for station, attitude, side in itertools.product(stations, _attitudes(target), (1.0, -1.0))
         if station.width_m < jaw.max_width
     ]
+    if not target.upright:
+        towards = np.array([np.cos(ahead), np.sin(ahead), 0.0])
+        found = [each for each in found if each.X_BH.rotation().matrix()[:, 0] @ towards > -0.3]
     return sorted(found, key=lambda candidate: candidate.cost)
 
 
-def _tilts(target: Target) -> Sequence[float]:
-    """How far the fingers may point down, rad."""
-    degrees = (10.0, 0.0, 20.0, 32.0, 45.0) if target.upright else (90.0, 78.0, 66.0, 54.0, 44.0)
-    return [float(np.radians(d)) for d in degrees]
+def _attitudes(target: Target) -> Sequence[tuple[float, float]]:
+    """Tilts of the fingers below level and, for what is taken from above, leans about its long axis; rad."""
+    if target.upright:
+        return [(float(np.radians(tilt)), 0.0) for tilt in (10.0, 0.0, 20.0, 32.0, 45.0)]
+    down = [(90.0, 0.0), (78.0, 0.0), (66.0, 0.0), (54.0, 0.0), (44.0, 0.0)]
+    leaning = [(90.0, lean) for lean in (18.0, -18.0, 32.0, -32.0, 44.0, -44.0)]
+    return [(float(np.radians(tilt)), float(np.radians(lean))) for tilt, lean in (*down, *leaning)]
 
 
 def _round_stations(target: Target, ahead_rad: float) -> list[_Station]:
@@ -120,20 +127,25 @@ def _long_stations(target: Target, ahead_rad: float) -> Iterator[_Station]:
                 yield _Station(xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 0.15 * off)
 
 
-def _candidate(target: Target, station: _Station, tilt_rad: float, side: float, jaw: JawGeometry) -> GraspCandidate:
+def _candidate(
+    target: Target, station: _Station, attitude: tuple[float, float], side: float, jaw: JawGeometry
+) -> GraspCandidate:
+    tilt, lean = attitude
     c, s = np.cos(station.azimuth_rad), np.sin(station.azimuth_rad)
-    x_axis = np.array([np.cos(tilt_rad) * c, np.cos(tilt_rad) * s, -np.sin(tilt_rad)])
+    x_axis = np.array([np.cos(tilt) * c, np.cos(tilt) * s, -np.sin(tilt)])
     z_axis = side * np.array([-s, c, 0.0])
-    R_BH = RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
+    upright_hand = RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
+    R_BH = RotationMatrix(AngleAxis(lean, np.array([c, s, 0.0]))) @ upright_hand
     if target.upright:
         height = float(np.clip(0.56 * target.height_m, 0.05, 0.095))
         depth = jaw.palm_x + station.half_depth_m + 0.008
-        cost = station.cost + 0.4 * abs(tilt_rad - np.radians(10.0))
+        cost = station.cost + 0.4 * abs(tilt - np.radians(10.0))
     else:
         height = 0.5 * target.height_m
-        depth = jaw.tip_x - max(0.004, height - 0.006) / np.sin(tilt_rad)
-        cost = station.cost + 0.4 * abs(tilt_rad - 0.5 * np.pi)
+        sunk = (0.5 * station.width_m + jaw.clearance) * abs(np.sin(lean))
+        depth = jaw.tip_x - max(0.004, height - 0.006 - sunk) / (np.sin(tilt) * np.cos(lean))
+        cost = station.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean)
     p_HT = np.array([depth, 0.0, jaw.fixed_z + jaw.clearance + 0.5 * station.width_m])
     p_BT = np.array([*station.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
-    return GraspCandidate(X_BH, station.width_m, float(cost), tilt_rad)
+    return GraspCandidate(X_BH, station.width_m, float(cost), tilt)

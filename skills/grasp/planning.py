@@ -14,19 +14,21 @@ from skills.arm.routine import PlanningError
 from skills.grasp.candidates import GraspCandidate
 from skills.robot import ArmTrajectory, FloatArray
 
-PREGRASP_M = 0.12
-LIFT_M = 0.12
+PREGRASPS_M = (0.12, 0.07)
+LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08))
+"""Ways to lift, up and back towards the shoulder, the best first."""
 APPROACH_SPEED_RAD_S = 0.4
 _FINAL_PADDING_M = 0.003
 
 
 @dataclass(frozen=True)
 class GraspPlan:
-    """A grasp with the motions to its pre-grasp and from there to the grasp."""
+    """A grasp with the motions to its pre-grasp and from there to the grasp, and how to lift (frame B)."""
 
     candidate: GraspCandidate
     to_pregrasp: ArmTrajectory
     to_grasp: ArmTrajectory
+    lift_B: FloatArray
 
 
 @dataclass(frozen=True)
@@ -49,14 +51,15 @@ def plan_grasp(
     reasons = []
     for candidate in candidates:
         try:
-            q_pregrasp, approach = reach_candidate(scene, q_start_rad, candidate, around)
+            approach, lift_B = reach_candidate(scene, q_start_rad, candidate, around)
             scene.set_boxes([*around.boxes, around.target])
             scene.set_padding(0.01)
-            path = plan_joint_path(scene, q_start_rad, q_pregrasp, rng)
+            path = plan_joint_path(scene, q_start_rad, approach[0], rng)
         except PlanningError as error:
             reasons.append(str(error))
             continue
-        return GraspPlan(candidate, time_path(path, scene=scene), time_path(approach, speed_rad_s=APPROACH_SPEED_RAD_S))
+        to_pregrasp, to_grasp = time_path(path, scene=scene), time_path(approach, speed_rad_s=APPROACH_SPEED_RAD_S)
+        return GraspPlan(candidate, to_pregrasp, to_grasp, lift_B)
     last = f": {max(set(reasons), key=reasons.count)}" if reasons else ""
     raise PlanningError(f"none of {len(candidates)} grasps is within reach and free{last}")
 
@@ -64,21 +67,34 @@ def plan_grasp(
 def reach_candidate(
     scene: ArmScene, q_near_rad: FloatArray, candidate: GraspCandidate, around: Surroundings
 ) -> tuple[FloatArray, FloatArray]:
-    """Pre-grasp angles and the straight approach path. Raises PlanningError."""
+    """The straight approach path from the pre-grasp, and the lift (frame B). Raises PlanningError."""
     scene.set_boxes(around.boxes)
     scene.set_padding(_FINAL_PADDING_M)
-    solutions = scene.model.inverse(candidate.retreated(PREGRASP_M), margin_rad=0.06)
     reason = "out of reach"
-    for q in sorted(solutions, key=lambda q: float(np.max(np.abs(q - q_near_rad)))):
-        if not scene.free(q):
-            reason = "the hand would touch something before the grasp"
-            continue
-        try:
-            approach = plan_line(scene.model, q, candidate.X_BH, scene)
-            lifted = RigidTransform(candidate.X_BH.rotation(), candidate.X_BH.translation() + LIFT_M * around.up_B)
-            plan_line(scene.model, approach[-1], lifted)
-        except PlanningError as error:
-            reason = str(error)
-            continue
-        return q, approach
+    for distance in PREGRASPS_M:
+        solutions = scene.model.inverse(candidate.retreated(distance), margin_rad=0.06)
+        for q in sorted(solutions, key=lambda q: float(np.max(np.abs(q - q_near_rad)))):
+            if not scene.free(q):
+                reason = "the hand would touch something before the grasp"
+                continue
+            try:
+                approach = plan_line(scene.model, q, candidate.X_BH, scene)
+                return approach, _lift(scene, approach[-1], around.up_B)
+            except PlanningError as error:
+                reason = str(error)
     raise PlanningError(reason)
+
+
+def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray) -> FloatArray:
+    """The first way to lift that the arm can follow. Raises PlanningError."""
+    X_BH = scene.model.X_BH(q_rad)
+    back = (scene.model.p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
+    back = back / max(float(np.linalg.norm(back)), 1e-6)
+    for up_m, back_m in LIFTS_M:
+        lift_B = up_m * up_B + back_m * back
+        try:
+            plan_line(scene.model, q_rad, RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B))
+        except PlanningError:
+            continue
+        return np.asarray(lift_B)
+    raise PlanningError("the arm cannot lift the thing from there")

@@ -18,7 +18,7 @@ from skills.detect.appearance import load_appearance
 from skills.detect.interim_segmentation import Cluster, SurfaceView, sightings, view_surface
 from skills.detect.looking import cluster_boxes, surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
-from skills.grasp.planning import LIFT_M, PREGRASP_M, GraspPlan, Surroundings, plan_grasp
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, plan_grasp
 from skills.robot import FloatArray, Image
 
 GRASP_FORCE_N = 60.0
@@ -126,7 +126,7 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.move_gripper(0.0, GRASP_FORCE_N, f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
-        yield from self.shift_hand(self._up_B() * LIFT_M, f"lifting the {thing}")
+        yield from self.shift_hand(plan.lift_B, f"lifting the {thing}")
         yield from self.pause(0.3, f"lifting the {thing}")
         self._check_held(thing, opening)
 
@@ -168,7 +168,7 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _draw_back(self) -> Routine[None]:
         ahead = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
-        yield from self.shift_hand(-PREGRASP_M * ahead, "drawing back after the failure")
+        yield from self.shift_hand(-PREGRASPS_M[-1] * ahead, "drawing back after the failure")
         yield from self.move_gripper(0.0, JAW_FORCE_N, "closing the empty jaw")
 
     def _up_B(self) -> FloatArray:

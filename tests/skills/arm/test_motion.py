@@ -1,5 +1,7 @@
 """Planned arm paths: free of contact, within limits, refused where they must be."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
@@ -61,7 +63,7 @@ def test_a_wall_between_is_gone_round(scene):
     scene.set_boxes([_wall_ahead()])
     path = plan_joint_path(scene, LEFT, RIGHT, np.random.default_rng(3))
     assert not scene.edge_free(LEFT, RIGHT)
-    assert all(scene.edge_free(a, b) for a, b in zip(path, path[1:], strict=False))
+    assert all(scene.edge_free(a, b) for a, b in pairwise(path))
     assert np.allclose(path[0], LEFT)
     assert np.allclose(path[-1], RIGHT)
 

@@ -26,8 +26,9 @@ def clear_cells(
 ) -> NDArray[np.bool_]:
     """Whether the beams see past each place (N, 3) at its height.
 
-    A place counts as free when all beams that could have hit it go on for 0.3 m at least; a place that no beam can hit
-    (too low, too near) is left as it is. `rotation` and `translation` are those of the LiDAR's pose in frame F.
+    A place counts as free when all beams that could have hit it go on for 0.3 m at least. A place that no beam can hit
+    (too low, too near) shares the fate of a free place beside it: both were seen on one thing. `rotation` and
+    `translation` are those of the LiDAR's pose in frame F.
     """
     places_L = np.ascontiguousarray((centres_F - translation) @ rotation)
     ranges = np.ascontiguousarray(beams.ranges_m)
@@ -46,14 +47,16 @@ def _clear(
     count = azimuths.shape[0]
     spacing = azimuths[1] - azimuths[0]
     ring_gap = abs(elevations[1] - elevations[0])
-    lowest, highest = elevations.min(), elevations.max()
+    lowest, highest = elevations.min() + 0.5 * ring_gap, elevations.max()
     free = np.zeros(places.shape[0], dtype=np.bool_)
+    hidden = np.zeros(places.shape[0], dtype=np.bool_)
     for n in range(places.shape[0]):
         x, y, z = places[n, 0], places[n, 1], places[n, 2]
         flat = math.hypot(x, y)
         reach = math.hypot(flat, z)
         elevation = math.atan2(z, flat)
         if not lowest <= elevation <= highest:
+            hidden[n] = True
             continue
         middle = round((math.atan2(y, x) - azimuths[0]) / spacing)
         half = math.ceil(cell_m / max(flat, 0.3) / abs(spacing))
@@ -67,7 +70,20 @@ def _clear(
                     blocked = True
                 looked += 1
         free[n] = looked > 0 and not blocked
-    return free
+    return _spread(free, hidden, places, 3.0 * cell_m)
+
+
+@compiled
+def _spread(
+    free: NDArray[np.bool_], hidden: NDArray[np.bool_], places: FloatArray, radius_m: float
+) -> NDArray[np.bool_]:
+    """The free places and the hidden ones that lie within radius_m of one of these."""
+    gone = free.copy()
+    for n in np.flatnonzero(hidden):
+        for m in np.flatnonzero(free):
+            if math.hypot(places[n, 0] - places[m, 0], places[n, 1] - places[m, 1]) <= radius_m:
+                gone[n] = True
+    return gone
 
 
 @compiled
@@ -92,9 +108,10 @@ def mark_cells(
         for a in range(max(0, i - 1), min(rows, i + 2)):
             for b in range(max(0, j - 1), min(columns, j + 2)):
                 if stamp - confirm <= candidate_s[a, b] < stamp:
-                    changed |= until_s[i, j] <= stamp
+                    fresh = until_s[i, j] <= stamp
+                    changed |= fresh
                     until_s[i, j] = stamp + memory
-                    height_m[i, j] = heights[n]
+                    height_m[i, j] = heights[n] if fresh else max(height_m[i, j], heights[n])
     for n in range(cells.shape[0]):
         candidate_s[cells[n, 0], cells[n, 1]] = stamp
     return changed

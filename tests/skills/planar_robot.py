@@ -1,4 +1,4 @@
-"""A kinematic stand-in for a robot on a floor with boxes: no dynamics, but drift, lag, LiDAR, depth, expiry and lease."""
+"""A kinematic stand-in for a robot among boxes: no dynamics, but drift, lag, LiDAR, depth, expiry and lease."""
 
 from __future__ import annotations
 

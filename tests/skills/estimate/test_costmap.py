@@ -1,0 +1,77 @@
+import numpy as np
+import pytest
+from planar_robot import Bench, Box
+
+from skills.robot import Pose2D
+
+START = Pose2D(1.5, 5.4, 0.0)
+PERSON = Box(3.2, 5.2, 3.6, 5.6, 0.0, 1.7)
+AT_PERSON = np.array([[3.2, 5.4]])
+
+
+def ticked(bench: Bench, ticks: int = 10) -> Bench:
+    for _ in range(ticks):
+        bench.tick()
+    return bench
+
+
+def test_without_anything_unmapped_only_the_survey_counts():
+    bench = ticked(Bench(START), 40)
+    assert len(bench.costmap.seen_m()) == 0
+    assert bench.costmap.clearance_m(np.array([[3.0, 5.6]]))[0] == pytest.approx(1.4, abs=0.02)
+
+
+def test_a_person_in_the_way_is_seen():
+    bench = ticked(Bench(START, unmapped=[PERSON]))
+    assert bench.costmap.clearance_m(AT_PERSON)[0] < 0.05
+    assert bench.costmap.clearance_m(AT_PERSON + [-0.5, 0.0])[0] == pytest.approx(0.5, abs=0.12)
+
+
+def test_a_person_who_walks_away_is_forgotten_at_once():
+    bench = ticked(Bench(START, unmapped=[PERSON]))
+    bench.robot.boxes.remove(PERSON)
+    ticked(bench, 6)
+    assert bench.costmap.clearance_m(AT_PERSON)[0] > 0.5
+
+
+def test_what_is_below_the_beams_stays_remembered_and_then_decays():
+    crate = Box(2.6, 5.2, 3.0, 5.6, 0.0, 0.3)
+    bench = ticked(Bench(START, unmapped=[crate], cameras=False))
+    ahead = np.array([[2.7, 5.4]])
+    assert bench.costmap.clearance_m(ahead)[0] > 0.5  # the LiDAR passes over it
+    points = np.column_stack(
+        [np.repeat(np.linspace(2.6, 2.8, 9), 20), np.tile(np.linspace(5.3, 5.5, 20), 9), np.full(180, 0.3)]
+    )
+    bench.costmap.add_points(points, bench.clock.now())
+    assert bench.costmap.clearance_m(ahead)[0] < 0.05
+    ticked(bench, 100)
+    assert bench.costmap.clearance_m(ahead)[0] < 0.05
+    ticked(bench, 160)
+    assert bench.costmap.clearance_m(ahead)[0] > 0.5
+
+
+def test_single_depth_points_are_taken_for_noise():
+    bench = ticked(Bench(START))
+    bench.costmap.add_points(np.array([[3.0, 5.4, 0.3], [3.5, 5.0, 0.3]]), bench.clock.now())
+    assert len(bench.costmap.seen_m()) == 0
+
+
+def test_points_on_the_robot_itself_are_left_out():
+    bench = ticked(Bench(START))
+    on_body = np.tile([[1.8, 5.5, 0.4]], (20, 1))
+    bench.costmap.add_points(on_body, bench.clock.now())
+    assert len(bench.costmap.seen_m()) == 0
+
+
+def test_points_on_surveyed_furniture_are_left_out():
+    bench = ticked(Bench(START))
+    bench.costmap.add_points(np.tile([[5.0, 6.52, 0.4]], (20, 1)), bench.clock.now())
+    assert len(bench.costmap.seen_m()) == 0
+
+
+def test_nothing_is_taken_in_while_the_robot_does_not_know_its_place():
+    bench = Bench(START, unmapped=[PERSON], believed_start=Pose2D(8.0, 2.0, 1.0))
+    bench.tick()
+    bench.tick()
+    assert not bench.localiser.estimate().localised
+    assert len(bench.costmap.seen_m()) == 0

@@ -1,0 +1,131 @@
+import math
+
+import numpy as np
+import pytest
+from planar_robot import TWO_ROOMS, Bench, Box
+
+from skills.estimate.planar import compose, inverse
+from skills.robot import Pose2D
+
+START = Pose2D(1.5, 2.0, 0.0)
+
+
+def drive_along_the_corridor(bench: Bench, way_m: float = 9.0) -> list[tuple[float, float]]:
+    """Back and forth at 0.6 m/s with a wiggle; the pose's error at each tick after the first second."""
+    errors = []
+    while bench.robot.travelled_m < way_m:
+        back = 4.0 < bench.robot.travelled_m < 8.0
+        wiggle = 0.3 * math.sin(bench.clock.now())
+        bench.robot.drive(-0.6 if back else 0.6, 0.0, wiggle, until_s=bench.clock.now() + 0.3, lease=bench.lease)
+        bench.tick()
+        if bench.clock.now() > 1.0:
+            errors.append(bench.pose_error())
+    return errors
+
+
+def odometry_error_m(bench: Bench, start: Pose2D) -> float:
+    off = compose(inverse(bench.robot.pose), compose(start, bench.robot.odometry().pose))
+    return math.hypot(off.x_m, off.y_m)
+
+
+def test_error_stays_below_3_cm_and_1_degree_while_odometry_drifts():
+    start = Pose2D(1.5, 5.4, 0.0)
+    bench = Bench(start)
+    errors = np.array(drive_along_the_corridor(bench, 4.0))
+    by_odometry_m = odometry_error_m(bench, start)
+    errors = np.vstack([errors, drive_along_the_corridor(bench, 10.0)])
+    assert errors[:, 0].max() < 0.03
+    assert errors[:, 1].max() < math.radians(1.0)
+    assert by_odometry_m > 0.04  # the bound above is no merit of odometry's
+
+
+def test_unmapped_things_near_the_robot_do_not_pull_the_pose():
+    person = Box(2.3, 6.2, 2.7, 6.6, 0.0, 1.7)
+    moved_cupboard = Box(4.5, 4.25, 5.6, 4.6, 0.0, 1.8)
+    bench = Bench(Pose2D(1.5, 5.4, 0.0), unmapped=[person, moved_cupboard])
+    errors = np.array(drive_along_the_corridor(bench))
+    assert errors[:, 0].max() < 0.03
+
+
+def test_a_start_believed_somewhat_wrong_is_corrected():
+    bench = Bench(START, believed_start=Pose2D(1.65, 1.85, 0.1))
+    for _ in range(20):
+        bench.tick()
+    distance_m, yaw_rad = bench.pose_error()
+    assert distance_m < 0.03 and yaw_rad < math.radians(1.0)
+    assert bench.localiser.estimate().localised
+
+
+def test_not_localised_before_the_first_scan():
+    bench = Bench(START)
+    assert not bench.localiser.estimate().localised
+
+
+def test_a_scan_is_used_once():
+    bench = Bench(START)
+    for _ in range(4):
+        bench.tick()
+    before = bench.localiser.estimate()
+    bench.localiser.update(bench.robot)
+    after = bench.localiser.estimate()
+    assert np.array_equal(before.X_WO.GetAsMatrix4(), after.X_WO.GetAsMatrix4())
+    assert np.array_equal(before.covariance, after.covariance)
+
+
+def test_covariance_shrinks_from_the_start_and_tells_the_size_of_errors():
+    bench = Bench(START)
+    for _ in range(20):
+        bench.tick()
+    sigma = np.sqrt(np.diag(bench.localiser.estimate().covariance))
+    assert (sigma[:2] < 0.03).all() and (sigma[:2] > 0.001).all()
+
+
+def test_lost_when_carried_off_and_found_again_nearby():
+    bench = Bench(START)
+    for _ in range(10):
+        bench.tick()
+    bench.robot.carry_off(Pose2D(2.4, 2.7, 0.5))
+    said = []
+    for _ in range(80):
+        bench.tick()
+        said.append(bench.localiser.estimate().localised)
+    assert not all(said)
+    assert said[-1]
+    assert bench.pose_error()[0] < 0.03
+
+
+def test_relocalise_finds_the_robot_anywhere_on_the_map():
+    bench = Bench(START)
+    bench.tick()
+    bench.robot.carry_off(Pose2D(8.0, 2.3, 2.0))
+    assert bench.localiser.relocalise(bench.robot)
+    assert bench.pose_error()[0] < 0.04
+
+
+def test_relocalise_says_no_where_nothing_fits():
+    rng = np.random.default_rng(5)
+    pillars = [
+        Box(x, y, x + 0.15, y + 0.15) for x, y in rng.uniform(20.0, 26.0, (60, 2)) if math.hypot(x - 23, y - 23) > 1
+    ]
+    bench = Bench(Pose2D(23.0, 23.0, 0.3), surveyed=TWO_ROOMS, unmapped=pillars, believed_start=START)
+    bench.tick()
+    bench.tick()
+    assert not bench.localiser.relocalise(bench.robot, radius_m=1.5)
+
+
+def test_equal_seeds_give_equal_estimates():
+    poses = []
+    for _ in range(2):
+        bench = Bench(START, seed=4)
+        drive_along_the_corridor(bench, 1.0)
+        poses.append(bench.context().pose())
+    assert poses[0] == poses[1]
+
+
+def test_pose_is_given_in_the_world_whatever_odometry_says():
+    bench = Bench(START)
+    bench.robot.odometry_pose = Pose2D(5.0, -3.0, 2.0)
+    for _ in range(4):
+        bench.tick()
+    assert bench.context().pose().x_m == pytest.approx(START.x_m, abs=0.03)
+    assert bench.context().pose().yaw_rad == pytest.approx(START.yaw_rad, abs=0.02)

@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from skills.estimate.self_filter import ArmShape, SelfFilter, segment_distance
+from skills.robot import ArmCapabilities, Capabilities, Joints
+
+URDF = """<robot name="r">
+  <link name="body"/><link name="upper"/><link name="lower"/>
+  <joint name="shoulder" type="revolute"><parent link="body"/><child link="upper"/><origin xyz="0.3 0 0.2"/>
+    <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/>
+    <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+</robot>"""
+OUTLINE = ((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25))
+
+
+def capabilities(arm: bool = True) -> Capabilities:
+    limbs = ArmCapabilities(("shoulder", "elbow"), 1.0, (0.0, 0.0)) if arm else None
+    return Capabilities(OUTLINE, 1.6, 2.0, 0.52, (0.4, 0.6), (-0.3, 0.3), limbs, None, (), URDF)
+
+
+def joints(shoulder: float, elbow: float) -> Joints:
+    return Joints(0.0, {"shoulder": shoulder, "elbow": elbow, "other": 1.0}, {}, {})
+
+
+def test_arm_points_follow_the_joint_angles():
+    points = ArmShape(capabilities()).points_B(joints(0.0, -np.pi / 2))
+    assert points == pytest.approx(np.array([[0.3, 0.0, 0.2], [0.7, 0.0, 0.2], [0.7, 0.0, 0.55]]), abs=1e-9)
+
+
+def test_a_thing_held_out_in_front_is_the_robots_own_and_one_beyond_is_not():
+    own = SelfFilter.of(capabilities())
+    assert own.arm is not None
+    arm = own.arm.points_B(joints(0.0, 0.0))
+    points = np.array([[1.05, 0.1, 0.2], [1.4, 0.0, 0.2], [0.8, 0.5, 0.2]])
+    assert own.foreign(points, arm).tolist() == [False, True, True]
+
+
+def test_the_body_is_left_out_also_without_an_arm():
+    own = SelfFilter.of(capabilities(arm=False))
+    assert own.arm is None
+    assert own.foreign(np.array([[0.0, 0.2, 0.5], [0.0, 0.6, 0.5]]), np.empty((0, 3))).tolist() == [False, True]
+
+
+def test_distance_from_a_segment_ends_at_its_ends():
+    points = np.array([[0.5, 1.0, 0.0], [2.0, 0.0, 0.0], [-3.0, 4.0, 0.0]])
+    ends = np.zeros(3), np.array([1.0, 0.0, 0.0])
+    assert segment_distance(points, *ends) == pytest.approx([1.0, 1.0, 5.0])

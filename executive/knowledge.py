@@ -139,14 +139,12 @@ class Knowledge(_Facts):
         """Where one can be sent: rooms, then surfaces."""
         return (*self.places, *self.surfaces)
 
-    def all_names(self) -> Iterator[str]:
-        """Every name and alias of places, surfaces, things, categories and people."""
+    def spellings(self, names: Iterable[str]) -> tuple[str, ...]:
+        """The names with all their aliases, for guessing what a misspelled one means."""
         groups: tuple[Mapping[str, Place | SurfaceFacts | ThingFacts | Person], ...]
         groups = (self.places, self.surfaces, self.things, self.people)
-        for group in groups:
-            for name, facts in group.items():
-                yield from (name, *facts.aliases)
-        yield from self.categories()
+        aliases = {name: facts.aliases for group in groups for name, facts in group.items()}
+        return tuple(word for name in names for word in (name, *aliases.get(name, ())))
 
     def class_ids(self, name: str) -> tuple[int, ...]:
         """The numbers of the classes that `name` stands for."""

@@ -201,16 +201,18 @@ def _unknown_names(
 ) -> Iterator[InputError]:
     for key, thing in (("take", command.item), ("object", command.object)):
         if thing is not None and knowledge.thing(thing.name) is None:
-            yield _unknown(file, (*path, key), "thing", thing.name, knowledge.thing_names())
+            yield _unknown(file, (*path, key), "thing", thing.name, knowledge.thing_names(), knowledge)
     goals = (*knowledge.place_names(), *knowledge.people, _START)
     if command.goal is not None and _goal(command.goal, knowledge) is None:
-        yield _unknown(file, (*path, "to"), "place or person", command.goal, goals)
+        yield _unknown(file, (*path, "to"), "place or person", command.goal, goals, knowledge)
     if command.goal_at is not None and knowledge.place(command.goal_at) is None:
-        yield _unknown(file, (*path, "to"), "place", command.goal_at, knowledge.place_names())
+        yield _unknown(file, (*path, "to"), "place", command.goal_at, knowledge.place_names(), knowledge)
 
 
-def _unknown(file: MissionFile, path: tuple[str | int, ...], kind: str, name: str, known: Sequence[str]) -> InputError:
-    near = did_you_mean(name, known)
+def _unknown(
+    file: MissionFile, path: tuple[str | int, ...], kind: str, name: str, known: Sequence[str], knowledge: Knowledge
+) -> InputError:
+    near = did_you_mean(name, knowledge.spellings(known))
     mend = f"did you mean {near!r}?" if near else f"known are {listing(known)}"
     return file.error(path, f"unknown {kind} {name!r}", mend)
 

@@ -134,6 +134,7 @@ def _model_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:
 def _inside(kind: Any, part: str | int) -> Any:
     """The annotation of what stands under `part` in something annotated `kind`."""
     fields = {f.alias or n: f.annotation for n, f in getattr(kind, "model_fields", {}).items()}
-    inner = fields[part] if part in fields else next(iter(get_args(kind)[-1:]), None)
+    items = [arg for arg in get_args(kind) if arg is not Ellipsis]
+    inner = fields[part] if part in fields else next(iter(items[-1:]), None)
     optional = get_origin(inner) in (Union, UnionType)
     return next(arg for arg in get_args(inner) if arg is not type(None)) if optional else inner

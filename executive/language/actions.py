@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import Final
 
 from executive.language.clauses import Clause
@@ -47,7 +48,7 @@ def _goes_nowhere(action: Action) -> bool:
 
 def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
     """Leave out "see" and "check" before "if there is": the question stands alone."""
-    for clause, after in zip(clauses, [*clauses[1:], None], strict=True):
+    for clause, after in zip_longest(clauses, clauses[1:]):
         checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
         if not (checks and after is not None and after.whether):
             yield clause
@@ -78,7 +79,7 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
 
 def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
     going = verb.kinds == {VerbKind.GO}
-    roles = read_roles(clause.items, words, describes=not going)
+    roles = read_roles(clause.items, words, describes=not going, puts=VerbKind.PLACE in verb.kinds)
     kind = _kind(verb, roles)
     blank = Action(kind, verb.text, unknown=tuple(roles.unknown))
     if kind is VerbKind.GO:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from executive.command import Command, Task, Thing
 from executive.errors import did_you_mean, listing
@@ -61,14 +61,13 @@ def _thing(phrase: Phrase, knowledge: Knowledge) -> Thing:
         known = next(filter(None, map(knowledge.thing, forms)), None)
         if known and all(t.adjective for t in attributes):
             return Thing(known, tuple(t.word for t in attributes))
-    raise _unknown("thing", phrase.text, knowledge.thing_names())
+    raise _unknown("thing", phrase.text, knowledge.thing_names(), knowledge)
 
 
-def _unknown(kind: str, name: str, known: Iterable[str]) -> RefusalError:
-    names = list(known)
-    near = did_you_mean(name, names)
+def _unknown(kind: str, name: str, known: Sequence[str], knowledge: Knowledge) -> RefusalError:
+    near = did_you_mean(name, knowledge.spellings(known))
     hint = f" (did you mean {near!r}?)" if near else ""
-    return RefusalError(f"I know no {kind} {name!r}{hint}; known {kind}s: {listing(names)}", [name])
+    return RefusalError(f"I know no {kind} {name!r}{hint}; known {kind}s: {listing(known)}", [name])
 
 
 def _goal(location: Location, knowledge: Knowledge) -> tuple[str, str | None]:
@@ -89,12 +88,12 @@ def _place(location: Location, knowledge: Knowledge) -> str:
     if location.phrase is None:
         raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
     phrase, around = location.phrase, _around(location)
-    room = None if around is None else _named_place(around, knowledge)
+    room = None if around is None else knowledge.place(around)
     if around is not None and room is None:
-        raise _unknown("place", around, knowledge.place_names())
+        raise _unknown("place", around, knowledge.place_names(), knowledge)
     inside = [name for name in _candidates(phrase, knowledge) if room in (None, name, knowledge.room(name))]
     if not inside:
-        raise _unknown("place", location.text, knowledge.place_names())
+        raise _unknown("place", location.text, knowledge.place_names(), knowledge)
     if len(inside) > 1:
         raise RefusalError(f"which {phrase.text}: {listing(inside, last='or')}?", [phrase.text], question=True)
     return inside[0]
@@ -106,10 +105,6 @@ def _around(location: Location) -> str | None:
         return location.within.text
     extra = () if location.phrase is None else location.phrase.extra
     return " ".join(extra[1:]) if extra[:1] == ("of",) else None
-
-
-def _named_place(name: str, knowledge: Knowledge) -> str | None:
-    return knowledge.place(name)
 
 
 def _candidates(phrase: Phrase, knowledge: Knowledge) -> list[str]:

@@ -188,6 +188,8 @@ class _Reader:
 
     def _directional(self, start: int) -> int:
         """How many words from `start` on tell a direction or a posture."""
+        if self.tokens[start].relation == "prt":
+            return 1
         preposition = int(self.tokens[start].pos in ("ADP", "PART"))
         phrase = self._phrase_at(start + preposition)
         if phrase is None or phrase.head.lemma not in self.words.directions:

@@ -70,16 +70,17 @@ class _Spoken:
     joint: str
 
 
-def read_roles(items: Sequence[Item], words: Lexicon, *, describes: bool) -> Roles:
+def read_roles(items: Sequence[Item], words: Lexicon, *, describes: bool, puts: bool = False) -> Roles:
     """Sort the items behind a verb.
 
-    `describes` says that a first "near", "on top of" with more places behind it tells which object is meant.
+    `describes` says that a first "near", "on top of" with more places behind it tells which object is meant, `puts`
+    that "on" behind "from" says where to, as in "put the cup from the desk on the bed".
     """
     roles = Roles()
     spoken = list(_spoken(items, roles))
     if describes:
         spoken = _describe(spoken)
-    for one in _nested(spoken):
+    for one in _nested(spoken, puts):
         _ADD[one.chunk.role](roles, one)
     roles.goals += [HERE if item.here else THERE for item in items if isinstance(item, Adverb)]
     _split_recipient(roles)
@@ -133,13 +134,14 @@ _CLOSER: Final = (PrepositionRole.AT, PrepositionRole.BESIDE)
 _PLACE_ROLES: Final = (PrepositionRole.SOURCE, PrepositionRole.GOAL, *_CLOSER)
 
 
-def _nested(spoken: Sequence[_Spoken]) -> Iterator[_Placed]:
+def _nested(spoken: Sequence[_Spoken], puts: bool) -> Iterator[_Placed]:
     """Join to each place the one behind it that tells it more closely."""
     rest = list(spoken)
     while rest:
         first = rest.pop(0)
         chain: list[Chunk] = []
-        while rest and _tells_closer(rest[0], chain[-1] if chain else first.chunk):
+        apart = puts and first.chunk.role is PrepositionRole.SOURCE
+        while rest and not apart and _tells_closer(rest[0], chain[-1] if chain else first.chunk):
             chain.append(rest.pop(0).chunk)
         within: Location | None = None
         for chunk in reversed(chain):

@@ -99,13 +99,13 @@ def parse_lines(
 def _commands(text: str, parser: DependencyParser, knowledge: Knowledge | None) -> tuple[Command, ...]:
     """All steps from text to commands; raises RefusalError."""
     words = text.split()
-    if not words:
-        raise RefusalError(f"nothing was said; {known_line(knowledge)}")
     if len(words) > MAX_WORDS:
         raise RefusalError(f"{len(words)} words are too many for one sentence; say it in {MAX_WORDS} at most")
     tokens = parse_with_names(open_commands(text), parser, None if knowledge is None else name_table(knowledge))
     items = split_items(tokens, noun_phrases(tokens), lexicon())
     clauses = split_clauses(items)
+    if not clauses:
+        raise RefusalError(f"nothing was said; {known_line(knowledge)}")
     actions = read_actions(clauses if knowledge else without_name(clauses), lexicon())
     _check(actions, knowledge)
     deeds = resolve(actions)

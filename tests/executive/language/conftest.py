@@ -1,0 +1,16 @@
+from pathlib import Path
+
+import pytest
+
+from executive.knowledge import load_knowledge
+from executive.language import load_parser
+
+
+@pytest.fixture(scope="session")
+def parser():
+    return load_parser()
+
+
+@pytest.fixture(scope="session")
+def knowledge():
+    return load_knowledge(Path(__file__).with_name("world.yaml"))

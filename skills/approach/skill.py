@@ -16,7 +16,7 @@ from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.candidates import Target, grasp_candidates
-from skills.grasp.planning import PREGRASPS_M
+from skills.grasp.planning import within_reach
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 
@@ -96,11 +96,9 @@ class Approach(ArmSkill[ApproachInputs]):
 
 def grasp_reachable(model: ArmModel, X_WB: RigidTransform, seen: ObjectObservation) -> bool:
     """Whether the arm reaches some grasp of a thing, and its pre-grasp, with the body at X_WB."""
-    target = observed_target(seen, X_WB)
-    for candidate in grasp_candidates(target, model.p_BS):
-        if model.inverse(candidate.X_BH, 0.08) and model.inverse(candidate.retreated(PREGRASPS_M[-1]), 0.08):
-            return True
-    return False
+    up_B = X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
+    candidates = grasp_candidates(observed_target(seen, X_WB), model.p_BS)
+    return any(within_reach(model, candidate, up_B) for candidate in candidates)
 
 
 def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:

@@ -13,7 +13,7 @@ from skills.api import Costmap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.robot import Capabilities, Pose2D
 
-DISTANCES_M = (0.90, 0.95, 0.86, 1.0, 0.82, 1.06)
+DISTANCES_M = (0.90, 0.94, 0.87, 0.84, 0.98, 0.81, 1.02, 1.06)
 BEARINGS = 24
 COMFORTABLE_M = (0.80, 1.02)
 COMFORTABLE_BEARING_RAD = 0.35

@@ -16,15 +16,23 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.robot import FloatArray
 
+_ABOVE_SURFACE_M = 0.006
+_LEAST_GRIP_M = 0.014
+
 
 @dataclass(frozen=True)
 class JawGeometry:
-    """The gripper in the hand frame, m: palm at palm_x, fingertips at tip_x, inner face of the fixed jaw at fixed_z."""
+    """The gripper in the hand frame, m: palm at palm_x, fingertips at tip_x, inner face of the fixed jaw at fixed_z.
+
+    The tips are 2 half_breadth wide along y and tip_thickness thick; `clearance` is left beside the fixed jaw.
+    """
 
     palm_x: float = 0.142
     tip_x: float = 0.240
     fixed_z: float = -0.038
     clearance: float = 0.010
+    half_breadth: float = 0.030
+    tip_thickness: float = 0.015
     max_width: float = 0.115
 
 
@@ -77,11 +85,12 @@ def grasp_candidates(target: Target, p_BS: FloatArray, jaw: JawGeometry | None =
     jaw = jaw or JawGeometry()
     ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
     stations = _round_stations(target, ahead) if target.round else list(_long_stations(target, ahead))
-    found = [
+    tried = [
         _candidate(target, station, attitude, side, jaw)
         for station, attitude, side in itertools.product(stations, _attitudes(target), (1.0, -1.0))
         if station.width_m < jaw.max_width
     ]
+    found = [candidate for candidate in tried if candidate is not None]
     if not target.upright:
         towards = np.array([np.cos(ahead), np.sin(ahead), 0.0])
         found = [each for each in found if each.X_BH.rotation().matrix()[:, 0] @ towards > -0.3]
@@ -129,7 +138,7 @@ def _long_stations(target: Target, ahead_rad: float) -> Iterator[_Station]:
 
 def _candidate(
     target: Target, station: _Station, attitude: tuple[float, float], side: float, jaw: JawGeometry
-) -> GraspCandidate:
+) -> GraspCandidate | None:
     tilt, lean = attitude
     c, s = np.cos(station.azimuth_rad), np.sin(station.azimuth_rad)
     x_axis = np.array([np.cos(tilt) * c, np.cos(tilt) * s, -np.sin(tilt)])
@@ -142,10 +151,18 @@ def _candidate(
         cost = station.cost + 0.4 * abs(tilt - np.radians(10.0))
     else:
         height = 0.5 * target.height_m
-        sunk = (0.5 * station.width_m + jaw.clearance) * abs(np.sin(lean))
-        depth = jaw.tip_x - max(0.004, height - 0.006 - sunk) / (np.sin(tilt) * np.cos(lean))
+        beyond = (height - _ABOVE_SURFACE_M - _tip_drop(R_BH, station.width_m, jaw)) / -R_BH.matrix()[2, 0]
+        if height + beyond * -R_BH.matrix()[2, 0] < _LEAST_GRIP_M:
+            return None
+        depth = jaw.tip_x - beyond
         cost = station.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean)
     p_HT = np.array([depth, 0.0, jaw.fixed_z + jaw.clearance + 0.5 * station.width_m])
     p_BT = np.array([*station.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
     return GraspCandidate(X_BH, station.width_m, float(cost), tilt)
+
+
+def _tip_drop(R_BH: RotationMatrix, width_m: float, jaw: JawGeometry) -> float:
+    """How far below the middle of the fingertips their lowest corner lies, for a thing of some width between them."""
+    half = 0.5 * width_m + jaw.clearance + jaw.tip_thickness
+    return float(abs(R_BH.matrix()[2, 1]) * jaw.half_breadth + abs(R_BH.matrix()[2, 2]) * half)

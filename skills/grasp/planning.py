@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.arm.collision import ArmScene, Box
+from skills.arm.kinematics import ArmModel
 from skills.arm.motion import plan_joint_path, plan_line, time_path
 from skills.arm.routine import PlanningError
 from skills.grasp.candidates import GraspCandidate
@@ -85,16 +86,29 @@ def reach_candidate(
     raise PlanningError(reason)
 
 
+def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:
+    """Whether the arm reaches a grasp, its pre-grasp and the end of its lift; contact is not looked at."""
+    X_BH, distance = candidate.X_BH, PREGRASPS_M[-1]
+    if not (model.inverse(X_BH, margin_rad) and model.inverse(candidate.retreated(distance), margin_rad)):
+        return False
+    lifted = (X_BH.translation() + offset for offset in _lifts(model, X_BH, up_B))
+    return any(model.inverse(RigidTransform(X_BH.rotation(), p), margin_rad) for p in lifted)
+
+
+def _lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[FloatArray]:
+    """Ways to lift from a grasp, the best first."""
+    back = (model.p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
+    back = back / max(float(np.linalg.norm(back)), 1e-6)
+    return [up_m * up_B + back_m * back for up_m, back_m in LIFTS_M]
+
+
 def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray) -> FloatArray:
     """The first way to lift that the arm can follow. Raises PlanningError."""
     X_BH = scene.model.X_BH(q_rad)
-    back = (scene.model.p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
-    back = back / max(float(np.linalg.norm(back)), 1e-6)
-    for up_m, back_m in LIFTS_M:
-        lift_B = up_m * up_B + back_m * back
+    for lift_B in _lifts(scene.model, X_BH, up_B):
         try:
             plan_line(scene.model, q_rad, RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B))
         except PlanningError:
             continue
-        return np.asarray(lift_B)
+        return lift_B
     raise PlanningError("the arm cannot lift the thing from there")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 from collections.abc import Callable, Mapping
 from enum import StrEnum
@@ -160,6 +161,7 @@ def evaluate(
 
 def main() -> None:
     """The entry point of the console script."""
+    logging.getLogger("drake").setLevel(logging.WARNING)
     app()
 
 
@@ -194,7 +196,7 @@ def _run_shown(
     else:
         with live_view(compiled, console) as observer:
             finished = run_request(request, compiled, seed=seed, out=out, record=record, observer=observer)
-        console.print(to_rich(finished.tree))
+        console.print(to_rich(finished.tree, collapsed=False))
     for line in finished.report.lines():
         console.print(line)
     console.print(f"Written to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}", markup=False)

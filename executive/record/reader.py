@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +11,12 @@ from typing import Any
 
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
+from zstandard import ZstdError
 
 from executive.errors import InputError
 from executive.record.schemas import WALL
+
+_DAMAGE = (McapError, struct.error, ZstdError, ValueError)
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ def read_events(path: Path) -> tuple[Event, ...]:
             return tuple(_events(NonSeekingReader(file)))
     except OSError as error:
         raise InputError(f"cannot read it ({error.strerror})", mend="name a log that exists", file=path) from error
-    except McapError as error:
+    except _DAMAGE as error:
         raise InputError("it is no event log", mend="name a log.mcap that a run has written", file=path) from error
 
 
@@ -50,6 +54,6 @@ def _events(reader: NonSeekingReader) -> Iterator[Event]:
         for _, channel, message in reader.iter_messages(log_time_order=False):
             count += 1
             yield Event(channel.topic, message.log_time / 1e9, json.loads(message.data))
-    except McapError:
+    except _DAMAGE:
         if count == 0:
             raise

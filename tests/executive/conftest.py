@@ -141,7 +141,9 @@ class Script:
 COKE = ObjectObservation(0.0, Thing("coke"), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.0, 0.9, "counter")
 
 
-def scripted_skill(script: Script, skill_name: str, inputs_type: type, outputs_: Mapping[str, type]) -> type[Skill[Any]]:
+def scripted_skill(
+    script: Script, skill_name: str, inputs_type: type, outputs_: Mapping[str, type]
+) -> type[Skill[Any]]:
     """A skill that drives for a few steps and then ends as the script says."""
 
     class Scripted(Skill[Any]):

@@ -1,0 +1,58 @@
+"""Status checks: yes, an honest no, and no answer when something was not looked at."""
+
+import py_trees
+import pytest
+from py_trees.common import Status
+
+from executive.behaviours.answer import Answer
+from executive.behaviours.composites import MemorySelector
+from executive.behaviours.explained import Explained
+from skills.api import Cause
+
+
+class Look(Explained, py_trees.behaviour.Behaviour):
+    def __init__(self, path_id: str, cause: Cause | None) -> None:
+        super().__init__(path_id)
+        self.path_id, self.fails_with = path_id, cause
+        self.clear_explanation()
+
+    def update(self) -> Status:
+        self.cause, self.message = self.fails_with, f"{self.fails_with}"
+        return Status.SUCCESS if self.fails_with is None else Status.FAILURE
+
+
+def answer_of(context, *causes: Cause | None) -> Answer:
+    looks = [Look(f"alice/q/{n}", cause) for n, cause in enumerate(causes)]
+    root = Answer(
+        path_id="alice/q",
+        name="q",
+        child=MemorySelector(path_id="alice/q/search", name="search", children=looks),
+        question="hammer in the workshop",
+        looks={"bench": ["alice/q/0", "alice/q/1"], "trolley": [f"alice/q/{n}" for n in range(2, len(causes))]},
+        key="alice/q/answer",
+        board=context.board,
+    )
+    root.tick_once()
+    return root
+
+
+def test_a_sighting_is_a_yes(context):
+    root = answer_of(context, Cause.POSTCONDITION, None, Cause.POSTCONDITION)
+    assert (root.status, root.answer, root.message) == (Status.SUCCESS, True, "yes: hammer in the workshop")
+    assert context.board.get("alice/q/answer") is True
+
+
+def test_no_after_every_view_was_looked_from_is_a_success(context):
+    root = answer_of(context, *[Cause.POSTCONDITION] * 3)
+    assert (root.status, root.answer, root.cause) == (Status.SUCCESS, False, None)
+
+
+@pytest.mark.parametrize("obstacle", [Cause.PLANNING, Cause.EXECUTION, Cause.TIMEOUT])
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_no_is_not_said_when_a_view_was_missed(context, obstacle, at):
+    causes = [Cause.POSTCONDITION] * 3
+    causes[at] = obstacle
+    root = answer_of(context, *causes)
+    assert (root.status, root.answer, root.cause) == (Status.FAILURE, None, obstacle)
+    assert ("trolley" if at == 2 else "bench") in root.message
+    assert "alice/q/answer" not in context.board

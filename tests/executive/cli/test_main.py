@@ -1,0 +1,179 @@
+"""The command line: what scripts rely on, and bad input."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from executive.cli import main
+from executive.cli.mission_run import Finished
+from executive.cli.report import RefereeReport, RunReport
+from executive.view.model import node_view
+
+FETCH = "Hey Alice, can you fetch me a drink from the kitchen"
+
+
+def invoke(*arguments: str):
+    return CliRunner().invoke(main.app, list(arguments))
+
+
+def report(**changes) -> RunReport:
+    facts = {
+        "outcome": "success",
+        "cause": None,
+        "message": "done",
+        "referee": RefereeReport(True, "it is so", 0, 0),
+        "commands": ("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]",),
+        "world": "flat",
+        "seed": 1,
+        "sim_time_s": 12.5,
+        "wall_time_s": 2.5,
+        "real_time_factor": 5.0,
+        "ticks": 250,
+        "log": "out/log.mcap",
+    }
+    return RunReport(**{**facts, **changes})
+
+
+@pytest.fixture
+def no_plant(monkeypatch):
+    """Runs end at once as the test says; no plant is built."""
+    ended = {"report": report()}
+
+    def run_request(request, tree, *, seed, out, record, observer=None):
+        out.mkdir(parents=True, exist_ok=True)
+        return Finished(ended["report"], node_view(tree.root))
+
+    monkeypatch.setattr(main, "run_request", run_request)
+    return ended
+
+
+def test_parse_prints_the_text_form_with_and_without_the_name():
+    for sentence in (FETCH, "fetch me a drink from the kitchen"):
+        result = invoke("parse", sentence)
+        assert result.exit_code == 0
+        assert result.stdout.splitlines() == [
+            "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
+            "Take [drink] to [start] and do [Nothing] to [Nothing]",
+        ]
+
+
+def test_parse_json_is_the_last_line_and_alone_on_standard_output():
+    result = invoke("parse", FETCH, "--json")
+    (line,) = result.stdout.splitlines()
+    assert [command["goal"] for command in json.loads(line)["commands"]] == ["kitchen", "start"]
+
+
+def test_parse_jsonl_answers_line_by_line_in_order(tmp_path: Path):
+    (tmp_path / "s.txt").write_text("go to the balcony\n\nwhat time is it\n")
+    result = invoke("parse", "--open", "--jsonl", "--file", str(tmp_path / "s.txt"))
+    answers = [json.loads(line) for line in result.stdout.splitlines()]
+    assert (result.exit_code, [answer["status"] for answer in answers]) == (0, ["ok", "refused", "refused"])
+    assert answers[0]["commands"][0]["goal"] == "balcony"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("parse", "what time is it"), "do not understand"),
+        (("parse", "bring me the unicorn"), "unicorn"),
+        (("parse", "fetch me a coke from the moon"), "moon"),
+        (("parse",), "takes one sentence"),
+        (("parse", "--file", "absent.txt"), "absent.txt"),
+        (("tree", "go to the kitchen", "--world", "falt"), "flat"),
+        (("tree", "absent.yaml"), "absent.yaml"),
+        (("run", "--say", "go to the kitchen"), "Hey Alice"),
+        (("run",), "--say"),
+        (("evaluate", "--say", FETCH, "--seeds", "many"), "no range of seeds"),
+        (("evaluate", "--say", "Hey Alice, dance"), "errand"),
+    ],
+)
+def test_bad_input_is_one_line_on_standard_error_and_exit_2(arguments, words):
+    result = invoke(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    assert words in line
+
+
+def test_a_broken_mission_file_names_file_and_line(tmp_path: Path):
+    path = tmp_path / "m.yaml"
+    path.write_text("name: x\nsteps:\n  - {to: kichen}\n")
+    result = invoke("run", str(path))
+    assert (result.exit_code, "m.yaml:3" in result.stderr, "kitchen" in result.stderr) == (2, True, True)
+    path.write_text("name: x\nworld: falt\nsteps:\n  - {to: kitchen}\n")
+    assert "m.yaml:2" in invoke("run", str(path)).stderr
+
+
+def test_tree_formats(tmp_path: Path):
+    sentence = "is there a hammer in the workshop"
+    text = invoke("tree", sentence)
+    assert (text.exit_code, text.stdout.splitlines()[0][0]) == (0, "○")
+    root = json.loads(invoke("tree", sentence, "--format", "json").stdout)
+    assert set(root) == {"id", "type", "name", "status", "cause", "source", "children"}
+    assert root["id"].startswith("alice/")
+    written = tmp_path / "tree.svg"
+    assert invoke("tree", sentence, "--format", "svg", "-o", str(written)).exit_code == 0
+    assert written.read_text().startswith("<svg")
+
+
+def test_tree_of_a_file_maps_nodes_to_lines(tmp_path: Path):
+    path = tmp_path / "m.yaml"
+    path.write_text("name: rounds\nsteps:\n  - {to: kitchen}\n  - say: go to the bedroom\n")
+    root = json.loads(invoke("tree", str(path), "--format", "json").stdout)
+    assert [child["source"]["line"] for child in root["children"]] == [3, 4]
+
+
+def test_run_json_has_exactly_the_contract_on_the_last_line(no_plant, tmp_path):
+    result = invoke("run", "--say", "Hey Alice, go to the bedroom", "--json", "--out", str(tmp_path))
+    values = json.loads(result.stdout.splitlines()[-1])
+    assert list(values) == [
+        "outcome", "cause", "message", "referee", "commands", "world", "seed", "sim_time_s", "wall_time_s",
+        "real_time_factor", "ticks", "log",
+    ]  # fmt: skip
+    assert list(values["referee"]) == ["success", "why", "collisions", "drops"]
+    assert (result.exit_code, len(result.stdout.splitlines())) == (0, 1)
+    assert "The referee saw" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"outcome": "failure", "cause": "PLANNING"},
+        {"outcome": "cancelled", "cause": "CANCELLED"},
+        {"outcome": "error", "cause": "ERROR"},
+        {"referee": RefereeReport(False, "the coke is on the floor", 0, 1)},
+    ],
+)
+def test_a_mission_that_is_not_achieved_exits_with_1(no_plant, tmp_path, changes):
+    no_plant["report"] = report(**changes)
+    assert invoke("run", "--no-wake", "--say", "go to the bedroom", "--out", str(tmp_path)).exit_code == 1
+
+
+def test_run_shows_commands_tree_and_both_verdicts(no_plant, tmp_path):
+    result = invoke("run", "--say", "Hey Alice, go to the bedroom", "--out", str(tmp_path))
+    lines = result.stdout.splitlines()
+    assert lines[0] == "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
+    assert any(line.startswith("The tree claims: ✓ success: done") for line in lines)
+    assert any(line.startswith("The referee saw: ✓") for line in lines)
+
+
+def test_evaluate_counts_claims_and_verdicts(monkeypatch, tmp_path):
+    reports = (
+        report(seed=1),
+        report(seed=2, referee=RefereeReport(False, "no", 0, 0)),
+        report(seed=3, outcome="failure", referee=RefereeReport(False, "no", 1, 0)),
+    )
+
+    def sweep(arguments, seeds, *, jobs, out, done):
+        assert (arguments, seeds, jobs) == (["--say", FETCH], (1, 2, 3), 2)
+        for each in reports:
+            done(each)
+        return reports
+
+    monkeypatch.setattr(main, "sweep", sweep)
+    result = invoke("evaluate", "--say", FETCH, "--seeds", "1-3", "--json", "--out", str(tmp_path))
+    values = json.loads(result.stdout.splitlines()[-1])
+    assert (values["successes"], values["referee_successes"], values["false_claims"]) == (2, 1, 1)
+    assert ([run["seed"] for run in values["runs"]], result.exit_code) == ([1, 2, 3], 1)

@@ -1,0 +1,52 @@
+"""Many seeds in processes of their own."""
+
+import json
+import subprocess
+
+import pytest
+
+from executive.cli import sweep as module
+from executive.cli.report import RefereeReport, RunReport
+from executive.cli.sweep import rows, seed_range, sweep, totals
+from executive.errors import InputError
+
+
+def report(seed: int, outcome: str = "success") -> RunReport:
+    referee = RefereeReport(outcome == "success", "so it is", 0, 0)
+    return RunReport(outcome, None, "done", referee, ("Take",), "flat", seed, 1.0, 1.0, 1.0, 20, "log")
+
+
+@pytest.mark.parametrize(("text", "seeds"), [("1-3", (1, 2, 3)), ("7", (7,)), ("1,4,7-8", (1, 4, 7, 8))])
+def test_seed_ranges(text, seeds):
+    assert seed_range(text) == seeds
+
+
+@pytest.mark.parametrize("text", ["", "a", "1-", "-", "5-3", "1..4"])
+def test_bad_seed_ranges_are_refused(text):
+    with pytest.raises(InputError, match="1-20"):
+        seed_range(text)
+
+
+def test_reports_survive_the_way_through_json():
+    assert RunReport.from_json(json.loads(json.dumps(report(3).to_json()))) == report(3)
+
+
+def test_reports_come_in_the_order_of_the_seeds_and_a_crash_takes_no_other_along(monkeypatch, tmp_path):
+    def fake_run(command, **_options):
+        seed = int(command[command.index("--seed") + 1])
+        told = "" if seed == 2 else "noise\n" + json.dumps(report(seed).to_json()) + "\n"
+        return subprocess.CompletedProcess(command, -11 if seed == 2 else 0, told, "Segmentation fault\n")
+
+    monkeypatch.setattr(module.subprocess, "run", fake_run)
+    done: list[int] = []
+    reports = sweep(["--say", "x"], (3, 2, 1), jobs=2, out=tmp_path, done=lambda each: done.append(each.seed))
+    assert [each.seed for each in reports] == [3, 2, 1]
+    assert sorted(done) == [1, 2, 3]
+    assert (reports[1].outcome, "Segmentation fault" in reports[1].message) == ("error", True)
+
+
+def test_totals_count_claims_that_the_referee_denies():
+    denied = RunReport.from_json({**report(2).to_json(), "referee": vars(RefereeReport(False, "no", 0, 0))})
+    result = totals([report(1), denied, report(3, "failure")])
+    assert [result[key] for key in ("successes", "referee_successes", "false_claims")] == [2, 1, 1]
+    assert [row[:3] for row in rows([report(1), denied])] == [("1", "success", "yes"), ("2", "success", "no")]

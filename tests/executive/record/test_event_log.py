@@ -1,0 +1,145 @@
+"""The event log: what is written comes back, also from a file that was cut off."""
+
+import base64
+import math
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from executive.errors import InputError
+from executive.record.event_log import EventLog, plain_values
+from executive.record.reader import comparable_events, read_events
+from skills.api import Cause
+
+
+@dataclass(frozen=True)
+class Point:
+    x: float
+    cause: Cause
+
+
+def test_messages_come_back_in_order_with_the_robots_time(tmp_path, clock):
+    log = EventLog(tmp_path / "deep" / "log.mcap", clock)
+    log("transitions", {"node": "a", "to": "RUNNING"})
+    clock.advance(1.25)
+    log("mine", {"values": (1, 2.5), "point": Point(math.nan, Cause.PLANNING)})
+    log.close()
+    first, second = read_events(log.path)
+    assert (first.topic, first.stamp_s, first.data["node"]) == ("transitions", 0.0, "a")
+    assert (second.topic, second.stamp_s) == ("mine", 1.25)
+    assert second.data == {"values": [1, 2.5], "point": {"x": None, "cause": "PLANNING"}}
+
+
+def test_wall_times_are_left_out_of_the_comparison(tmp_path, clock):
+    log = EventLog(tmp_path / "log.mcap", clock)
+    log("wall", {"wall_time_s": 1.0})
+    log("outcome", {"outcome": "success"})
+    log.close()
+    assert [event.topic for event in comparable_events(log.path)] == ["outcome"]
+
+
+def test_two_logs_of_the_same_messages_are_equal_to_the_byte(tmp_path, clock):
+    for name in ("a", "b"):
+        log = EventLog(tmp_path / name, clock)
+        log("pose", {"x": 1.0})
+        log.close()
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_a_cut_off_log_gives_what_was_flushed(tmp_path, clock):
+    log = EventLog(tmp_path / "log.mcap", clock)
+    for _ in range(30):
+        log("pose", {"x": clock.now()})
+        clock.advance(0.1)
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(log.path.read_bytes())
+    events = read_events(cut)
+    assert 2.9 - events[-1].stamp_s <= 1.0
+    cut.write_bytes(log.path.read_bytes()[:-7])
+    assert len(read_events(cut)) > 0
+    log.close()
+
+
+KILLED = """
+import sys, time
+from pathlib import Path
+from executive.record.event_log import EventLog
+class Clock:
+    time_s = 0.0
+    def now(self): return self.time_s
+clock = Clock()
+log = EventLog(Path(sys.argv[1]), clock)
+while True:
+    log("pose", {"x": clock.time_s})
+    clock.time_s += 0.1
+    print(clock.time_s, flush=True)
+"""
+
+
+def test_a_killed_process_leaves_a_readable_log(tmp_path):
+    path = tmp_path / "log.mcap"
+    process = subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    last_s = [float(process.stdout.readline()) for _ in range(100)][-1]
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    assert read_events(path)[-1].stamp_s >= last_s - 1.2
+
+
+def test_pictures_become_compressed_images_that_viewers_draw(tmp_path, clock):
+    picture = np.zeros((8, 8, 3), np.uint8)
+    picture[..., 0] = 250  # red
+    log = EventLog(tmp_path / "log.mcap", clock)
+    log("detections", {"image": picture, "source": "hand"})
+    log.close()
+    with log.path.open("rb") as file:
+        ((schema, _, _),) = list(make_reader(file).iter_messages())
+    data = read_events(log.path)[0].data
+    decoded = cv2.imdecode(np.frombuffer(base64.b64decode(data["data"]), np.uint8), cv2.IMREAD_COLOR)
+    assert schema is not None
+    assert (schema.name, data["format"], data["frame_id"]) == ("foxglove.CompressedImage", "jpeg", "hand")
+    assert decoded[4, 4, 2] > 230 > 60 > decoded[4, 4, 0]
+
+
+def test_closing_twice_is_fine_and_writing_afterwards_is_not(tmp_path, clock):
+    log = EventLog(tmp_path / "log.mcap", clock)
+    log.close()
+    log.close()
+    with pytest.raises(ValueError, match="closed"):
+        log("pose", {})
+
+
+def test_a_file_that_is_no_log_is_refused(tmp_path):
+    (tmp_path / "x").write_text("hello")
+    with pytest.raises(InputError, match="no event log"):
+        read_events(tmp_path / "x")
+    with pytest.raises(InputError, match="cannot read"):
+        read_events(tmp_path / "absent")
+
+
+@pytest.mark.parametrize(
+    ("value", "plain"),
+    [(np.float64(1.5), 1.5), (np.arange(2), [0, 1]), (math.inf, None), ({1: {2}}, {"1": [2]}), (Cause.ERROR, "ERROR")],
+)
+def test_plain_values(value, plain):
+    assert plain_values(value) == plain
+
+
+def test_a_whole_mission_is_logged(tmp_path, compiled, run_tree, make, clock):
+    log = EventLog(tmp_path / "log.mcap", clock)
+    run_tree(compiled(*make.FETCH), publish=log)
+    log.close()
+    events = read_events(log.path)
+    topics = [event.topic for event in events]
+    assert topics[0] == "tree"
+    assert topics[-2:] == ["outcome", "wall"]
+    assert {"transitions", "pose"} <= set(topics)
+    assert events[-2].data["outcome"] == "success"

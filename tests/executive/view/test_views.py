@@ -1,0 +1,101 @@
+"""Text, SVG and JSON of a tree before and after it ran."""
+
+import json
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+from py_trees.common import Status
+
+from executive.snapshot import NodeState
+from executive.view.looks import Looks, look_of
+from executive.view.model import NodeView, node_view, to_json
+from executive.view.svg import to_svg
+from executive.view.text import to_rich, to_text
+from skills.api import Cause, Failed
+
+
+@pytest.fixture
+def failed(compiled, run_tree, make, script) -> NodeView:
+    script.ends["approach"] = lambda skill: Failed(Cause.PLANNING, "no room to stand <here> & there")
+    tree = compiled(*make.FETCH)
+    return node_view(tree.root, run_tree(tree).worst.states)
+
+
+def test_text_shows_status_cause_and_sentence_once(failed):
+    lines = to_text(failed).splitlines()
+    assert lines[0] == "✗ sequence fetch drink - PLANNING"
+    assert sum("no room to stand" in line for line in lines) == 1
+    assert any(line.endswith("✗ approach - PLANNING: no room to stand <here> & there") for line in lines)
+    assert len(lines) == sum(1 for _ in failed.walk())
+
+
+def test_ascii_text_is_ascii(failed):
+    text = to_text(failed, ascii_only=True)
+    assert text.isascii()
+    assert text.startswith("[x] sequence fetch drink")
+
+
+def test_collapsed_view_hides_what_is_done_or_not_begun(failed):
+    shown = to_rich(failed).plain
+    assert "look at counter" not in shown
+    assert "selector find drink" in shown
+    assert "nodes)" in shown
+
+
+def test_svg_is_well_formed_and_has_every_node(failed):
+    root = ElementTree.fromstring(to_svg(failed, title="a <title> & more"))
+    ids = [group.get("data-id") for group in root.iter("{http://www.w3.org/2000/svg}g") if group.get("data-id")]
+    assert ids == [node.path_id for _, node in failed.walk()]
+    assert "PLANNING: no room to stand" in " ".join(root.itertext())
+
+
+def test_svg_boxes_do_not_overlap(failed):
+    root = ElementTree.fromstring(to_svg(failed))
+    boxes = []
+    for group in root.iter("{http://www.w3.org/2000/svg}g"):
+        if group.get("data-id"):
+            x, y = map(float, group.get("transform")[10:-1].split(","))
+            frame = group.find("{http://www.w3.org/2000/svg}rect")
+            boxes.append((x, y, float(frame.get("width")), float(frame.get("height"))))
+    pairs = [(a, b) for n, a in enumerate(boxes) for b in boxes[n + 1 :]]
+    assert not [
+        (a, b)
+        for a, b in pairs
+        if a[0] < b[0] + b[2] and b[0] < a[0] + a[2] and a[1] < b[1] + b[3] and b[1] < a[1] + a[3]
+    ]
+
+
+def test_json_has_the_keys_of_the_contract(failed):
+    root = json.loads(json.dumps(to_json(failed)))
+    assert set(root) == {"id", "type", "name", "status", "cause", "source", "children"}
+    assert (root["id"], root["status"], root["cause"], root["source"]) == (
+        "alice/fetch-drink",
+        "FAILURE",
+        "PLANNING",
+        None,
+    )
+
+
+def test_a_tree_that_has_not_run_is_idle(compiled, make):
+    view = node_view(compiled(*make.FETCH).root)
+    assert {node.state for _, node in view.walk()} == {NodeState()}
+
+
+def test_looks_are_told_apart_by_symbol_and_colour():
+    looks = [look.value for look in Looks]
+    for attribute in ("word", "symbol", "ascii", "line", "fill"):
+        assert len({getattr(look, attribute) for look in looks}) == len(looks)
+
+
+@pytest.mark.parametrize(
+    ("state", "word"),
+    [
+        (NodeState(), "not run"),
+        (NodeState(Status.INVALID, Cause.CANCELLED), "cancelled"),
+        (NodeState(Status.RUNNING), "running"),
+        (NodeState(Status.SUCCESS), "success"),
+        (NodeState(Status.FAILURE, Cause.PLANNING), "failure"),
+    ],
+)
+def test_look_of_each_state(state, word):
+    assert look_of(state).word == word

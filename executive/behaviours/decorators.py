@@ -70,13 +70,23 @@ class Timeout(ExplainedDecorator):
 class Retry(ExplainedDecorator):
     """Tries again, but only after failures of given causes.
 
-    Child RUNNING or SUCCESS: the same. Child FAILURE of another cause, or no attempts left: FAILURE with its cause.
-    Else RUNNING, and at the next tick the child starts anew from its first step with nothing remembered.
+    Child RUNNING or SUCCESS: the same. Child FAILURE of another cause, or with the node `final` failed, or no attempts
+    left: FAILURE with its cause. Else RUNNING, and at the next tick the child starts anew from its first step with
+    nothing remembered.
     """
 
-    def __init__(self, *, path_id: str, name: str, child: Behaviour, attempts: int, causes: frozenset[Cause]) -> None:
+    def __init__(
+        self,
+        *,
+        path_id: str,
+        name: str,
+        child: Behaviour,
+        attempts: int,
+        causes: frozenset[Cause],
+        final: str | None = None,
+    ) -> None:
         super().__init__(path_id=path_id, name=name, child=child)
-        self._attempts, self._causes = attempts, causes
+        self._attempts, self._causes, self._final = attempts, causes, final
         self.attempt = 1
 
     def initialise(self) -> None:
@@ -88,13 +98,17 @@ class Retry(ExplainedDecorator):
         status = self.pass_on()
         if status != Status.FAILURE:
             return status
-        if self.cause in self._causes and self.attempt < self._attempts:
+        if self.cause in self._causes and self.attempt < self._attempts and not self._final_failed():
             self.attempt += 1
             self.cause, self.message = None, f"attempt {self.attempt} of {self._attempts}, since {self.message}"
             return Status.RUNNING
         if self.attempt > 1:
             self.message = f"{self.message} (after {self.attempt} attempts)"
         return Status.FAILURE
+
+    def _final_failed(self) -> bool:
+        nodes = (node for node in self.iterate() if isinstance(node, Explained) and node.path_id == self._final)
+        return any(isinstance(node, Behaviour) and node.status == Status.FAILURE for node in nodes)
 
 
 class Condition(Protocol):

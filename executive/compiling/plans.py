@@ -173,16 +173,23 @@ class _Decorator(NodePlan):
 
 @dataclass(frozen=True, kw_only=True)
 class RetryPlan(_Decorator):
-    """Up to `attempts` attempts, after failures of the given causes only."""
+    """Up to `attempts` attempts, after failures of the given causes only, and not when the node `final` failed."""
 
     kind: ClassVar[str] = "retry"
     attempts: int
     causes: frozenset[Cause]
+    final: str | None = None
 
     def build(self, context: RunContext) -> Behaviour:
         """A Retry decorator."""
-        child = self.child.build(context)
-        return Retry(path_id=self.path_id, name=self.name, child=child, attempts=self.attempts, causes=self.causes)
+        return Retry(
+            path_id=self.path_id,
+            name=self.name,
+            child=self.child.build(context),
+            attempts=self.attempts,
+            causes=self.causes,
+            final=self.final,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

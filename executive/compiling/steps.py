@@ -17,7 +17,7 @@ from skills.robot import Pose2D
 
 START: Final = "start"
 ATTEMPTS: Final = 3
-WORTH_RETRYING: Final = frozenset({Cause.EXECUTION, Cause.POSTCONDITION})
+WORTH_RETRYING: Final = frozenset({Cause.EXECUTION, Cause.POSTCONDITION, Cause.PRECONDITION, Cause.PLANNING})
 
 
 def step_plan(shop: Workshop) -> NodePlan:
@@ -35,7 +35,10 @@ def needs_start(shop: Workshop) -> bool:
 
 
 def grasp_plan(shop: Workshop) -> NodePlan:
-    """Find it, stand before it, take it, tuck the arm in; approach and grasp are tried again after a new look."""
+    """Find it, stand before it, take it, tuck the arm in.
+
+    When standing or taking fails the robot looks again and tries anew; when nothing is to be found that is final.
+    """
     thing = _required(shop, shop.command.object)
     if shop.command.item is not None:
         raise shop.error("the one gripper cannot take hold of a second thing", "put the first one down before")
@@ -56,6 +59,7 @@ def grasp_plan(shop: Workshop) -> NodePlan:
         child=attempt,
         attempts=ATTEMPTS,
         causes=WORTH_RETRYING,
+        final=f"{shop.path_id}/find",
     )
     return shop.sequence(f"get {thing} {where(place)}", attempts, shop.skill("stow"))
 

@@ -60,6 +60,13 @@ def test_grasping_is_given_up_after_three_attempts(compiled, run_tree, make, scr
     assert script.begun.count("grasp") == 3
 
 
+@pytest.mark.parametrize("cause", [Cause.TIMEOUT, Cause.ERROR])
+def test_timeouts_and_defects_are_not_tried_again(compiled, run_tree, make, script, cause):
+    script.ends["grasp"] = lambda skill: Failed(cause, "no")
+    assert run_tree(compiled(*make.FETCH)).worst.cause is cause
+    assert script.begun.count("grasp") == 1
+
+
 def test_a_thing_lost_on_the_way_is_no_success(compiled, run_tree, make, robot, script):
     script.steps = 100
 

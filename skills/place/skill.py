@@ -25,9 +25,9 @@ from skills.robot import FloatArray, Pose2D
 
 HAND_TO_THING_M = 0.185
 ABOVE_M = 0.22
+_SURELY_FREE_M = 0.135
 _LOWEST_M = 0.02
-_STEP_M = 0.006
-_STEP_S = 0.2
+_STEP_M = 0.008
 _CONTACT_M = 0.005
 _SEEN_AGAIN_M = 0.12
 
@@ -120,6 +120,7 @@ class Place(ArmSkill[PlaceInputs]):
     def _lower(self, surface: Surface) -> Routine[None]:
         """Go down in small steps until the arm is held up, by contact, or the height is that of the surface."""
         message = f"putting the thing down on the {surface.name}"
+        yield from self.shift_hand(np.array([0.0, 0.0, _SURELY_FREE_M - ABOVE_M]), message)
         q_wanted = self.q_rad()
         X_BH = self.model.X_BH(q_wanted)
         rest_m = float(X_BH.translation()[2]) - self._hand_z()

@@ -19,6 +19,7 @@ Colour = tuple[float, float, float]
 UV = tuple[tuple[float, float], tuple[float, float]]
 WHOLE: UV = ((0.0, 0.0), (1.0, 1.0))
 PALETTE_COLUMNS = 16
+SMOOTH_COSINE = 0.75
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -40,6 +41,23 @@ class _Triangles:
     points: list[FloatArray] = field(default_factory=list)
     normals: list[FloatArray] = field(default_factory=list)
     uvs: list[FloatArray] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Ring:
+    """One edge of a band of a lathe: (radius, z), the normal's (radial, z) and the texture's v."""
+
+    place: FloatArray
+    facing: FloatArray
+    v: float
+
+
+def _smoothed(facing: FloatArray, neighbour: FloatArray) -> FloatArray:
+    """A normal shared with the neighbouring band, unless there is an edge between them."""
+    if facing @ neighbour < SMOOTH_COSINE:
+        return facing
+    both = facing + neighbour
+    return np.asarray(both / np.linalg.norm(both))
 
 
 class Mesh:
@@ -109,29 +127,26 @@ class Mesh:
     ) -> None:
         """Turn a profile of (radius, z), from the bottom up, about the vertical through `centre`."""
         outline = np.asarray(profile, dtype=float)
-        steps = np.linalg.norm(np.diff(outline, axis=0), axis=1)
-        v = np.concatenate([[0.0], np.cumsum(steps)]) / np.sum(steps)
-        for k, (lower, upper) in enumerate(itertools.pairwise(outline)):
-            self._add_band(material, lower, upper, (v[k], v[k + 1]), np.asarray(centre, dtype=float), sides)
+        steps = np.diff(outline, axis=0)
+        lengths = np.linalg.norm(steps, axis=1)
+        v = np.concatenate([[0.0], np.cumsum(lengths)]) / np.sum(lengths)
+        facing = np.column_stack([steps[:, 1], -steps[:, 0]]) / lengths[:, None]
+        for k in range(len(steps)):
+            before, after = facing[max(k - 1, 0)], facing[min(k + 1, len(steps) - 1)]
+            lower = _Ring(outline[k], _smoothed(facing[k], before), float(v[k]))
+            upper = _Ring(outline[k + 1], _smoothed(facing[k], after), float(v[k + 1]))
+            self._add_band(material, lower, upper, np.asarray(centre, dtype=float), sides)
 
-    def _add_band(
-        self, material: str, low: FloatArray, high: FloatArray, v: tuple[float, float], centre: FloatArray, sides: int
-    ) -> None:
+    def _add_band(self, material: str, low: _Ring, high: _Ring, centre: FloatArray, sides: int) -> None:
         angle = np.linspace(0, 2 * np.pi, sides + 1)
-        ring = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
-        slope = high - low
-        normal = ring * slope[1] + np.array([0, 0, -slope[0]])
-        normal /= np.linalg.norm(slope)
-        bottom = centre + ring * low[0] + [0, 0, low[1]]
-        top = centre + ring * high[0] + [0, 0, high[1]]
-        u = np.linspace(0, 1, sides + 1)
+        around = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+        rings = (low, high)
+        points = [centre + around * r.place[0] + [0, 0, r.place[1]] for r in rings]
+        normals = [around * r.facing[0] + [0, 0, r.facing[1]] for r in rings]
         for i in range(sides):
-            j = i + 1
-            corners = [(bottom, i, 0), (bottom, j, 0), (top, j, 1), (bottom, i, 0), (top, j, 1), (top, i, 1)]
-            points = [side[k] for side, k, _ in corners]
-            self.add_triangles(
-                material, points, [normal[k] for _, k, _ in corners], [(u[k], v[e]) for _, k, e in corners]
-            )
+            corners = [(0, i), (0, i + 1), (1, i + 1), (0, i), (1, i + 1), (1, i)]
+            uvs = [(k / sides, rings[e].v) for e, k in corners]
+            self.add_triangles(material, [points[e][k] for e, k in corners], [normals[e][k] for e, k in corners], uvs)
 
     def add_cylinder(
         self, material: str, radius: float, low: ArrayLike, height: float, *, cap: str | None = None, sides: int = 20

@@ -43,7 +43,7 @@ def person_looks() -> Looks:
         _leg(mesh, side)
         _arm(mesh, side)
     _head(mesh)
-    knit = cloth(np.random.default_rng(21), (96, 96), (0.97, 0.97, 0.97), 0.10)
+    knit = cloth(np.random.default_rng(21), (96, 96), (0.97, 0.97, 0.97), 0.04)
     return Looks(mesh, {"knit.png": to_picture(knit)})
 
 

@@ -8,7 +8,7 @@ from itertools import zip_longest
 from typing import Final
 
 from executive.language.clauses import Clause
-from executive.language.items import Being, Verb, spoken_words
+from executive.language.items import Being, Separator, Unknown, Verb, spoken_words
 from executive.language.lexicon import Lexicon, VerbKind
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, Location, Roles, read_roles
@@ -65,6 +65,8 @@ def _actions(clause: Clause, words: Lexicon) -> Iterator[Action]:
 
 def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     """A status check ("is there a hammer in the workshop"), or a statement ("there is a hammer in the workshop")."""
+    if _is_state(clause):
+        return Action(None, being.text)
     roles = read_roles(clause.items, words, describes=False)
     objects = [*([clause.subject.phrase] if clause.subject else []), *roles.objects]
     places = [*roles.ats, *roles.sources, *roles.goals]
@@ -77,13 +79,19 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     return Action(VerbKind.FIND if asked else None, "be", tuple(objects[:1]), place, unknown=unknown)
 
 
+def _is_state(clause: Clause) -> bool:
+    """Whether the speaker only tells how they feel ("I'm thirsty"): a reason, and nothing to do."""
+    speaker = clause.subject is not None and clause.subject.phrase.speaker
+    return speaker and all(isinstance(item, Unknown | Separator) for item in clause.items)
+
+
 def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
     going = verb.kinds == {VerbKind.GO}
     roles = read_roles(clause.items, words, describes=not going, puts=VerbKind.PLACE in verb.kinds)
     kind = _kind(verb, roles)
     blank = Action(kind, verb.text, unknown=tuple(roles.unknown))
     if kind is VerbKind.GO:
-        yield from _going(blank, roles)
+        yield from _going(blank, roles, words)
     elif kind is VerbKind.FIND:
         yield _finding(blank, roles)
     elif kind is VerbKind.CHECK:
@@ -99,10 +107,12 @@ def _kind(verb: Verb, roles: Roles) -> VerbKind:
     return next(kind for kind in VerbKind if kind in verb.kinds and kind is not VerbKind.GO)
 
 
-def _going(blank: Action, roles: Roles) -> Iterator[Action]:
+def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     """One action for each place to go to."""
     bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
     places = [*roles.goals, *roles.ats, *bare, *roles.joined_goals]
+    if not places and blank.verb in words.goes_back:
+        places = [HERE]
     extra = [phrase.text for phrase in (roles.recipient, roles.searched) if phrase is not None]
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
     blank = replace(blank, unknown=(*blank.unknown, *extra))

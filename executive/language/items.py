@@ -166,13 +166,13 @@ class _Reader:
         return None if cut is None else Phrase(tuple(t for t in cut.tokens if t.index >= start))
 
     def _of(self, phrase: Phrase) -> Phrase:
-        """Join "of wine" to a bottle."""
+        """Join "of wine" to a bottle, and "of cups" to "two" or "a couple"."""
         while self.at < len(self.tokens) and self.tokens[self.at].word == "of":
             inner = self._phrase_at(self.at + 1)
             if inner is None:
                 break
             self.at += 1 + len(inner.tokens)
-            phrase = phrase.with_extra("of", inner.text, *inner.extra)
+            phrase = phrase.counting(inner) if phrase.counts else phrase.with_extra("of", inner.text, *inner.extra)
         return phrase
 
     def _description(self, phrase: Phrase) -> Phrase:

@@ -46,6 +46,7 @@ class Lexicon:
     verbs: Mapping[Phrase, frozenset[VerbKind]]
     at_is_goal: frozenset[str]
     goal_wanted: frozenset[str]
+    goes_back: frozenset[str]
     prepositions: Mapping[Phrase, PrepositionRole]
     fillers: frozenset[Phrase]
     openers: tuple[str, ...]
@@ -68,6 +69,7 @@ def lexicon() -> Lexicon:
         verbs=_kinds(verbs),
         at_is_goal=frozenset(verbs["at_is_goal"]),
         goal_wanted=frozenset(verbs["goal_wanted"]),
+        goes_back=frozenset(verbs["goes_back"]),
         prepositions={
             tuple(phrase.split()): PrepositionRole(role)
             for role, phrases in words["prepositions"].items()

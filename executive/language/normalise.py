@@ -11,14 +11,19 @@ from executive.language.lexicon import lexicon
 __all__ = ["MAX_WORDS", "clean", "open_commands"]
 
 MAX_WORDS: Final = 60
+_APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")
 
 
 def clean(text: str) -> str:
-    """The sentence in plain characters: no control characters, brackets or pictures, single blanks, plain quotes."""
+    """The sentence in plain characters: no control characters, brackets or pictures, and single blanks.
+
+    Quotes become plain, and short forms stand in one piece ("i 'm" becomes "i'm").
+    """
     plain = unicodedata.normalize("NFKC", text).replace("\u2019", "'").replace("\u2018", "'")
     printable = "".join(" " if unicodedata.category(c).startswith(("C", "S", "Z")) else c for c in plain)
-    return " ".join(_ALLOWED.sub(" ", printable).split())
+    spaced = " ".join(_ALLOWED.sub(" ", printable).split())
+    return _APART.sub(r"\1", spaced)
 
 
 def open_commands(text: str) -> str:

@@ -103,6 +103,15 @@ class Phrase:
         """All words as spoken."""
         return " ".join((*(t.text for t in self.tokens), *self.extra))
 
+    @property
+    def counts(self) -> bool:
+        """Whether it is only a number ("two", "a couple")."""
+        return _number(self.head) is not None
+
+    def counting(self, counted: Phrase) -> Phrase:
+        """The phrase of so many of what is counted."""
+        return Phrase((*self.tokens, *counted.tokens), counted.extra)
+
     def with_extra(self, *words: str) -> Phrase:
         """The phrase with more words behind the noun."""
         return Phrase(self.tokens, (*self.extra, *words))

@@ -83,6 +83,10 @@ def _things(action: Action, memory: _Memory) -> tuple[Phrase, ...]:
 
 
 def _place(place: Location | None, memory: _Memory) -> Location | None:
-    if place is not None and place.phrase is not None and place.phrase.pronoun:
-        return memory.place
-    return memory.place if place == THERE else place
+    pronoun = place is not None and place.phrase is not None and place.phrase.pronoun
+    if place is None or not (pronoun or place == THERE):
+        return place
+    if memory.place is None:
+        word = THERE.preposition if place.phrase is None else place.phrase.text
+        raise RefusalError(f"which place is {word!r}?", [word], question=True)
+    return memory.place

@@ -11,6 +11,7 @@ from executive.language.normalise import clean, open_commands
         ("\x1b[31mfetch\x00 it", "31mfetch it"),
         ('fetch 🙂 [it] "now"', "fetch it now"),
         ("ﬁnd it", "find it"),
+        ("i 'm here , do n't go", "i'm here , don't go"),
     ],
 )
 def test_text_becomes_plain(text, cleaned):

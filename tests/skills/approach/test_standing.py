@@ -1,0 +1,75 @@
+"""Where to stand for a thing on a surface."""
+
+import math
+
+import numpy as np
+import pytest
+from scripted_robot import CAPABILITIES, MODEL
+
+from skills.api import ObjectObservation, Thing
+from skills.approach.skill import grasp_reachable, observed_target
+from skills.approach.standing import is_comfortable, standing_poses
+from skills.robot import Pose2D
+
+CAN = ObjectObservation(0.0, Thing("coke"), (2.15, 0.0, 0.807), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
+
+
+class _Table:
+    """A table top from x = 2 on; the floor before it is free."""
+
+    def clearance_m(self, points_W):
+        return np.maximum(0.0, 2.0 - np.asarray(points_W)[:, 0])
+
+    def update(self, robot, localisation):
+        pass
+
+
+def _poses(reachable=lambda pose: True):
+    return standing_poses((2.15, 0.0), Pose2D(0.5, 0.3, 0.0), _Table(), CAPABILITIES, reachable)
+
+
+def test_the_body_keeps_off_the_table_and_faces_the_thing():
+    found = _poses()
+    assert found
+    for standing in found:
+        pose = standing.pose
+        front = pose.x_m + 0.52 * math.cos(pose.yaw_rad)
+        bearing = math.atan2(-pose.y_m, 2.15 - pose.x_m) - pose.yaw_rad
+        assert front < 2.0
+        assert abs(math.remainder(bearing, 2 * math.pi)) < 1e-6
+
+
+def test_the_best_comes_first():
+    costs = [standing.cost for standing in _poses()]
+    assert costs == sorted(costs)
+
+
+def test_places_out_of_reach_are_left_out():
+    assert _poses(lambda pose: False) == []
+
+
+def test_a_can_is_within_reach_from_the_best_place_but_not_from_afar():
+    best = _poses()[0].pose
+    assert grasp_reachable(MODEL, best.transform(0.52), CAN)
+    assert not grasp_reachable(MODEL, Pose2D(0.0, 0.0, 0.0).transform(0.52), CAN)
+
+
+@pytest.mark.parametrize(
+    ("pose", "comfortable"),
+    [
+        (Pose2D(1.25, 0.0, 0.0), True),
+        (Pose2D(0.5, 0.0, 0.0), False),
+        (Pose2D(1.25, 0.0, 1.0), False),
+        (Pose2D(1.25, 0.0, 2 * math.pi), True),
+    ],
+)
+def test_standing_well_already(pose, comfortable):
+    assert is_comfortable(pose, (2.15, 0.0)) is comfortable
+
+
+def test_an_observation_keeps_its_axes_when_the_body_is_turned():
+    hammer = ObjectObservation(0.0, Thing("hammer"), (1.0, 0.0, 0.765), (0.33, 0.12, 0.03), 0.5, 1.0, "bench")
+    target = observed_target(hammer, Pose2D(0.0, 0.0, 0.3).transform(0.52))
+    assert target.yaw_rad == pytest.approx(0.2)
+    assert target.base_m == pytest.approx(0.75 - 0.52)
+    assert not target.round

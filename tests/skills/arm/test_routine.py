@@ -1,0 +1,104 @@
+"""Routines: what end stops, how failures come out."""
+
+import numpy as np
+import pytest
+from scripted_robot import ScriptedRobot, context_of
+
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.arm.routine import PlanningError, RoutineSkill, SkillFailure
+from skills.robot import ArmTrajectory
+
+TRAJECTORY = ArmTrajectory(np.array([0.5]), np.array([[0.1, -3.0, 3.0, 0.0, 0.0, 0.0]]))
+
+
+class _Moves(RoutineSkill[None]):
+    name = "moves"
+    Inputs = type(None)
+
+    def run(self, inputs):
+        yield from self.follow(TRAJECTORY, "moving")
+        return Succeeded("moved")
+
+
+class _Plans(RoutineSkill[None]):
+    name = "plans"
+    Inputs = type(None)
+
+    def run(self, inputs):
+        yield from self.compute(_no_way, latency_s=0.2, name="plan", message="planning")
+        return Succeeded("planned")
+
+
+class _Nests(RoutineSkill[None]):
+    name = "nests"
+    Inputs = type(None)
+
+    def run(self, inputs):
+        try:
+            yield from self.perform(_Plans(self.context), None)
+        except SkillFailure as failure:
+            assert failure.cause is Cause.PLANNING
+        return (yield from self.perform(_Moves(self.context), None))
+
+
+def _no_way():
+    raise PlanningError("no way")
+
+
+def test_end_stops_only_the_skills_own_running_command():
+    robot = ScriptedRobot()
+    other = robot.move_arm(TRAJECTORY, until_s=9.0, lease=None)
+    skill = _Moves(context_of(robot))
+    skill.begin(None)
+    skill.step()
+    skill.end()
+    assert robot.stopped == [other + 1]
+    skill.end()
+    assert robot.stopped == [other + 1]
+
+
+def test_a_command_that_is_done_is_not_stopped():
+    robot = ScriptedRobot()
+    skill = _Moves(context_of(robot))
+    skill.begin(None)
+    skill.step()
+    robot.advance(0.1)
+    assert skill.step() == Succeeded("moved")
+    skill.end()
+    assert robot.stopped == []
+
+
+def test_a_planning_error_is_a_failure_with_cause_planning_after_the_latency():
+    robot = ScriptedRobot()
+    skill = _Plans(context_of(robot))
+    skill.begin(None)
+    assert isinstance(skill.step(), Running)
+    robot.advance(0.2)
+    assert skill.step() == Failed(Cause.PLANNING, "no way")
+
+
+def test_a_skill_within_a_skill_passes_on_its_outcome_and_is_ended():
+    robot = ScriptedRobot()
+    skill = _Nests(context_of(robot))
+    skill.begin(None)
+    while isinstance(step := skill.step(), Running):
+        robot.advance(0.1)
+    assert step == Succeeded("moved")
+
+
+def test_ending_the_outer_skill_stops_the_inner_ones_command():
+    robot = ScriptedRobot()
+    skill = _Nests(context_of(robot))
+    skill.begin(None)
+    for _ in range(4):
+        skill.step()
+        if robot.arm_commands:
+            break
+        robot.advance(0.1)
+    skill.end()
+    assert len(robot.stopped) == 1
+
+
+def test_a_step_before_begin_is_a_defect():
+    with pytest.raises(RuntimeError, match="step before begin"):
+        _Moves(context_of(ScriptedRobot())).step()

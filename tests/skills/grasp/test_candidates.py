@@ -1,0 +1,78 @@
+"""Grasp candidates from shapes, and which of them the arm reaches."""
+
+import numpy as np
+import pytest
+
+from plant.spot.robot import spot_capabilities
+from skills.arm.kinematics import arm_model
+from skills.grasp.candidates import JawGeometry, Target, grasp_candidates
+from skills.grasp.planning import within_reach
+
+MODEL = arm_model(spot_capabilities())
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def _target(length, width, height, *, is_round=False, yaw=0.0, points=None, base=0.2, x=0.85):
+    if points is None:
+        s, t = np.meshgrid(np.linspace(-0.5, 0.5, 60), np.linspace(-0.5, 0.5, 20))
+        points = np.column_stack([s.ravel() * length, t.ravel() * width])
+    turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    xy = points @ turn + [x, 0.0]
+    cloud = np.column_stack([xy, np.full(len(xy), base + height)])
+    return Target(cloud, (x, 0.0), yaw, length, width, height, base, is_round)
+
+
+def _hammer(yaw):
+    """Seen from above: a handle of 30 mm along x with a head of 120 mm across at its end."""
+    handle = np.stack(np.meshgrid(np.linspace(-0.165, 0.13, 150), np.linspace(-0.015, 0.015, 15)), -1).reshape(-1, 2)
+    head = np.stack(np.meshgrid(np.linspace(0.13, 0.165, 18), np.linspace(-0.06, 0.06, 60)), -1).reshape(-1, 2)
+    return _target(0.33, 0.12, 0.03, yaw=yaw, points=np.concatenate([handle, head]))
+
+
+def test_a_can_is_taken_from_the_side_with_the_wrist_rolled():
+    best = grasp_candidates(_target(0.066, 0.066, 0.115, is_round=True), MODEL.p_BS)[0]
+    R = best.X_BH.rotation().matrix()
+    assert abs(R[2, 2]) < 1e-9  # the jaw closes level
+    assert R[0, 0] > 0.9  # the fingers point ahead
+    assert best.width_m == pytest.approx(0.066)
+
+
+def test_the_can_lies_between_palm_and_fingertips_and_clear_of_the_fixed_jaw():
+    jaw = JawGeometry()
+    best = grasp_candidates(_target(0.066, 0.066, 0.115, is_round=True), MODEL.p_BS)[0]
+    p_HT = best.X_BH.inverse() @ np.array([0.85, 0.0, 0.2 + 0.06])
+    assert jaw.palm_x + 0.033 < p_HT[0] < jaw.tip_x - 0.033
+    assert p_HT[2] - 0.033 > jaw.fixed_z + 0.005
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.8, 1.57, 2.5])
+def test_a_hammer_is_taken_across_its_handle(yaw):
+    candidates = grasp_candidates(_hammer(yaw), MODEL.p_BS)
+    best = candidates[0]
+    closing = best.X_BH.rotation().matrix()[:, 2]
+    assert best.width_m < 0.04
+    assert abs(closing @ [np.cos(yaw), np.sin(yaw), 0.0]) < 0.1
+    assert best.X_BH.rotation().matrix()[2, 0] < -0.9
+
+
+def test_fingertips_keep_off_the_surface():
+    jaw = JawGeometry()
+    for target in (_hammer(0.6), _target(0.05, 0.05, 0.05)):
+        for candidate in grasp_candidates(target, MODEL.p_BS):
+            for y in (-0.03, 0.03):
+                assert (candidate.X_BH @ np.array([jaw.tip_x, y, jaw.fixed_z]))[2] > target.base_m + 0.004
+
+
+def test_a_thing_wider_than_the_jaw_has_no_candidates():
+    assert grasp_candidates(_target(0.25, 0.2, 0.05), MODEL.p_BS) == []
+
+
+def test_candidates_come_best_first():
+    costs = [candidate.cost for candidate in grasp_candidates(_hammer(0.3), MODEL.p_BS)]
+    assert costs == sorted(costs)
+
+
+def test_a_can_ahead_is_within_reach_and_one_across_the_room_is_not():
+    near, far = (_target(0.066, 0.066, 0.115, is_round=True, x=x) for x in (0.9, 2.0))
+    assert any(within_reach(MODEL, candidate, UP) for candidate in grasp_candidates(near, MODEL.p_BS))
+    assert not any(within_reach(MODEL, candidate, UP) for candidate in grasp_candidates(far, MODEL.p_BS))

@@ -1,0 +1,36 @@
+"""What the grasp skill does when things go wrong."""
+
+import numpy as np
+from scripted_robot import MODEL, ScriptedRobot, context_of, failed
+
+from skills.api import Cause, ObjectObservation, Thing
+from skills.grasp.skill import Grasp, GraspInputs
+from skills.robot import CommandState, CommandStatus
+
+SEEN = GraspInputs(ObjectObservation(0.0, Thing("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table"))
+
+
+def test_a_full_jaw_is_a_failed_precondition():
+    robot = ScriptedRobot(holding=True, opening_rad=0.3)
+    failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "holds something already")
+    assert robot.arm_commands == []
+
+
+def test_a_thing_that_is_gone_is_a_failed_precondition_and_the_arm_is_stowed():
+    robot = ScriptedRobot()
+    failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "no longer where it was seen")
+    assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
+    assert robot.opening_rad == 0.0
+
+
+def test_a_refused_arm_is_a_failed_execution_with_the_robots_reason():
+    robot = ScriptedRobot(arm_answers={1: CommandStatus(CommandState.REFUSED, "the lease is held by another")})
+    failed(Grasp(context_of(robot)), SEEN, Cause.EXECUTION, "the lease is held by another")
+
+
+def test_a_second_attempt_starts_anew():
+    robot = ScriptedRobot(holding=True, opening_rad=0.3)
+    skill = Grasp(context_of(robot))
+    failed(skill, SEEN, Cause.PRECONDITION, "holds something already")
+    robot.holding, robot.opening_rad = False, 0.0
+    failed(skill, SEEN, Cause.PRECONDITION, "no longer where it was seen")

@@ -1,0 +1,56 @@
+"""Free spots on a surface that is seen."""
+
+import numpy as np
+import pytest
+
+from skills.api import Surface
+from skills.detect.interim_segmentation import Cluster, Plane, SurfaceView
+from skills.detect.points import PointCloud
+from skills.detect.shape import SeenShape
+from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, spots
+
+TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)
+PLANE = Plane((1.3, 0.0), 0.7, (0.0, 0.0), 0.002)
+
+
+def _cloud(xy, z=0.7):
+    points = np.column_stack([xy, np.full(len(xy), z)])
+    return PointCloud(points, np.zeros((len(xy), 2), np.int64), np.zeros((len(xy), 3), np.uint8))
+
+
+def _view(seen_y=(-0.5, 0.5), things=()):
+    grid = np.stack(np.meshgrid(np.arange(1.0, 1.6, 0.01), np.arange(*seen_y, 0.01)), -1).reshape(-1, 2)
+    clusters = tuple(
+        Cluster(
+            _cloud(np.array([thing]), 0.8), "table", PLANE, SeenShape(thing, 0.07, 0.07, 0.1, 0.0, True), (0, 0, 1, 1)
+        )
+        for thing in things
+    )
+    return SurfaceView(PLANE, _cloud(grid), clusters)
+
+
+def test_spots_keep_off_the_edges():
+    found = spots(TABLE)
+    assert found[:, 0].min() >= 1.0 + EDGE_M - 1e-9
+    assert found[:, 0].max() <= 1.6 - EDGE_M + 1e-9
+
+
+def test_a_small_surface_has_its_middle_as_spot():
+    small = Surface("stool", ((0.0, 0.0), (0.12, 0.0), (0.12, 0.12), (0.0, 0.12)), 0.4)
+    assert spots(small) == pytest.approx(np.array([[0.06, 0.06]]))
+
+
+def test_spots_near_a_thing_are_not_free():
+    free = free_spots(_view(things=((1.3, 0.0),)), spots(TABLE))
+    assert len(free) > 0
+    assert np.linalg.norm(free - [1.3, 0.0], axis=1).min() > CLEARANCE_M
+
+
+def test_what_is_not_seen_is_not_free():
+    free = free_spots(_view(seen_y=(0.0, 0.5)), spots(TABLE))
+    assert free[:, 1].min() > -0.04
+
+
+def test_a_full_table_has_no_free_spot():
+    things = tuple((x, y) for x in np.arange(1.05, 1.6, 0.1) for y in np.arange(-0.45, 0.5, 0.1))
+    assert len(free_spots(_view(things=things), spots(TABLE))) == 0

@@ -1,0 +1,165 @@
+"""A robot whose arm goes at once where it is sent, for tests of what skills do when things go wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from executive.worker import LockStepWorker
+from plant.spot.robot import spot_capabilities
+from skills.api import Failed, LocalisationEstimate, Running, SkillContext
+from skills.arm.kinematics import arm_model
+from skills.robot import (
+    CommandId,
+    CommandState,
+    CommandStatus,
+    FrameTree,
+    Gripper,
+    Image,
+    Intrinsics,
+    Joints,
+    Lease,
+    Odometry,
+)
+
+CAPABILITIES = spot_capabilities()
+MODEL = arm_model(CAPABILITIES)
+LENS = Intrinsics(64, 48, 55.2, 55.2, 32.0, 24.0)
+
+
+@dataclass
+class ScriptedRobot:
+    """Commands are done one tick later; `arm_answers` and `jaw_stops_rad` script what goes wrong."""
+
+    name: str = "Alice"
+    now_s: float = 0.0
+    q: Any = field(default_factory=lambda: MODEL.stowed_rad.copy())
+    opening_rad: float = 0.0
+    holding: bool = False
+    jaw_stops_rad: float = 0.0
+    scan_now: Any = None
+    arm_answers: dict[int, CommandStatus] = field(default_factory=dict)
+    arm_commands: list[Any] = field(default_factory=list)
+    stopped: list[CommandId] = field(default_factory=list)
+    status: dict[CommandId, CommandStatus] = field(default_factory=dict)
+
+    def now(self):
+        return self.now_s
+
+    def advance(self, dt_s):
+        self.now_s += dt_s
+        for command, status in self.status.items():
+            if status.state is CommandState.RUNNING:
+                self.status[command] = CommandStatus(CommandState.DONE)
+
+    def capabilities(self):
+        return CAPABILITIES
+
+    def odometry(self):
+        return Odometry(self.now_s, RigidTransform([0.0, 0.0, 0.52]), (0.0, 0.0, 0.0))
+
+    def joints(self):
+        return Joints(self.now_s, dict(zip(MODEL.names, self.q.tolist(), strict=True)), {}, {})
+
+    def gripper(self):
+        return Gripper(self.now_s, self.opening_rad, 0.0, self.holding)
+
+    def scan(self):
+        return self.scan_now
+
+    def image(self, source):
+        hand = MODEL.X_BH(self.q)
+        frames = FrameTree(
+            {
+                "body": ("odom", RigidTransform([0.0, 0.0, 0.52])),
+                "hand": ("body", hand),
+                "hand_camera": (
+                    "hand",
+                    RigidTransform(np.array([[0, 0, 1, 0.14], [-1, 0, 0, 0.02], [0, -1, 0, 0.02], [0, 0, 0, 1.0]])),
+                ),
+            }
+        )
+        shape = (LENS.height, LENS.width)
+        colour, depth = np.zeros((*shape, 3), np.uint8), np.zeros(shape, np.float32)
+        return Image(self.now_s, source, "hand_camera", LENS, LENS, colour, colour[..., 0], depth, frames)
+
+    def move_arm(self, trajectory, *, until_s, lease):
+        self.arm_commands.append(trajectory)
+        answer = self.arm_answers.get(len(self.arm_commands), CommandStatus(CommandState.RUNNING))
+        if answer.state is CommandState.RUNNING:
+            self.q = trajectory.positions_rad[-1].copy()
+        return self._note(answer)
+
+    def set_gripper(self, opening_rad, force_n, *, until_s, lease):
+        self.opening_rad = max(opening_rad, self.jaw_stops_rad)
+        self.holding = self.opening_rad > opening_rad
+        return self._note(CommandStatus(CommandState.RUNNING))
+
+    def stop(self, *, lease, only=None):
+        self.stopped.append(only)
+        return self._note(CommandStatus(CommandState.DONE))
+
+    def command_status(self, command):
+        return self.status[command]
+
+    def _note(self, status):
+        command = CommandId(len(self.status) + 1)
+        self.status[command] = status
+        return command
+
+
+class FixedLocaliser:
+    """The odometry frame is the world."""
+
+    def estimate(self):
+        return LocalisationEstimate(0.0, RigidTransform(), np.eye(3) * 1e-4, True)
+
+    def update(self, robot):
+        pass
+
+
+class OpenFloor:
+    """Nothing stands anywhere."""
+
+    def clearance_m(self, points_W):
+        return np.full(len(points_W), 5.0)
+
+    def update(self, robot, localisation):
+        pass
+
+
+def context_of(robot, published=None, costmap=None):
+    """A context with the scripted robot as clock, too; what is published is appended to a list."""
+    log = [] if published is None else published
+    return SkillContext(
+        robot=robot,
+        lease=Lease("Alice", "test"),
+        clock=robot,
+        worker=LockStepWorker(robot),
+        localiser=FixedLocaliser(),
+        costmap=costmap or OpenFloor(),
+        publish=lambda topic, message: log.append((topic, message)),
+        seed=1,
+    )
+
+
+def outcome(skill, inputs, limit_s=120.0):
+    """Run a skill to its end; the last Step. Raises AssertionError when it takes longer than limit_s."""
+    robot = skill.context.robot
+    skill.begin(inputs)
+    while isinstance(step := skill.step(), Running):
+        robot.advance(0.1)
+        assert robot.now() < limit_s, f"still {step.message}"
+    skill.end()
+    return step
+
+
+def failed(skill, inputs, cause, part):
+    """Assert that a skill fails with a cause and a sentence that holds `part`."""
+    step = outcome(skill, inputs)
+    assert isinstance(step, Failed), step
+    assert step.cause is cause, step
+    assert part in step.message, step.message

@@ -109,7 +109,7 @@ def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
     turn = RigidTransform(X_BW.rotation())
     axis = turn @ np.array([np.cos(seen.yaw_rad), np.sin(seen.yaw_rad), 0.0])
     yaw = float(np.arctan2(axis[1], axis[0]))
-    grid = np.stack(np.meshgrid(np.linspace(-0.5, 0.5, 9), np.linspace(-0.5, 0.5, 5)), axis=-1).reshape(-1, 2)
+    grid = np.stack(np.meshgrid(np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 7)), axis=-1).reshape(-1, 2)
     along = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
     centre = (X_BW @ np.array(seen.position_W))[:2]
     xy = centre + (grid * [length, min(width, 0.06)]) @ along

@@ -73,3 +73,10 @@ def test_an_observation_keeps_its_axes_when_the_body_is_turned():
     assert target.yaw_rad == pytest.approx(0.2)
     assert target.base_m == pytest.approx(0.75 - 0.52)
     assert not target.round
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, 1.57, 2.4])
+def test_a_hammer_lying_any_way_is_within_reach_from_some_place(yaw):
+    hammer = ObjectObservation(0.0, Thing("hammer"), (2.15, 0.0, 0.765), (0.33, 0.12, 0.03), yaw, 1.0, "bench")
+    found = _poses(lambda pose: grasp_reachable(MODEL, pose.transform(0.52), hammer))
+    assert found

@@ -39,7 +39,7 @@ def test_nothing_seen_is_a_failed_postcondition_and_the_arm_is_stowed():
         "no coke or beer seen on the kitchen table",
     )
     assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
-    assert [topic for topic, _ in log][0] == "object_to_detect"
+    assert next(topic for topic, _ in log) == "object_to_detect"
     assert {topic for topic, _ in log} == {"object_to_detect", "detections"}
 
 

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 from analytic_scan import scan_of
+from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 
 from skills.api import Cause, Succeeded
 from skills.hand_over.skill import HandOver, HandOverInputs, facing_poses

@@ -18,6 +18,7 @@ _STEP_RAD = 0.25
 _ITERATIONS = 1500
 _SHORTCUTS = 80
 _DENSE_RAD = 0.02
+_FEWEST_POINTS = 9
 _SAMPLE_S = 0.04
 _LINE_STEP_M = 0.01
 _LINE_JUMP_RAD = 0.35
@@ -148,7 +149,7 @@ def _resampled(path_rad: FloatArray) -> FloatArray:
     keep = np.concatenate([[True], lengths > 1e-9])
     path_rad = path_rad[keep]
     along = np.concatenate([[0.0], np.cumsum(lengths[lengths > 1e-9])])
-    count = max(2, int(np.ceil(along[-1] / _DENSE_RAD)) + 1)
+    count = max(_FEWEST_POINTS, int(np.ceil(along[-1] / _DENSE_RAD)) + 1)
     if len(path_rad) < 2:
         return np.repeat(path_rad[:1], 2, axis=0)
     stations = np.linspace(0.0, along[-1], count)

@@ -114,3 +114,10 @@ def test_a_straight_line_into_a_box_is_refused(scene):
     scene.set_boxes([Box(RigidTransform(X_from @ np.array([0.38, 0.0, 0.0])), (0.1, 0.1, 0.1))])
     with pytest.raises(PlanningError, match="meets"):
         plan_line(MODEL, LEFT, ahead, scene)
+
+
+@pytest.mark.parametrize("way_rad", [0.5, 0.05, 0.01, 0.001])
+def test_timing_takes_about_as_long_as_the_acceleration_needs(way_rad):
+    trajectory = time_path(np.array([LEFT, LEFT + way_rad * np.eye(6)[1]]), speed_rad_s=10.0, acceleration_rad_s2=3.0)
+    shortest_s = 2.0 * np.sqrt(way_rad / 3.0)
+    assert 0.8 * shortest_s < trajectory.times_s[-1] < 2.5 * shortest_s + 0.1

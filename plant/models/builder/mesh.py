@@ -67,10 +67,14 @@ class Mesh:
         self.materials = materials
         self._groups: dict[str, _Triangles] = {}
 
+    def _material(self, name: str) -> Material:
+        if name not in self.materials:
+            raise KeyError(f"no material {name!r}; there are {', '.join(sorted(self.materials))}")
+        return self.materials[name]
+
     def add_triangles(self, material: str, points: ArrayLike, normals: ArrayLike, uvs: ArrayLike) -> None:
         """Add (N, 3, 3) corner points and normals with (N, 3, 2) texture coordinates. Raises KeyError."""
-        if material not in self.materials:
-            raise KeyError(f"no material {material!r}")
+        self._material(material)
         group = self._groups.setdefault(material, _Triangles())
         group.points.append(np.asarray(points, dtype=float).reshape(-1, 3))
         group.normals.append(np.asarray(normals, dtype=float).reshape(-1, 3))
@@ -79,7 +83,7 @@ class Mesh:
     def add_rectangle(self, material: str, corner: ArrayLike, edge_u: ArrayLike, edge_v: ArrayLike) -> None:
         """Add the rectangle from `corner` along two edges; its normal is edge_u x edge_v."""
         p, u, v = (np.asarray(a, dtype=float) for a in (corner, edge_u, edge_v))
-        tile = self.materials[material].tile_m
+        tile = self._material(material).tile_m
         lengths = np.linalg.norm(u), np.linalg.norm(v)
         spans = (1.0, 1.0) if tile is None else (float(lengths[0] / tile[0]), float(lengths[1] / tile[1]))
         for u0, u1 in _cuts(spans[0]):

@@ -31,7 +31,7 @@ def look_plans(
 def _look_plan(shop: Workshop, thing: Thing, surface: str, number: int, key: str) -> SequencePlan:
     view = shop.knowledge.surfaces[surface].viewpoints[number - 1]
     return shop.sequence(
-        f"look at {surface}" + (f", view {number}" if number > 1 else ""),
+        f"look at {surface}" + (f" ({number})" if number > 1 else ""),
         shop.navigate(pose_2d(view)),
         detect_plan(shop, thing, (surface,), key),
     )

@@ -13,7 +13,7 @@ from executive.view.looks import Look, Looks, look_of
 from executive.view.model import NodeView
 from executive.view.text import note_of
 
-BOX_W: Final = 216
+BOX_W: Final = 232
 BOX_H: Final = 40
 NOTE_LINE_H: Final = 13
 COLUMN_GAP: Final = 34
@@ -21,9 +21,9 @@ ROW_GAP: Final = 10
 MARGIN: Final = 20
 TITLE_H: Final = 34
 LEGEND_H: Final = 34
-NOTE_CHARS: Final = 33
+NOTE_CHARS: Final = 36
 NOTE_LINES: Final = 3
-NAME_CHARS: Final = 27
+NAME_CHARS: Final = 30
 FONT: Final = "DejaVu Sans, Helvetica, Arial, sans-serif"
 DASHES: Final[Mapping[str, str]] = MappingProxyType({"not run": "2 3", "running": "7 3", "cancelled": "9 3 2 3"})
 SYMBOLS: Final[Mapping[str, str]] = MappingProxyType(

@@ -24,6 +24,7 @@ POSITION_TOLERANCE_M = 0.06
 YAW_TOLERANCE_RAD = 0.08
 SPEED_M_S = 0.5
 _MOST_TRIES = 3
+_GOOD_GRASP = 0.1
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,9 @@ class Approach(ArmSkill[ApproachInputs]):
         """Choose a place, go, look again."""
         seen = inputs.observation
         point_W = (seen.position_W[0], seen.position_W[1])
-        if not (is_comfortable(self.context.pose(), point_W) and self._reachable(seen)(self.context.pose())):
+        here = self.context.pose()
+        from_here = self._reach_cost(seen)(here) if is_comfortable(here, point_W) else None
+        if from_here is None or from_here > _GOOD_GRASP:
             places = yield from self.compute(
                 lambda: self._places(seen), latency_s=0.2, name="choose a place", message="choosing where to stand"
             )
@@ -86,19 +89,24 @@ class Approach(ArmSkill[ApproachInputs]):
         context = self.context
         point_W = (seen.position_W[0], seen.position_W[1])
         return standing_poses(
-            point_W, context.pose(), context.costmap, context.robot.capabilities(), self._reachable(seen)
+            point_W, context.pose(), context.costmap, context.robot.capabilities(), self._reach_cost(seen)
         )
 
-    def _reachable(self, seen: ObjectObservation) -> Callable[[Pose2D], bool]:
+    def _reach_cost(self, seen: ObjectObservation) -> Callable[[Pose2D], float | None]:
         model, height_m = self.model, float(self.X_WB().translation()[2])
-        return lambda pose: grasp_reachable(model, pose.transform(height_m), seen)
+        return lambda pose: grasp_cost(model, pose.transform(height_m), seen)
 
 
-def grasp_reachable(model: ArmModel, X_WB: RigidTransform, seen: ObjectObservation) -> bool:
-    """Whether the arm reaches some grasp of a thing, and its pre-grasp, with the body at X_WB."""
+def grasp_cost(model: ArmModel, X_WB: RigidTransform, seen: ObjectObservation) -> float | None:
+    """Cost of the best grasp of a thing that the arm reaches with the body at X_WB, beyond the best there is.
+
+    None when it reaches no grasp.
+    """
     up_B = X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
     candidates = grasp_candidates(observed_target(seen, X_WB), model.p_BS)
-    return any(within_reach(model, candidate, up_B) for candidate in candidates)
+    reached = (candidate.cost for candidate in candidates if within_reach(model, candidate, up_B))
+    best = next(reached, None)
+    return None if best is None else best - candidates[0].cost
 
 
 def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:

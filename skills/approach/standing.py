@@ -15,8 +15,11 @@ from skills.robot import Capabilities, Pose2D
 
 DISTANCES_M = (0.90, 0.94, 0.87, 0.84, 0.98, 0.81, 1.02, 1.06)
 BEARINGS = 24
+REACH_WEIGHT = 4.0
 COMFORTABLE_M = (0.80, 1.02)
 COMFORTABLE_BEARING_RAD = 0.35
+_LOOKED_AT = 40
+_OFFERED = 5
 
 
 @dataclass(frozen=True)
@@ -39,9 +42,12 @@ def standing_poses(
     here: Pose2D,
     costmap: Costmap,
     capabilities: Capabilities,
-    reachable: Callable[[Pose2D], bool],
+    reach_cost: Callable[[Pose2D], float | None],
 ) -> list[Standing]:
-    """Free poses around point_W that face it and from which it is `reachable`, the best first."""
+    """Free poses around point_W that face it, the best first.
+
+    `reach_cost` tells how awkward the reach from a pose is, None where the point is out of reach.
+    """
     footprint = Footprint.of(capabilities)
     found = []
     for k, distance in itertools.product(range(BEARINGS), DISTANCES_M):
@@ -49,8 +55,10 @@ def standing_poses(
         pose = Pose2D(point_W[0] - distance * math.cos(yaw), point_W[1] - distance * math.sin(yaw), yaw)
         if footprint_clear(costmap, footprint, pose):
             found.append(Standing(pose, _cost(pose, here, distance)))
-    found.sort(key=lambda standing: standing.cost)
-    return list(itertools.islice((each for each in found if reachable(each.pose)), 5))
+    nearest = sorted(found, key=lambda standing: standing.cost)[:_LOOKED_AT]
+    reaches = [(standing, reach_cost(standing.pose)) for standing in nearest]
+    reached = [Standing(each.pose, each.cost + REACH_WEIGHT * cost) for each, cost in reaches if cost is not None]
+    return sorted(reached, key=lambda standing: standing.cost)[:_OFFERED]
 
 
 def _cost(pose: Pose2D, here: Pose2D, distance_m: float) -> float:

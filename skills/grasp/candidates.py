@@ -18,19 +18,22 @@ from skills.robot import FloatArray
 
 _ABOVE_SURFACE_M = 0.006
 _LEAST_GRIP_M = 0.014
+_LEAST_BEYOND_M = 0.004
 
 
 @dataclass(frozen=True)
 class JawGeometry:
     """The gripper in the hand frame, m: palm at palm_x, fingertips at tip_x, inner face of the fixed jaw at fixed_z.
 
-    The tips are 2 half_breadth wide along y and tip_thickness thick; `clearance` is left beside the fixed jaw.
+    The tips are 2 half_breadth wide along y and tip_thickness thick; `clearance` is left beside the fixed jaw,
+    `low_clearance` beside things that lie low, since a jaw that comes down on top of one is stopped by it.
     """
 
     palm_x: float = 0.142
     tip_x: float = 0.240
     fixed_z: float = -0.038
     clearance: float = 0.010
+    low_clearance: float = 0.017
     half_breadth: float = 0.030
     tip_thickness: float = 0.015
     max_width: float = 0.115
@@ -128,7 +131,7 @@ def _long_stations(target: Target, ahead_rad: float) -> Iterator[_Station]:
             local = np.abs(s - middle - shift) < 0.022
             if np.count_nonzero(local) < 8:
                 continue
-            low, high = np.percentile(t[local], [2, 98])
+            low, high = np.percentile(t[local], [1, 99])
             xy = np.array(target.centre_B) + (0.0 if square else middle + shift) * along + 0.5 * (low + high) * across
             half_depth = 0.5 * (target.length_m if turn == 0.0 else target.width_m) if target.upright else 0.02
             for azimuth in (yaw, yaw + np.pi):
@@ -152,11 +155,13 @@ def _candidate(
     else:
         height = 0.5 * target.height_m
         beyond = (height - _ABOVE_SURFACE_M - _tip_drop(R_BH, station.width_m, jaw)) / -R_BH.matrix()[2, 0]
-        if height + beyond * -R_BH.matrix()[2, 0] < _LEAST_GRIP_M:
+        least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
+        if beyond < least or height + beyond * -R_BH.matrix()[2, 0] < _LEAST_GRIP_M:
             return None
         depth = jaw.tip_x - beyond
-        cost = station.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean)
-    p_HT = np.array([depth, 0.0, jaw.fixed_z + jaw.clearance + 0.5 * station.width_m])
+        cost = station.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
+    clearance = jaw.clearance if target.upright else jaw.low_clearance
+    p_HT = np.array([depth, 0.0, jaw.fixed_z + clearance + 0.5 * station.width_m])
     p_BT = np.array([*station.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
     return GraspCandidate(X_BH, station.width_m, float(cost), tilt)
@@ -164,5 +169,5 @@ def _candidate(
 
 def _tip_drop(R_BH: RotationMatrix, width_m: float, jaw: JawGeometry) -> float:
     """How far below the middle of the fingertips their lowest corner lies, for a thing of some width between them."""
-    half = 0.5 * width_m + jaw.clearance + jaw.tip_thickness
+    half = 0.5 * width_m + jaw.low_clearance + jaw.tip_thickness
     return float(abs(R_BH.matrix()[2, 1]) * jaw.half_breadth + abs(R_BH.matrix()[2, 2]) * half)

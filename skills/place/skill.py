@@ -77,7 +77,7 @@ class Place(ArmSkill[PlaceInputs]):
         if np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6:
             return
         context = self.context
-        places = standing_poses((spot[0], spot[1]), pose, context.costmap, context.robot.capabilities(), lambda _: True)
+        places = standing_poses((spot[0], spot[1]), pose, context.costmap, context.robot.capabilities(), lambda _: 0.0)
         if not places:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
         yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))

@@ -7,7 +7,7 @@ import pytest
 from scripted_robot import CAPABILITIES, MODEL
 
 from skills.api import ObjectObservation, Thing
-from skills.approach.skill import grasp_reachable, observed_target
+from skills.approach.skill import grasp_cost, observed_target
 from skills.approach.standing import is_comfortable, standing_poses
 from skills.robot import Pose2D
 
@@ -24,8 +24,8 @@ class _Table:
         pass
 
 
-def _poses(reachable=lambda pose: True):
-    return standing_poses((2.15, 0.0), Pose2D(0.5, 0.3, 0.0), _Table(), CAPABILITIES, reachable)
+def _poses(reach_cost=lambda pose: 0.0):
+    return standing_poses((2.15, 0.0), Pose2D(0.5, 0.3, 0.0), _Table(), CAPABILITIES, reach_cost)
 
 
 def test_the_body_keeps_off_the_table_and_faces_the_thing():
@@ -45,13 +45,13 @@ def test_the_best_comes_first():
 
 
 def test_places_out_of_reach_are_left_out():
-    assert _poses(lambda pose: False) == []
+    assert _poses(lambda pose: None) == []
 
 
 def test_a_can_is_within_reach_from_the_best_place_but_not_from_afar():
     best = _poses()[0].pose
-    assert grasp_reachable(MODEL, best.transform(0.52), CAN)
-    assert not grasp_reachable(MODEL, Pose2D(0.0, 0.0, 0.0).transform(0.52), CAN)
+    assert grasp_cost(MODEL, best.transform(0.52), CAN) == 0.0
+    assert grasp_cost(MODEL, Pose2D(0.0, 0.0, 0.0).transform(0.52), CAN) is None
 
 
 @pytest.mark.parametrize(
@@ -78,5 +78,11 @@ def test_an_observation_keeps_its_axes_when_the_body_is_turned():
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 1.57, 2.4])
 def test_a_hammer_lying_any_way_is_within_reach_from_some_place(yaw):
     hammer = ObjectObservation(0.0, Thing("hammer"), (2.15, 0.0, 0.765), (0.33, 0.12, 0.03), yaw, 1.0, "bench")
-    found = _poses(lambda pose: grasp_reachable(MODEL, pose.transform(0.52), hammer))
+    found = _poses(lambda pose: grasp_cost(MODEL, pose.transform(0.52), hammer))
     assert found
+
+
+def test_a_place_with_a_better_grasp_is_preferred():
+    nearest = _poses()[0].pose
+    best = _poses(lambda pose: 1.0 if pose == nearest else 0.0)[0].pose
+    assert best != nearest

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.models.catalogue import ModelClass, load_catalogue
-from plant.worlds.world import ObjectRule, PersonRule, Point, Polygon, World, WorldError
-from skills.api import Surface
+from plant.worlds.world import ObjectRule, PersonRule, Point, Polygon, SurfaceTop, World, WorldError
 
 FloatArray = NDArray[np.float64]
 ATTEMPTS = 500
@@ -82,7 +81,7 @@ def _place(
     raise WorldError(f"{world.folder / 'objects.yaml'}: {rule.name} finds no free spot on {', '.join(rule.surfaces)}")
 
 
-def _candidates(world: World, surface: Surface, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
+def _candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
     """Random centres along the surface's front edges, with random yaws."""
     fronts = world.seed_rules.fronts[surface.name]
     middle = np.mean(surface.polygon_W, axis=0)

@@ -14,7 +14,6 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydrake.multibody.parsing import PackageMap
 
-from skills.api import Surface
 from skills.robot import Pose2D
 
 WORLDS_FOLDER = Path(__file__).resolve().parent
@@ -98,6 +97,15 @@ class _Knowledge(BaseModel):
 
 
 @dataclass(frozen=True)
+class SurfaceTop:
+    """A flat top where things lie: outline in the world frame as (x, y) corners, height above the floor (m)."""
+
+    name: str
+    polygon_W: Polygon
+    height_m: float
+
+
+@dataclass(frozen=True)
 class World:
     """A world's files and what the plant needs to know of them. Lengths in metres, world frame."""
 
@@ -106,7 +114,7 @@ class World:
     start: Pose2D
     dock: Pose2D
     rooms: dict[str, Polygon]
-    surfaces: dict[str, Surface]
+    surfaces: dict[str, SurfaceTop]
     surface_places: dict[str, str]
     seed_rules: SeedRules
 
@@ -146,7 +154,7 @@ def load_world(name_or_path: str | Path) -> World:
     folder = _find_folder(name_or_path)
     knowledge = _read(folder / "knowledge.yaml", _Knowledge)
     rules = _read(folder / "objects.yaml", SeedRules)
-    surfaces = {name: Surface(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
+    surfaces = {name: SurfaceTop(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
     _check_surfaces(folder / "objects.yaml", rules, surfaces)
     return World(
         name=folder.name,
@@ -215,7 +223,7 @@ def _line_of(node: yaml.Node | None, location: tuple[int | str, ...]) -> int:
     return line
 
 
-def _check_surfaces(path: Path, rules: SeedRules, surfaces: dict[str, Surface]) -> None:
+def _check_surfaces(path: Path, rules: SeedRules, surfaces: dict[str, SurfaceTop]) -> None:
     """Every surface that the rules name is known, and those for things have fronts."""
     wanted = {name for thing in rules.objects for name in thing.surfaces}
     for name in sorted(wanted | set(rules.fronts)):

@@ -106,7 +106,7 @@ def test_things_that_do_not_fit_are_refused(world: World) -> None:
 def test_a_model_that_does_not_exist_is_refused(world: World) -> None:
     rule = world.seed_rules.objects[0].model_copy(update={"model": "sofa"})
     wrong = world.seed_rules.model_copy(update={"objects": (rule,)})
-    with pytest.raises(WorldError, match="no model 'sofa'; there are coke, beer"):
+    with pytest.raises(WorldError, match="no model 'sofa'; there are beer, coke"):
         place_objects(dataclasses.replace(world, seed_rules=wrong), 1)
 
 

@@ -1,0 +1,242 @@
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from planar_robot import Bench, Box
+
+from skills.api import Cause, Failed, Running, Step, Succeeded
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.robot import Pose2D
+
+START, CORRIDOR, OTHER_ROOM = Pose2D(1.5, 2.0, 0.0), Pose2D(1.2, 5.5, math.pi), Pose2D(8.5, 2.0, -1.57)
+
+
+def go(
+    bench: Bench, goal: Pose2D, *, limit_s: float = 90.0, each: Callable[[], None] | None = None
+) -> tuple[Step, list[Step]]:
+    """Run the skill as its leaf would; the last step and all before."""
+    skill = Navigate(bench.context())
+    skill.begin(NavigateInputs(goal))
+    begun_s, steps = bench.clock.now(), []
+    step = skill.step()
+    while isinstance(step, Running) and bench.clock.now() < begun_s + limit_s:
+        steps.append(step)
+        bench.tick()
+        if each is not None:
+            each()
+        step = skill.step()
+    skill.end()
+    return step, steps
+
+
+def off_goal(bench: Bench, goal: Pose2D) -> tuple[float, float]:
+    pose = bench.robot.pose
+    turn = math.remainder(pose.yaw_rad - goal.yaw_rad, 2.0 * math.pi)
+    return math.hypot(pose.x_m - goal.x_m, pose.y_m - goal.y_m), abs(turn)
+
+
+def test_goes_through_two_doors_without_touching_and_stands_at_the_goal():
+    bench = Bench(START)
+    step, _ = go(bench, OTHER_ROOM)
+    assert isinstance(step, Succeeded), step.message
+    distance_m, yaw_rad = off_goal(bench, OTHER_ROOM)
+    assert distance_m < 0.10 and yaw_rad < 0.10
+    assert np.abs(bench.robot.velocity).max() < 0.05
+    assert bench.robot.least_clearance_m > 0.06
+    assert not bench.robot.driving
+
+
+def test_takes_about_the_time_that_the_way_needs():
+    bench = Bench(START)
+    go(bench, OTHER_ROOM)
+    assert bench.clock.now() < 25.0
+
+
+def test_progress_grows_and_sentences_are_plain():
+    bench = Bench(START)
+    _, steps = go(bench, CORRIDOR)
+    progress = [step.progress for step in steps if isinstance(step, Running) and step.progress is not None]
+    assert progress[-1] == pytest.approx(1.0)
+    assert np.diff(progress).min() > -0.05
+    assert all(isinstance(step, Running) and step.message for step in steps)
+
+
+def test_speed_stays_below_what_is_asked():
+    bench = Bench(START)
+    skill = Navigate(bench.context())
+    skill.begin(NavigateInputs(CORRIDOR, max_speed_m_s=0.4))
+    fastest = 0.0
+    while isinstance(skill.step(), Running):
+        bench.tick()
+        fastest = max(fastest, float(np.hypot(*bench.robot.velocity[:2])))
+    assert 0.3 < fastest < 0.45
+
+
+def test_goes_around_a_thing_that_the_lidar_sees():
+    bench = Bench(START, unmapped=[Box(4.5, 5.0, 4.9, 5.4, 0.0, 1.7)])
+    step, _ = go(bench, OTHER_ROOM)
+    assert isinstance(step, Succeeded), step.message
+    assert bench.robot.least_clearance_m > 0.03
+    assert bench.worker.names.count("plan a way") >= 2
+
+
+def test_goes_around_a_thing_too_low_for_the_lidar():
+    bench = Bench(START, unmapped=[Box(4.5, 5.0, 4.9, 5.8, 0.0, 0.2)])
+    step, _ = go(bench, OTHER_ROOM)
+    assert isinstance(step, Succeeded), step.message
+    assert bench.robot.least_clearance_m > 0.0
+    assert bench.robot.images_taken > 10
+
+
+def test_without_cameras_a_low_thing_is_hit():
+    """The world of the test before really needs the cameras."""
+    bench = Bench(START, unmapped=[Box(4.5, 5.0, 4.9, 5.8, 0.0, 0.2)], cameras=False)
+    go(bench, OTHER_ROOM)
+    assert bench.robot.least_clearance_m < 0.0
+
+
+def test_waits_for_a_person_who_walks_out_of_the_door():
+    person = Box(7.2, 3.9, 7.7, 4.3, 0.0, 1.7)
+    bench = Bench(START, unmapped=[person])
+
+    def walk_away() -> None:
+        if bench.clock.now() > 18.0 and person in bench.robot.boxes:
+            bench.robot.boxes.remove(person)
+
+    step, _ = go(bench, OTHER_ROOM, each=walk_away)
+    assert isinstance(step, Succeeded), step.message
+    assert bench.clock.now() > 19.0
+    assert bench.robot.least_clearance_m > 0.03
+
+
+def test_door_that_stays_closed_is_a_planning_failure_that_names_the_place():
+    bench = Bench(START, unmapped=[Box(7.0, 4.0, 7.9, 4.1, 0.0, 2.0)])
+    step, _ = go(bench, OTHER_ROOM)
+    assert isinstance(step, Failed)
+    assert step.cause is Cause.PLANNING
+    assert "blocked by something seen at (7." in step.message
+    assert bench.robot.least_clearance_m > 0.03
+
+
+def test_goal_in_furniture_is_a_planning_failure():
+    step, _ = go(Bench(START), Pose2D(1.0, 0.7, 0.0))
+    assert isinstance(step, Failed) and step.cause is Cause.PLANNING
+    assert "blocked" in step.message
+
+
+def test_cancel_on_the_way_stops_the_robot():
+    bench = Bench(START)
+    skill = Navigate(bench.context())
+    skill.begin(NavigateInputs(OTHER_ROOM))
+    for _ in range(80):
+        assert isinstance(skill.step(), Running)
+        bench.tick()
+    assert bench.robot.driving and bench.robot.velocity[0] > 0.3
+    skill.end()
+    skill.end()
+    assert not bench.robot.driving
+    for _ in range(20):
+        bench.tick()
+    assert np.abs(bench.robot.velocity).max() < 0.01
+
+
+def test_end_leaves_the_commands_of_others_alone():
+    bench = Bench(START)
+    skill = Navigate(bench.context())
+    skill.begin(NavigateInputs(OTHER_ROOM))
+    for _ in range(40):
+        skill.step()
+        bench.tick()
+    other = bench.robot.drive(0.1, 0.0, 0.0, until_s=bench.clock.now() + 1.0, lease=bench.lease)
+    skill.end()
+    assert bench.robot.command_status(other).state.value == "running"
+
+
+def test_pushed_off_its_path_it_still_arrives():
+    bench = Bench(START)
+    pushed = []
+
+    def push() -> None:
+        if bench.robot.travelled_m > 5.0 and not pushed:
+            pushed.append(True)
+            bench.robot.push(0.0, 0.45, 0.5)
+
+    step, _ = go(bench, OTHER_ROOM, each=push)
+    assert pushed and isinstance(step, Succeeded), step.message
+    assert bench.robot.least_clearance_m > 0.03
+
+
+def test_begun_again_it_goes_to_the_new_goal():
+    bench = Bench(START)
+    skill = Navigate(bench.context())
+    skill.begin(NavigateInputs(OTHER_ROOM))
+    for _ in range(60):
+        skill.step()
+        bench.tick()
+    skill.begin(NavigateInputs(CORRIDOR))
+    step: Step = Running("")
+    while isinstance(step, Running):
+        step = skill.step()
+        bench.tick()
+    assert isinstance(step, Succeeded)
+    assert off_goal(bench, CORRIDOR)[0] < 0.1
+
+
+def test_not_knowing_its_place_is_a_failed_precondition():
+    places = np.random.default_rng(5).uniform(20.0, 26.0, (60, 2))
+    pillars = [Box(x, y, x + 0.15, y + 0.15) for x, y in places if math.hypot(x - 23.0, y - 23.0) > 1.0]
+    bench = Bench(Pose2D(23.0, 23.0, 0.3), unmapped=pillars, believed_start=START)
+    step, _ = go(bench, CORRIDOR)
+    assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION
+    assert bench.robot.travelled_m == 0.0
+
+
+def test_refused_from_the_start_is_a_failed_precondition():
+    bench = Bench(START)
+    bench.robot.refuse_because = "motors off"
+    step, _ = go(bench, CORRIDOR)
+    assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION
+    assert "motors off" in step.message
+
+
+def test_lease_taken_on_the_way_is_a_failure_in_execution():
+    bench = Bench(START)
+
+    def take() -> None:
+        if bench.clock.now() > 4.0 and bench.lease is not None and bench.robot._lease.holder == "test":
+            bench.robot.take_lease("somebody")
+
+    step, _ = go(bench, CORRIDOR, each=take)
+    assert isinstance(step, Failed) and step.cause is Cause.EXECUTION
+    assert "lease" in step.message
+
+
+def test_held_fast_it_gives_up_with_a_reason():
+    bench = Bench(START)
+
+    def hold() -> None:
+        if bench.robot.travelled_m > 1.0:
+            bench.robot.velocity = np.zeros(3)
+            bench.robot.pose = held.setdefault("pose", bench.robot.pose)
+
+    held: dict[str, Pose2D] = {}
+    step, _ = go(bench, OTHER_ROOM, each=hold)
+    assert isinstance(step, Failed) and step.cause is Cause.EXECUTION
+
+
+def test_equal_seeds_go_equal_ways():
+    poses = []
+    for _ in range(2):
+        bench = Bench(START, seed=3)
+        go(bench, CORRIDOR)
+        poses.append(bench.robot.pose)
+    assert poses[0] == poses[1]
+
+
+def test_planned_path_is_published_with_the_robots_name():
+    bench = Bench(START)
+    go(bench, CORRIDOR)
+    topic, message = bench.published[0]
+    assert topic == "path" and message["robot"] == "alice"
+    assert message["poses"][0][:2] == pytest.approx([START.x_m, START.y_m], abs=0.05)

@@ -52,9 +52,29 @@ class Recorder:
         return earlier[-1] if earlier else self._frames[0]
 
 
-def save_html(world: WorldDiagram, frames: Sequence[Frame], path: Path) -> None:
-    """Write an animation of `frames` as one HTML file that needs no server."""
+@dataclass(frozen=True)
+class View:
+    """Where a camera stands and what it looks at, in the world frame (m)."""
+
+    p_WCamera: tuple[float, float, float]
+    p_WTarget: tuple[float, float, float]
+
+    @staticmethod
+    def over(corners_W: Sequence[tuple[float, float]]) -> View:
+        """From the south and above, so that all corners (x, y) are seen."""
+        low, high = np.min(corners_W, axis=0), np.max(corners_W, axis=0)
+        x, y = (float(value) for value in (low + high) / 2)
+        size = float(np.linalg.norm(high - low))
+        return View((x, y - 0.30 * size, 0.62 * size), (x, y, 0.0))
+
+
+def save_html(world: WorldDiagram, frames: Sequence[Frame], path: Path, view: View | None = None) -> None:
+    """Write an animation of `frames` as one HTML file that needs no server and opens on `view`."""
     meshcat = Meshcat()
+    for helper in ("/Grid", "/Axes"):
+        meshcat.SetProperty(helper, "visible", False)
+    if view is not None:
+        meshcat.SetCameraPose(np.array(view.p_WCamera), np.array(view.p_WTarget))
     shown = world.rebuild(meshcat)
     root_context = shown.diagram.CreateDefaultContext()
     context = shown.plant.GetMyMutableContextFromRoot(root_context)

@@ -10,7 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from plant.diagram import RENDERER, LooseModel, WorldDiagram, build_diagram
-from plant.recording import Recorder, save_html
+from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.spot.model import SpotModel
 from plant.spot.robot import SpotRobot
@@ -134,7 +134,8 @@ class Simulation:
         """Write what was recorded as one HTML file. Raises LookupError when nothing was."""
         if self.recorder is None or not self.recorder.frames:
             raise LookupError("nothing was recorded: build the simulation with record=True and advance its clock")
-        save_html(self.engine.world, self.recorder.frames, path)
+        corners = [corner for room in self.world.rooms.values() for corner in room]
+        save_html(self.engine.world, self.recorder.frames, path, View.over(corners))
 
 
 def _loose(placement: Placement, *, fixed: bool = False) -> LooseModel:

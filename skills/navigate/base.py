@@ -13,11 +13,12 @@ EXPIRY_S = 0.3
 
 
 class Base:
-    """Sends drive commands under a context's lease and remembers the last."""
+    """Sends drive commands under a context's lease and remembers the last; `accepted` once the robot took one."""
 
     def __init__(self, context: SkillContext) -> None:
         self._context = context
         self._command: CommandId | None = None
+        self.accepted = False
         self.last_velocity: NDArray[np.float64] = np.zeros(3)
 
     def drive(self, velocity: tuple[float, float, float]) -> None:
@@ -31,6 +32,7 @@ class Base:
         if self._command is None:
             return None
         status = self._context.robot.command_status(self._command)
+        self.accepted |= status.state is not CommandState.REFUSED
         return (status.reason or "no reason given") if status.state is CommandState.REFUSED else None
 
     def stop(self) -> None:

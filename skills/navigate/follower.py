@@ -78,8 +78,10 @@ class PathFollower:
         here = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
         off_path_m = self._project(here)
         along = float(self._progress[self._index])
-        free_m, blocked_at = self._free_way(costmap, here)
-        speed = min(float(self._limits[self._index]), math.sqrt(2.0 * self._options.braking_m_s2 * free_m))
+        now_m = float(footprint_clearance_m(costmap, self._footprint, here[None, :])[0])
+        free_m, blocked_at = self._free_way(costmap, now_m)
+        in_time = math.sqrt(2.0 * self._options.braking_m_s2 * free_m)
+        speed = min(float(self._limits[self._index]), in_time, float(speed_by_clearance(now_m, self._options)))
         wanted = self._wanted(here, along, speed) if free_m > 0.0 else np.zeros(3)
         limited = self._slew(self._clip(wanted), last)
         safe = self._brake(limited, here, costmap)
@@ -130,14 +132,16 @@ class PathFollower:
         most = most * options.period_s * np.where(np.abs(velocity) < np.abs(last), 2.0, 1.0)
         return np.asarray(last + np.clip(velocity - last, -most, most))
 
-    def _free_way(self, costmap: Costmap, here: FloatArray) -> tuple[float, tuple[float, float] | None]:
-        """Way (m) that is free ahead, less a reserve, and the place of the first thing in it."""
+    def _free_way(self, costmap: Costmap, now_m: float) -> tuple[float, tuple[float, float] | None]:
+        """Way (m) that is free ahead, less a reserve, and the place of the first thing in it.
+
+        A robot that has but now_m of clearance need only not get worse.
+        """
         options = self._options
         end = int(np.searchsorted(self._progress, self._progress[self._index] + options.look_m))
         poses = self._path.poses[self._index : end + 1 : 2]
         clearance = footprint_clearance_m(costmap, self._footprint, poses)
-        now = float(footprint_clearance_m(costmap, self._footprint, here[None, :])[0])
-        blocked = np.flatnonzero(clearance < min(options.touch_m, now - 0.02))
+        blocked = np.flatnonzero(clearance < min(options.touch_m, now_m - 0.02))
         if len(blocked) == 0:
             return options.look_m, None
         first = int(blocked[0])
@@ -151,14 +155,31 @@ class PathFollower:
         return float(centres[worst, 0]), float(centres[worst, 1])
 
     def _brake(self, velocity: FloatArray, here: FloatArray, costmap: Costmap) -> FloatArray:
-        """Stop when the next half second would bring the outline into something that it is not in already."""
+        """The velocity, or as much of it as brings the outline into nothing within the next half second.
+
+        Half of it is tried, then what leads back to the path without going ahead, then standing still.
+        """
+        shares = np.array([[1.0, 1.0, 1.0], [0.5, 0.5, 0.5], [0.0, 1.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        tried = velocity * shares
         c, s = math.cos(here[2]), math.sin(here[2])
-        world = np.array([c * velocity[0] - s * velocity[1], s * velocity[0] + c * velocity[1], velocity[2]])
-        ahead = here + np.array([[0.0], [0.25], [0.5]]) * world
+        world = np.column_stack([c * tried[:, 0] - s * tried[:, 1], s * tried[:, 0] + c * tried[:, 1], tried[:, 2]])
+        ahead = here + np.concatenate([np.zeros((1, 3)), 0.25 * world, 0.5 * world])
         clearance = footprint_clearance_m(costmap, self._footprint, ahead)
-        if clearance[1:].min() < min(0.0, float(clearance[0]) - 0.005):
-            return np.zeros(3)
-        return velocity
+        least = np.minimum(clearance[1 : len(tried) + 1], clearance[len(tried) + 1 :])
+        safe = np.flatnonzero(least >= min(self._options.touch_m, float(clearance[0]) - 0.005))
+        return tried[safe[0]] if len(safe) else np.zeros(3)
+
+    def pose_after(self, way_m: float) -> Pose2D:
+        """The path's pose so far on from where the robot was last."""
+        x, y, yaw = self._at(min(self.length_m, float(self._progress[self._index]) + way_m)).tolist()
+        return Pose2D(x, y, wrap(yaw))
+
+
+def speed_by_clearance(clearance_m: FloatArray | float, options: FollowerOptions) -> FloatArray:
+    """Speed (m/s) that a clearance allows."""
+    share = np.clip((np.asarray(clearance_m) - options.near_m) / (options.wide_m - options.near_m), 0.0, 1.0)
+    slow = min(options.near_speed_m_s, options.max_speed_m_s)
+    return np.asarray(slow + share * (options.max_speed_m_s - slow))
 
 
 def speed_limits(path: Path, progress_m: FloatArray, options: FollowerOptions) -> FloatArray:
@@ -169,8 +190,7 @@ def speed_limits(path: Path, progress_m: FloatArray, options: FollowerOptions) -
     ahead = (np.cos(yaw) * steps[:, 0] + np.sin(yaw) * steps[:, 1]) / ways
     aside = np.abs(-np.sin(yaw) * steps[:, 0] + np.cos(yaw) * steps[:, 1]) / ways
     turn = np.abs(steps[:, 2]) / ways
-    open_share = np.clip((path.clearance_m - options.near_m) / (options.wide_m - options.near_m), 0.0, 1.0)[:-1]
-    by_clearance = options.near_speed_m_s + open_share * max(0.0, options.max_speed_m_s - options.near_speed_m_s)
+    by_clearance = speed_by_clearance(path.clearance_m[:-1], options)
     lengthwise = np.where(ahead >= 0.0, options.max_speed_m_s, options.backward_m_s) / np.maximum(np.abs(ahead), 1e-6)
     sideways = options.lateral_m_s / np.maximum(aside, 1e-6)
     turning = 0.85 * options.turn_rad_s / np.maximum(turn, 1e-6)

@@ -19,13 +19,14 @@ FloatArray = NDArray[np.float64]
 class WatchOptions:
     """Cameras asked in turn, one picture each `period_s`, which arrives after `latency_s`.
 
-    Kept are points of every `stride`-th pixel, between the heights above the floor and within `reach_m` of the camera.
+    Of each row about `columns` pixels are used. Kept are points between the heights above the floor and within
+    `reach_m` of the camera.
     """
 
     sources: tuple[str, ...] = ("frontleft", "frontright")
     period_s: float = 0.35
     latency_s: float = 0.1
-    stride: int = 6
+    columns: int = 110
     heights_m: tuple[float, float] = (0.06, 0.5)
     reach_m: float = 2.0
 
@@ -69,12 +70,13 @@ class LowObstacleWatch:
 
 def low_points(image: Image, options: WatchOptions) -> FloatArray:
     """Points (N, 3) in the odom frame that a depth picture shows low above the floor and near."""
-    depth = image.depth_m[:: options.stride, :: options.stride].astype(np.float64)
+    stride = max(1, image.depth_m.shape[1] // options.columns)
+    depth = image.depth_m[::stride, ::stride].astype(np.float64)
     rows, columns = np.nonzero((depth > 0.0) & (depth < options.reach_m))
     z = depth[rows, columns]
     lens = image.depth_intrinsics
-    x = (columns * options.stride - lens.cx) / lens.fx * z
-    y = (rows * options.stride - lens.cy) / lens.fy * z
+    x = (columns * stride - lens.cx) / lens.fx * z
+    y = (rows * stride - lens.cy) / lens.fy * z
     points_O = image.frames.pose(image.camera_frame).multiply(np.stack([x, y, z])).T
     low, high = options.heights_m
     return np.ascontiguousarray(points_O[(points_O[:, 2] > low) & (points_O[:, 2] < high)])

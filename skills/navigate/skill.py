@@ -66,6 +66,7 @@ class Navigate(Skill[NavigateInputs]):
     def begin(self, inputs: NavigateInputs) -> None:
         """Start anew to the goal of `inputs`."""
         self._base.stop()
+        self._base = Base(self.context)
         self._inputs = inputs
         self._footprint = Footprint.of(self.context.robot.capabilities())
         self._watch = LowObstacleWatch(self.context)
@@ -73,7 +74,6 @@ class Navigate(Skill[NavigateInputs]):
         self._follower: PathFollower | None = None
         self._job: Job[Path] | None = None
         self._replans = 0
-        self._driven = False
         self._whole_m: float | None = None
         self._wait_until_s = -math.inf
         self._blocked_since_s: float | None = None
@@ -88,7 +88,7 @@ class Navigate(Skill[NavigateInputs]):
             return Failed(Cause.EXECUTION, "The robot lost its place: its scans no longer agree with the map.")
         refusal = self._base.refusal()
         if refusal is not None:
-            cause = Cause.EXECUTION if self._driven else Cause.PRECONDITION
+            cause = Cause.EXECUTION if self._base.accepted else Cause.PRECONDITION
             return Failed(cause, f"The robot refused to drive: {refusal}.")
         return self._phase()
 
@@ -116,12 +116,12 @@ class Navigate(Skill[NavigateInputs]):
             self._phase = self._planning
         return Running("finding out where I am")
 
-    def _ask_for_plan(self) -> None:
-        """Sample the costmap now and plan in the Worker."""
+    def _ask_for_plan(self, start: Pose2D | None = None) -> None:
+        """Sample the costmap now and plan in the Worker, from a pose or from here."""
         speed = max(0.1, self._inputs.max_speed_m_s)
         options = PlannerOptions(forward_m_s=speed)
-        start = self.context.pose()
-        problem = problem_of(self.context.costmap, self._footprint, start, self._inputs.goal, options, margin_m=8.0)
+        begin, goal = start or self.context.pose(), self._inputs.goal
+        problem = problem_of(self.context.costmap, self._footprint, begin, goal, options, margin_m=8.0)
         self._job = self.context.worker.submit(
             lambda: solve(problem), latency_s=self._options.planning_latency_s, name="plan a way"
         )
@@ -181,7 +181,6 @@ class Navigate(Skill[NavigateInputs]):
         pose, velocity = self.context.pose(), self.context.robot.odometry().velocity
         answer = self._follower.command(pose, velocity, self._base.last_velocity, self.context.costmap)
         self._base.drive(answer.velocity)
-        self._driven = True
         if self._arrived(pose, 0.4):
             self._wait_until_s = self._now() + self._options.settle_s
             self._phase = self._settling
@@ -224,8 +223,17 @@ class Navigate(Skill[NavigateInputs]):
             return Failed(Cause.EXECUTION, f"{why} Planning anew {self._options.replans} times did not help.")
         self._best_m, self._best_s = math.inf, self._now()
         self._blocked_since_s = None
-        self._ask_for_plan()
+        self._ask_for_plan(self._pose_then())
         return Running(f"{why} Planning a way around.")
+
+    def _pose_then(self) -> Pose2D | None:
+        """Where the old path will have led when a plan asked for now is there; None when the robot is off it."""
+        if self._follower is None:
+            return None
+        vx, vy, _ = self.context.robot.odometry().velocity
+        then = self._follower.pose_after(math.hypot(vx, vy) * self._options.planning_latency_s)
+        off = relative(self.context.pose(), then)
+        return then if math.hypot(off.x_m, off.y_m) < 0.35 and abs(off.yaw_rad) < 0.3 else None
 
     def _arrived(self, pose: Pose2D, share: float) -> bool:
         """Whether a pose lies within a share of the tolerances of the goal."""

@@ -17,6 +17,7 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.candidates import Target, grasp_candidates
 from skills.grasp.planning import within_reach
+from skills.grasp.posture import body_height_m
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 
@@ -93,7 +94,8 @@ class Approach(ArmSkill[ApproachInputs]):
         )
 
     def _reach_cost(self, seen: ObjectObservation) -> Callable[[Pose2D], float | None]:
-        model, height_m = self.model, float(self.X_WB().translation()[2])
+        base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
+        model, height_m = self.model, body_height_m(base_m, self.context.robot.capabilities())
         return lambda pose: grasp_cost(model, pose.transform(height_m), seen)
 
 

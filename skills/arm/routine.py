@@ -15,6 +15,8 @@ Routine = Generator[Running, None, ResultT]
 
 ARM_EXPIRY_MARGIN_S = 3.0
 GRIPPER_EXPIRY_S = 4.0
+STAND_EXPIRY_S = 5.0
+HEIGHT_TOLERANCE_M = 0.02
 
 
 class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program error
@@ -97,6 +99,14 @@ class RoutineSkill(Skill[InputsT]):
         until_s = context.clock.now() + GRIPPER_EXPIRY_S
         command = context.robot.set_gripper(opening_rad, force_n, until_s=until_s, lease=context.lease)
         yield from self.finish(self.issue(command), message, "the gripper")
+
+    def stand_at(self, height_m: float, message: str) -> Routine[None]:
+        """Bring the body to a height, level; nothing is done where it is there already."""
+        context = self.context
+        if abs(float(context.robot.odometry().X_OB.translation()[2]) - height_m) > HEIGHT_TOLERANCE_M:
+            until_s = context.clock.now() + STAND_EXPIRY_S
+            command = context.robot.stand(height_m, 0.0, until_s=until_s, lease=context.lease)
+            yield from self.finish(self.issue(command), message, "the body")
 
     def perform(self, skill: Skill[OtherT], inputs: OtherT) -> Routine[Succeeded]:
         """Let another skill do its work as part of this one. Raises SkillFailure with its cause and message."""

@@ -19,6 +19,7 @@ from skills.detect.interim_segmentation import Cluster, SurfaceView, sightings, 
 from skills.detect.looking import cluster_boxes, surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, plan_grasp
+from skills.grasp.posture import body_height_m
 from skills.robot import FloatArray, Image
 
 GRASP_FORCE_N = 60.0
@@ -65,14 +66,18 @@ class Grasp(ArmSkill[GraspInputs]):
         thing = inputs.observation.thing
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "the jaw holds something already")
+        seen, capabilities = inputs.observation, self.context.robot.capabilities()
         try:
-            view = yield from self._look_closely(inputs.observation)
+            height_m = body_height_m(seen.position_W[2] - 0.5 * seen.size_m[2], capabilities)
+            yield from self.stand_at(height_m, f"standing up to the {thing}")
+            view = yield from self._look_closely(seen)
             plan = yield from self._plan(view, str(thing))
             yield from self._take(plan, str(thing))
         except SkillFailure:
             yield from self._let_go()
             raise
         yield from self._carry(view, plan.candidate, str(thing))
+        yield from self.stand_at(capabilities.standing_height_m, f"carrying the {thing}")
         return Succeeded(f"holding the {thing}")
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
@@ -157,7 +162,7 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _let_go(self) -> Routine[None]:
         """On failure: open the jaw, draw back, stow; what does not work is left out."""
-        for recovery in (self._open, self._draw_back, self.try_stow):
+        for recovery in (self._open, self._draw_back, self.try_stow, self._stand_down):
             try:
                 yield from recovery()
             except SkillFailure:
@@ -170,6 +175,9 @@ class Grasp(ArmSkill[GraspInputs]):
         ahead = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
         yield from self.shift_hand(-PREGRASPS_M[-1] * ahead, "drawing back after the failure")
         yield from self.move_gripper(0.0, JAW_FORCE_N, "closing the empty jaw")
+
+    def _stand_down(self) -> Routine[None]:
+        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
 
     def _up_B(self) -> FloatArray:
         return np.asarray(self.X_WB().rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))

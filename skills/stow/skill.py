@@ -23,7 +23,7 @@ class StowInputs:
 
 
 class Stow(ArmSkill[StowInputs]):
-    """Leaves the arm where it is when it is near the body already."""
+    """Leaves the arm where it is when it is near the body already; the body stands at its usual height."""
 
     name = "stow"
     Inputs = StowInputs
@@ -35,6 +35,7 @@ class Stow(ArmSkill[StowInputs]):
 
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
         """Stow, or carry."""
+        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
         if not self.context.robot.gripper().holding:
             yield from self.stow()
             return Succeeded("the arm is stowed")

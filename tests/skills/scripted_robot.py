@@ -36,6 +36,7 @@ class ScriptedRobot:
 
     name: str = "Alice"
     now_s: float = 0.0
+    height_m: float = 0.52
     q: Any = field(default_factory=lambda: MODEL.stowed_rad.copy())
     opening_rad: float = 0.0
     holding: bool = False
@@ -59,7 +60,7 @@ class ScriptedRobot:
         return CAPABILITIES
 
     def odometry(self):
-        return Odometry(self.now_s, RigidTransform([0.0, 0.0, 0.52]), (0.0, 0.0, 0.0))
+        return Odometry(self.now_s, RigidTransform([0.0, 0.0, self.height_m]), (0.0, 0.0, 0.0))
 
     def joints(self):
         return Joints(self.now_s, dict(zip(MODEL.names, self.q.tolist(), strict=True)), {}, {})
@@ -74,7 +75,7 @@ class ScriptedRobot:
         hand = MODEL.X_BH(self.q)
         frames = FrameTree(
             {
-                "body": ("odom", RigidTransform([0.0, 0.0, 0.52])),
+                "body": ("odom", RigidTransform([0.0, 0.0, self.height_m])),
                 "hand": ("body", hand),
                 "hand_camera": (
                     "hand",
@@ -92,6 +93,10 @@ class ScriptedRobot:
         if answer.state is CommandState.RUNNING:
             self.q = trajectory.positions_rad[-1].copy()
         return self._note(answer)
+
+    def stand(self, height_m, pitch_rad, *, until_s, lease):
+        self.height_m = height_m
+        return self._note(CommandStatus(CommandState.RUNNING))
 
     def set_gripper(self, opening_rad, force_n, *, until_s, lease):
         self.opening_rad = max(opening_rad, self.jaw_stops_rad)

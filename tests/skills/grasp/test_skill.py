@@ -34,3 +34,14 @@ def test_a_second_attempt_starts_anew():
     failed(skill, SEEN, Cause.PRECONDITION, "holds something already")
     robot.holding, robot.opening_rad = False, 0.0
     failed(skill, SEEN, Cause.PRECONDITION, "no longer where it was seen")
+
+
+def test_after_a_failure_the_body_stands_at_its_usual_height():
+    robot = ScriptedRobot()
+    high = GraspInputs(ObjectObservation(0.0, Thing("coke"), (0.9, 0.0, 0.96), (0.066, 0.066, 0.115), 0.0, 1.0))
+    heights = []
+    stand = robot.stand
+    robot.stand = lambda height_m, *args, **kwargs: heights.append(height_m) or stand(height_m, *args, **kwargs)
+    failed(Grasp(context_of(robot)), high, Cause.PRECONDITION, "no longer where it was seen")
+    assert heights[0] > 0.55
+    assert robot.height_m == 0.52

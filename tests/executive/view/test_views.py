@@ -16,16 +16,16 @@ from skills.api import Cause, Failed
 
 @pytest.fixture
 def failed(compiled, run_tree, make, script) -> NodeView:
-    script.ends["approach"] = lambda skill: Failed(Cause.PLANNING, "no room to stand <here> & there")
+    script.ends["approach"] = lambda skill: Failed(Cause.TIMEOUT, "no room to stand <here> & there")
     tree = compiled(*make.FETCH)
     return node_view(tree.root, run_tree(tree).worst.states)
 
 
 def test_text_shows_status_cause_and_sentence_once(failed):
     lines = to_text(failed).splitlines()
-    assert lines[0] == "✗ sequence fetch drink - PLANNING"
+    assert lines[0] == "✗ sequence fetch drink - TIMEOUT"
     assert sum("no room to stand" in line for line in lines) == 1
-    assert any(line.endswith("✗ approach - PLANNING: no room to stand <here> & there") for line in lines)
+    assert any(line.endswith("✗ approach - TIMEOUT: no room to stand <here> & there") for line in lines)
     assert len(lines) == sum(1 for _ in failed.walk())
 
 
@@ -46,7 +46,7 @@ def test_svg_is_well_formed_and_has_every_node(failed):
     root = ElementTree.fromstring(to_svg(failed, title="a <title> & more"))
     ids = [group.get("data-id") for group in root.iter("{http://www.w3.org/2000/svg}g") if group.get("data-id")]
     assert ids == [node.path_id for _, node in failed.walk()]
-    assert "PLANNING: no room to stand" in " ".join(root.itertext())
+    assert "TIMEOUT: no room to stand" in " ".join(root.itertext())
 
 
 def test_svg_boxes_do_not_overlap(failed):
@@ -71,7 +71,7 @@ def test_json_has_the_keys_of_the_contract(failed):
     assert (root["id"], root["status"], root["cause"], root["source"]) == (
         "alice/fetch-drink",
         "FAILURE",
-        "PLANNING",
+        "TIMEOUT",
         None,
     )
 

@@ -16,7 +16,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.robot import FloatArray
 
-_ABOVE_SURFACE_M = 0.006
+_ABOVE_SURFACE_M = 0.003
 _LEAST_GRIP_M = 0.014
 _LEAST_BEYOND_M = 0.004
 
@@ -30,7 +30,7 @@ class JawGeometry:
     """
 
     palm_x: float = 0.142
-    tip_x: float = 0.240
+    tip_x: float = 0.246
     fixed_z: float = -0.038
     clearance: float = 0.010
     low_clearance: float = 0.017

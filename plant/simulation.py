@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from pydrake.geometry import QueryObject
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
@@ -14,7 +16,7 @@ from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.spot.model import SpotModel
 from plant.spot.robot import SpotRobot
-from plant.spot.sensing import SpotSensors
+from plant.spot.sensing import HAND_LINK, SpotSensors
 from plant.worlds.lights import render_parameters
 from plant.worlds.placement import Placement, place_objects, place_people
 from plant.worlds.world import World
@@ -109,6 +111,7 @@ class Simulation:
             built.plant, [*things, *people], robots=sorted(robot_names), persons=[each.name for each in people]
         )
         self.recorder = Recorder(built, self.engine.context) if record else None
+        self._past = built.diagram.CreateDefaultContext()
         self._watch()
 
     def _watch(self) -> None:
@@ -129,6 +132,27 @@ class Simulation:
     def robots(self) -> Mapping[str, Robot]:
         """The robots by name."""
         return self.engine.robots
+
+    def query_at(self, time_s: float) -> QueryObject:
+        """The scene as it was recorded at a time, for pictures afterwards. Raises LookupError without a recording."""
+        self._rewind(time_s)
+        scene_graph = self.engine.world.scene_graph
+        query = scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(self._past))
+        assert isinstance(query, QueryObject)
+        return query
+
+    def hand_pose_at(self, robot_name: str, time_s: float) -> RigidTransform:
+        """X_WH of a robot's hand as it was recorded at a time. Raises LookupError without a recording."""
+        self._rewind(time_s)
+        plant, model = self.engine.world.plant, self.engine.world.robots[robot_name]
+        hand = plant.GetBodyByName(HAND_LINK, model.instance)
+        return plant.EvalBodyPoseInWorld(plant.GetMyContextFromRoot(self._past), hand)
+
+    def _rewind(self, time_s: float) -> None:
+        if self.recorder is None:
+            raise LookupError("nothing was recorded: build the simulation with record=True")
+        plant = self.engine.world.plant
+        plant.SetPositions(plant.GetMyMutableContextFromRoot(self._past), self.recorder.at(time_s).positions)
 
     def save_recording(self, path: Path) -> None:
         """Write what was recorded as one HTML file. Raises LookupError when nothing was."""

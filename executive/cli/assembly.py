@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-
 from executive.cli.promises import promises
 from executive.compiler import CompiledTree
 from executive.errors import InputError
@@ -67,10 +64,3 @@ def judge(simulation: Simulation, tree: CompiledTree, knowledge: Knowledge, resu
     promised = promises(tree.commands, knowledge=knowledge, robot=tree.robot_name, answers=answers)
     verdict: Verdict = simulation.referee.judge(promised)
     return verdict
-
-
-def save_recording(simulation: Simulation, folder: Path) -> Mapping[str, Path]:
-    """Write the recording and the pictures of a run into `folder`; gives what was written by name."""
-    path = folder / "recording.html"
-    simulation.save_recording(path)
-    return {"recording": path}

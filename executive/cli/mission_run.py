@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
-from executive.cli.assembly import judge, run_entry, save_recording, simulate
+from executive.cli.assembly import judge, run_entry, simulate
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Request
+from executive.cli.souvenirs import Souvenirs, draw_souvenirs
 from executive.compiler import CompiledTree
 from executive.outcome import RunResult
 from executive.record.announce import announce
@@ -43,6 +44,7 @@ def run_request(
     entry = run_entry(simulation, request.world, tree)
     clock = simulation.clock
     log = EventLog(out / "log.mcap", clock)
+    souvenirs = Souvenirs(log)
     try:
         announce(log, clock, tree, request.knowledge, world=request.world.name, seed=seed)
         with cancelled_by_signals() as cancel:
@@ -50,7 +52,7 @@ def run_request(
                 [entry],
                 clock=clock,
                 worker=LockStepWorker(clock),
-                publish=log,
+                publish=souvenirs,
                 settings=RunSettings(seed=seed),
                 cancel=cancel,
                 observer=observer,
@@ -61,7 +63,8 @@ def run_request(
     view = node_view(tree.root, result.worst.states)
     (out / "tree.svg").write_text(to_svg(view, title=request.mission.name), encoding="utf-8")
     if record:
-        save_recording(simulation, out)
+        simulation.save_recording(out / "recording.html")
+        draw_souvenirs(souvenirs, simulation, request.mission.robot_name, out)
     referee = RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops)
     return Finished(_report(request, result, referee, seed=seed, log=log.path), view)
 

@@ -14,7 +14,7 @@ from plant.referee.cast import Cast, Kind, LinkNames, Placed
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
 from plant.referee.judge import Truth, judge, offered
 from plant.referee.promise import Promise, Verdict
-from plant.referee.story import Look, ObjectStory
+from plant.referee.story import Lift, Look, ObjectStory
 
 FloatArray = NDArray[np.float64]
 
@@ -62,6 +62,11 @@ class Referee:
         """What happened, one sentence each: bumps, lifts, drops."""
         told = [event for story in self._stories.values() for event in story.events]
         return (*told, *(collision.sentence for collision in self._counter.collisions))
+
+    def lifts(self, robot: str) -> tuple[Lift, ...]:
+        """All that a robot has lifted off its place so far, in the order of time."""
+        all_lifts = (lift for story in self._stories.values() for lift in story.lifts if lift.robot == robot)
+        return tuple(sorted(all_lifts, key=lambda lift: lift.time_s))
 
     def path(self, robot: str) -> FloatArray:
         """The way of a robot's body so far, (N, 3) in the world, a point every few centimetres. Raises KeyError."""

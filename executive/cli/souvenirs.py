@@ -1,0 +1,88 @@
+"""The pictures of a run: what the hand camera detected, the grasp, the hand-over, and the way walked from above."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from executive.messages import DESTINATION_TOPIC
+from executive.record.schemas import TRANSITIONS
+from plant.pictures import Bounds, Picture, best_view, draw_detection, draw_map, render_view, save_png, top_view
+from plant.simulation import Simulation
+from skills.api import Publish
+
+DETECTIONS: Final = "detections"
+_MARGIN_M: Final = 0.3
+_MOMENTS: Final[Mapping[str, str]] = MappingProxyType({"hand-over": "hand_over", "place": "place"})
+
+
+class Souvenirs:
+    """Passes messages on to the log and remembers what is worth a picture."""
+
+    def __init__(self, publish: Publish) -> None:
+        self._publish = publish
+        self._seen: Mapping[str, Any] | None = None
+        self.detection: Mapping[str, Any] | None = None
+        self.moments: dict[str, float] = {}
+
+    def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
+        """Take note of a message and pass it on."""
+        if topic == DETECTIONS and message["detections"]:
+            self._seen = message
+        if topic == DESTINATION_TOPIC and self.detection is None:
+            self.detection = self._seen
+        if topic == TRANSITIONS and message["to"] == "SUCCESS":
+            self._note(str(message["node"]), float(message["t"]))
+        self._publish(topic, message)
+
+    def _note(self, path_id: str, time_s: float) -> None:
+        name = _MOMENTS.get(path_id.rsplit("/", 1)[-1])
+        if name is not None:
+            self.moments[name] = time_s
+
+
+def draw_souvenirs(souvenirs: Souvenirs, simulation: Simulation, robot_name: str, folder: Path) -> Sequence[Path]:
+    """Write the pictures of a recorded run into `folder` as PNG; gives their paths."""
+    pictures = {"map": _map(simulation, robot_name)}
+    if souvenirs.detection is not None:
+        pictures["detection"] = _detection(souvenirs.detection)
+    grasps = {"grasp": lift.time_s for lift in simulation.referee.lifts(robot_name)}
+    for name, time_s in {**grasps, **souvenirs.moments}.items():
+        pictures[name] = _view(simulation, robot_name, time_s)
+    paths = [folder / f"{name}.png" for name in pictures]
+    for path, picture in zip(paths, pictures.values(), strict=True):
+        save_png(path, picture)
+    return paths
+
+
+def _detection(message: Mapping[str, Any]) -> Picture:
+    picture: Picture = message["image"]
+    for each in message["detections"]:
+        picture = draw_detection(picture, tuple(each["box"]), each["class_name"], each["score"])
+    return picture
+
+
+def _map(simulation: Simulation, robot_name: str) -> Picture:
+    rooms = simulation.world.rooms
+    view = top_view(simulation.query_at(simulation.clock.now()), _bounds(list(rooms.values())))
+    centres = {name: tuple(np.mean(polygon, axis=0)) for name, polygon in rooms.items()}
+    start = simulation.world.start
+    return draw_map(view, simulation.referee.path(robot_name), labels=centres, marks={"start": (start.x_m, start.y_m)})
+
+
+def _bounds(polygons: Sequence[Sequence[tuple[float, float]]]) -> Bounds:
+    corners = np.array([corner for polygon in polygons for corner in polygon])
+    low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _view(simulation: Simulation, robot_name: str, time_s: float) -> Picture:
+    query = simulation.query_at(time_s)
+    X_WH = simulation.hand_pose_at(robot_name, time_s)
+    across = X_WH.rotation().matrix() @ np.array([0.2, 1.0, 0.0])
+    X_WC = best_view(query, X_WH.translation(), facing_W=(float(across[0]), float(across[1])), distance_m=1.5)
+    return render_view(query, X_WC)

@@ -50,8 +50,8 @@ def draw_souvenirs(souvenirs: Souvenirs, simulation: Simulation, robot_name: str
     pictures = {"map": _map(simulation, robot_name)}
     if souvenirs.detection is not None:
         pictures["detection"] = _detection(souvenirs.detection)
-    grasps = {"grasp": lift.time_s for lift in simulation.referee.lifts(robot_name)}
-    for name, time_s in {**grasps, **souvenirs.moments}.items():
+    lifts = [("grasp", lift.time_s) for lift in simulation.referee.lifts(robot_name)[-1:]]
+    for name, time_s in (*lifts, *souvenirs.moments.items()):
         pictures[name] = _view(simulation, robot_name, time_s)
     paths = [folder / f"{name}.png" for name in pictures]
     for path, picture in zip(paths, pictures.values(), strict=True):

@@ -154,7 +154,8 @@ def _candidate(
         cost = station.cost + 0.4 * abs(tilt - np.radians(10.0))
     else:
         height = 0.5 * target.height_m
-        beyond = (height - _ABOVE_SURFACE_M - _tip_drop(R_BH, station.width_m, jaw)) / -R_BH.matrix()[2, 0]
+        above = _ABOVE_SURFACE_M + 0.4 * max(0.0, target.height_m - 0.03)
+        beyond = (height - above - _tip_drop(R_BH, station.width_m, jaw)) / -R_BH.matrix()[2, 0]
         least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
         if beyond < least or height + beyond * -R_BH.matrix()[2, 0] < _LEAST_GRIP_M:
             return None

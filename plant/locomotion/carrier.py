@@ -40,6 +40,8 @@ class CarrierLimits:
     turn_rate_rad_s: float = 2.0
     acceleration_m_s2: float = 2.0
     turn_acceleration_rad_s2: float = 4.0
+    stop_deceleration_m_s2: float = 5.0
+    stop_turn_deceleration_rad_s2: float = 12.0
     posture_speed_m_s: float = 0.25
     pitch_rate_rad_s: float = 0.6
     force_n: float = 250.0
@@ -132,10 +134,20 @@ class Carrier:
         return np.array([positions[joint.position_start()] for joint in self._joints])
 
     def control(
-        self, context: Context, state: FloatArray, wanted: Velocity, posture: Sequence[float], dt_s: float
+        self,
+        context: Context,
+        state: FloatArray,
+        wanted: Velocity,
+        posture: Sequence[float],
+        dt_s: float,
+        *,
+        stopping: bool,
     ) -> None:
-        """Command the joints for the next dt_s: ramp to `wanted` (body frame) and to the posture (height, pitch)."""
-        self._velocity = self._ramp(wanted, dt_s)
+        """Command the joints for the next dt_s: ramp to `wanted` (body frame) and to the posture (height, pitch).
+
+        A robot that is `stopping` brakes harder than it otherwise changes its speed.
+        """
+        self._velocity = self._ramp(wanted, dt_s, stopping=stopping)
         yaw = state[2]
         c, s = math.cos(yaw), math.sin(yaw)
         v = self._velocity
@@ -150,17 +162,21 @@ class Carrier:
         self._plant.get_desired_state_input_port(self.instance).FixValue(context, desired)
         self._plant.get_actuation_input_port(self.instance).FixValue(context, np.zeros(5))
 
-    def _ramp(self, wanted: Velocity, dt_s: float) -> Velocity:
+    def _ramp(self, wanted: Velocity, dt_s: float, *, stopping: bool) -> Velocity:
         limits, now = self._limits, self._velocity
         goal = np.array([wanted.vx, wanted.vy])
         speed = float(np.linalg.norm(goal))
         if speed > limits.speed_m_s:
             goal *= limits.speed_m_s / speed
         change = goal - [now.vx, now.vy]
-        size, most = float(np.linalg.norm(change)), limits.acceleration_m_s2 * dt_s
+        size, most = (
+            float(np.linalg.norm(change)),
+            (limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2) * dt_s,
+        )
         if size > most:
             change *= most / size
         turn_goal = float(np.clip(wanted.wz, -limits.turn_rate_rad_s, limits.turn_rate_rad_s))
-        turn_most = limits.turn_acceleration_rad_s2 * dt_s
+        turn_rate = limits.stop_turn_deceleration_rad_s2 if stopping else limits.turn_acceleration_rad_s2
+        turn_most = turn_rate * dt_s
         turn = float(np.clip(turn_goal - now.wz, -turn_most, turn_most))
         return Velocity(now.vx + float(change[0]), now.vy + float(change[1]), now.wz + turn)

@@ -304,7 +304,8 @@ class SpotRobot:
             return
         active = self._book.running(Part.VELOCITY)
         wanted = active.payload if active is not None and isinstance(active.payload, Velocity) else Velocity()
-        carrier.control(self._context, carrier.state(positions), wanted, self._posture, dt_s)
+        stopping = active is None
+        carrier.control(self._context, carrier.state(positions), wanted, self._posture, dt_s, stopping=stopping)
 
     def _legs(self, dt_s: float) -> tuple[FloatArray, FloatArray]:
         if self._model.carrier is None:

@@ -155,3 +155,13 @@ def test_a_command_that_has_expired_already_is_refused(engine, spot, lease):
 def test_unknown_command_ids_raise(spot):
     with pytest.raises(KeyError):
         spot.command_status(999)
+
+
+def test_a_stopped_robot_stands_within_a_fifth_of_a_second(engine, spot, lease):
+    spot.drive(0.8, 0.0, 0.5, until_s=9.0, lease=lease)
+    engine.advance(2.0)
+    spot.stop(lease=lease)
+    engine.advance(0.2)
+    before = truth(engine)
+    engine.advance(0.5)
+    assert np.abs(truth(engine) - before).max() < 0.01

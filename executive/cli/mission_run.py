@@ -65,7 +65,7 @@ def run_request(
     if record:
         simulation.save_recording(out / "recording.html")
         draw_souvenirs(souvenirs, simulation, request.mission.robot_name, out)
-    referee = RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops)
+    referee = RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops, simulation.referee.events)
     return Finished(_report(request, result, referee, seed=seed, log=log.path), view)
 
 

@@ -11,12 +11,13 @@ from rich.markup import escape
 
 @dataclass(frozen=True)
 class RefereeReport:
-    """The referee's verdict with its counts."""
+    """The referee's verdict with its counts, and one sentence for each lift, drop and bump."""
 
     success: bool
     why: str
     collisions: int
     drops: int
+    events: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -66,11 +67,13 @@ class RunReport:
         """The two verdicts and the figures, with rich markup."""
         cause = f" ({self.cause})" if self.cause else ""
         seen = "the mission is fulfilled" if self.referee.success else "the mission is not fulfilled"
+        events = tuple(escape(f"  {event}") for event in self.referee.events)
         return (
             f"[bold]The tree claims:[/bold] {_mark(self.claimed)} {self.outcome}{cause}: {escape(self.message)}",
             f"[bold]The referee saw:[/bold] {_mark(self.referee.success)} {seen}: {escape(self.referee.why)}",
             f"{self.referee.collisions} collisions, {self.referee.drops} drops; {self.sim_time_s:.1f} s simulated in "
             f"{self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), {self.ticks} ticks",
+            *events,
         )
 
 

@@ -53,8 +53,10 @@ class RunReport:
         return self.claimed and not self.referee.success
 
     def to_json(self) -> dict[str, Any]:
-        """The report as JSON values."""
-        return {**asdict(self), "commands": list(self.commands)}
+        """The report as JSON values; the referee's events are for people only."""
+        values = {**asdict(self), "commands": list(self.commands)}
+        del values["referee"]["events"]
+        return values
 
     @staticmethod
     def from_json(values: Mapping[str, Any]) -> RunReport:

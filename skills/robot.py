@@ -193,7 +193,7 @@ class Joints:
 
 @dataclass(frozen=True)
 class Gripper:
-    """Jaw angle (0 closed), clamp force at the jaw's tip (N), and whether the robot itself believes it holds something."""
+    """Jaw angle (0 closed), clamp force at the jaw tip (N), whether the robot itself believes that it holds something."""
 
     stamp_s: float
     opening_rad: float
@@ -211,7 +211,7 @@ class Battery:
 
 @dataclass(frozen=True)
 class ArmTrajectory:
-    """Joint positions (K, number of arm joints) at times from the start (K,), interpolated linearly. Raises ValueError."""
+    """Joint positions (K, arm joints) at times from the start (K,), interpolated linearly. Raises ValueError."""
 
     times_s: FloatArray
     positions_rad: FloatArray

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -87,7 +89,8 @@ class LayeredCostmap:
         scan = robot.scan()
         if scan is not None and scan.stamp_s > self._scan_stamp_s and localisation.localised:
             self._scan_stamp_s = scan.stamp_s
-            self._take_scan(scan, X_WO, self._arm_F(robot, scan), self._filter)
+            foreign = partial(self._filter.foreign, arm_F=self._arm_F(robot, scan), holding=robot.gripper().holding)
+            self._take_scan(scan, X_WO, foreign)
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
         """Take in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
@@ -131,8 +134,8 @@ class LayeredCostmap:
         points_L = scan.X_BL.inverse().multiply(points_B.T)
         return np.asarray((rotation @ points_L).T + translation)
 
-    def _take_scan(self, scan: Scan, X_WO: Pose2D, arm_F: FloatArray, self_filter: SelfFilter) -> None:
-        """Clear the cells that beams see past, then mark those that are hit and not explained."""
+    def _take_scan(self, scan: Scan, X_WO: Pose2D, foreign: Callable[[FloatArray], NDArray[np.bool_]]) -> None:
+        """Clear the cells that beams see past, then mark those that are hit, not explained and not the robot's own."""
         options = self._options
         X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
         changed = self._clear(scan, X_WF)
@@ -141,7 +144,7 @@ class LayeredCostmap:
         )
         points = self._unexplained(_placed(points_F, X_WF))
         if len(points):
-            points = points[self_filter.foreign(in_body_axes(points, X_WF), arm_F)]
+            points = points[foreign(in_body_axes(points, X_WF))]
         times = (scan.stamp_s, options.confirm_s, options.memory_s)
         cells = self._layer.cells(points)
         changed |= mark_cells(cells, points[:, 2].copy(), times, self._candidate_s, self._until_s, self._height_m)

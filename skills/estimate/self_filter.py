@@ -51,6 +51,7 @@ class SelfFilter:
     arm: ArmShape | None = None
     body_margin_m: float = 0.08
     arm_radius_m: float = 0.2
+    held_radius_m: float = 0.36
 
     @staticmethod
     def of(capabilities: Capabilities) -> SelfFilter:
@@ -60,17 +61,20 @@ class SelfFilter:
         arm = ArmShape(capabilities) if capabilities.arm and capabilities.description else None
         return SelfFilter((float(x0), float(x1), float(y0), float(y1)), arm)
 
-    def foreign(self, points_F: FloatArray, arm_F: FloatArray) -> NDArray[np.bool_]:
+    def foreign(self, points_F: FloatArray, arm_F: FloatArray, *, holding: bool = False) -> NDArray[np.bool_]:
         """Whether each (x, y, z) row is none of the robot's.
 
         All are given in one frame with the body's axes; `arm_F` holds the arm's points (`ArmShape`) and may be empty.
+        While `holding`, what is about the hand counts as the thing in it.
         """
         x0, x1, y0, y1 = self.outline_m
         m = self.body_margin_m
         x, y = points_F[:, 0], points_F[:, 1]
         own = (x > x0 - m) & (x < x1 + m) & (y > y0 - m) & (y < y1 + m)
-        for start, end in pairwise(arm_F):
-            own |= segment_distance(points_F[:, :3], start, end) < self.arm_radius_m
+        segments = list(pairwise(arm_F))
+        for index, (start, end) in enumerate(segments, start=1):
+            radius_m = self.held_radius_m if holding and index == len(segments) else self.arm_radius_m
+            own |= segment_distance(points_F[:, :3], start, end) < radius_m
         return np.asarray(~own)
 
 

@@ -46,3 +46,11 @@ def test_distance_from_a_segment_ends_at_its_ends():
     points = np.array([[0.5, 1.0, 0.0], [2.0, 0.0, 0.0], [-3.0, 4.0, 0.0]])
     ends = np.zeros(3), np.array([1.0, 0.0, 0.0])
     assert segment_distance(points, *ends) == pytest.approx([1.0, 1.0, 5.0])
+
+
+def test_what_is_about_the_hand_is_the_held_thing_while_it_holds():
+    own = SelfFilter(outline_m=(-0.5, 0.5, -0.25, 0.25))
+    arm = np.array([[0.3, 0.0, 0.7], [0.8, 0.0, 0.7], [1.0, 0.0, 0.7]])
+    beside_the_hand = np.array([[0.95, 0.3, 0.7]])
+    assert own.foreign(beside_the_hand, arm).tolist() == [True]
+    assert own.foreign(beside_the_hand, arm, holding=True).tolist() == [False]

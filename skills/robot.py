@@ -193,7 +193,7 @@ class Joints:
 
 @dataclass(frozen=True)
 class Gripper:
-    """Jaw angle (0 closed), clamp force at the jaw tip (N), whether the robot itself believes that it holds something."""
+    """Jaw angle (0 closed), clamp force at the jaw tip (N), and whether the robot believes that it holds something."""
 
     stamp_s: float
     opening_rad: float

@@ -22,6 +22,7 @@ from skills.robot import (
     CommandState,
     CommandStatus,
     FrameTree,
+    Gripper,
     Image,
     Intrinsics,
     Lease,
@@ -162,6 +163,9 @@ class PlanarRobot:
 
     def capabilities(self) -> Capabilities:
         return Capabilities(OUTLINE, 1.6, 2.0, BODY_HEIGHT_M, (0.4, 0.6), (-0.3, 0.3), None, None, self._cameras, "")
+
+    def gripper(self) -> Gripper:
+        return Gripper(self.clock.now(), 0.0, 0.0, False)
 
     def odometry(self) -> Odometry:
         X_OB = self.odometry_pose.transform(BODY_HEIGHT_M)

@@ -11,7 +11,7 @@ from executive.errors import InputError
 from executive.knowledge import Knowledge
 from executive.language import load_parser
 from executive.mission import DEFAULT_WORLD, Mission, load_mission, mission_from_file, mission_from_sentence
-from executive.registry import built_in_skills
+from executive.registry import installed_skills
 from plant.worlds.world import World
 
 
@@ -25,7 +25,7 @@ class Request:
 
     def compile(self) -> CompiledTree:
         """The mission's tree. Raises InputError."""
-        return compile_mission(self.mission, knowledge=self.knowledge, registry=built_in_skills())
+        return compile_mission(self.mission, knowledge=self.knowledge, registry=installed_skills())
 
 
 def said(text: str, *, world: str | None, require_wake: bool) -> Request:

@@ -10,13 +10,13 @@ import enum
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from skills.robot import Clock, Lease, Pose2D, Robot
+from skills.robot import Clock, Lease, Pose2D, Robot, Scan
 
 ResultT = TypeVar("ResultT")
 ResultT_co = TypeVar("ResultT_co", covariant=True)
@@ -53,10 +53,14 @@ class Succeeded:
 
 @dataclass(frozen=True)
 class Failed:
-    """Finished badly: the cause and one plain sentence."""
+    """Finished badly: the cause and one plain sentence.
+
+    `outputs` may fill some of the skill's output ports with what was learnt for the next attempt.
+    """
 
     cause: Cause
     message: str
+    outputs: Mapping[str, Any] = field(default_factory=dict)
 
 
 Step = Running | Succeeded | Failed
@@ -119,6 +123,20 @@ class Localiser(Protocol):
         """Take in the robot's newest sensor readings; called by the runner before each tick."""
 
 
+@runtime_checkable
+class SearchingLocaliser(Protocol):
+    """A localiser that can look for the robot's place on a whole map, as recovery does when the place was lost."""
+
+    def search(self, scan: Scan, radius_m: float | None) -> LocalisationEstimate | None:
+        """Where the scan fits, within radius_m of the present belief or anywhere (None); None where nowhere.
+
+        Changes nothing and may take long: call it inside a Worker job.
+        """
+
+    def accept(self, estimate: LocalisationEstimate) -> None:
+        """Believe an estimate from now on."""
+
+
 class Costmap(Protocol):
     """Where the body can go: the surveyed keep-out grid plus what the sensors see now."""
 
@@ -130,6 +148,14 @@ class Costmap(Protocol):
 
     def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
         """Take in (N, 3) points that a camera saw on things in the way, the floor left out."""
+
+
+@runtime_checkable
+class ForgettingCostmap(Protocol):
+    """A costmap whose layer of seen things can be cleared; what the survey knows stays."""
+
+    def forget_seen(self) -> int:
+        """Forget all that was seen and not surveyed; the number of cells that were blocked by it."""
 
 
 class Job(Protocol[ResultT_co]):
@@ -205,3 +231,17 @@ class Skill(ABC, Generic[InputsT]):
 
     def end(self) -> None:
         """Clean up on any way out; idempotent. Stops only this skill's own commands (`Robot.stop(only=...)`)."""
+
+    def suspend(self) -> None:
+        """Stop this skill's motion for a while and keep what is worth keeping. `resume` or `end` follows.
+
+        By default the attempt is ended.
+        """
+        self.end()
+
+    def resume(self, inputs: InputsT) -> None:
+        """Go on after `suspend`. Time has passed, and the robot may have been elsewhere in between.
+
+        By default the attempt begins anew. Override it where that would undo or repeat what is done already.
+        """
+        self.begin(inputs)

@@ -11,6 +11,7 @@ from py_trees.decorators import Decorator
 
 from executive.behaviours.context import RunContext
 from executive.behaviours.explained import Explained, cause_of, message_of
+from executive.behaviours.suspension import StoppableTime
 from skills.api import Cause, Failed
 from skills.robot import Clock
 
@@ -48,20 +49,25 @@ class Timeout(ExplainedDecorator):
     """A limit on the robot's clock.
 
     Child FAILURE: FAILURE with its cause. Time over: child halted, FAILURE with TIMEOUT, even when it succeeded just
-    now. Else as the child.
+    now. Else as the child. Time in which the tree is suspended does not count.
     """
 
     def __init__(self, *, path_id: str, name: str, child: Behaviour, limit_s: float, clock: Clock) -> None:
         super().__init__(path_id=path_id, name=name, child=child)
-        self._limit_s, self._clock, self._deadline_s = limit_s, clock, 0.0
+        self._limit_s, self._clock, self._time = limit_s, clock, StoppableTime(clock)
 
     def initialise(self) -> None:
         """Start the time."""
-        self._deadline_s = self._clock.now() + self._limit_s
+        self._time = StoppableTime(self._clock)
+
+    def suspend(self) -> None:
+        """Stop counting until the next tick."""
+        self._time.stop()
 
     def update(self) -> Status:
         """The child's status, unless the time is over."""
-        late = self._clock.now() > self._deadline_s
+        self._time.go_on()
+        late = self._time.elapsed_s() > self._limit_s
         if late and self.decorated.status != Status.FAILURE:
             return self.fail(Failed(Cause.TIMEOUT, f"not done within {self._limit_s:g} s"))
         return self.pass_on()

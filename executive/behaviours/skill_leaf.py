@@ -12,6 +12,7 @@ from py_trees.common import Status
 from executive.behaviours.board import Binding
 from executive.behaviours.context import RunContext
 from executive.behaviours.explained import Explained
+from executive.behaviours.suspension import StoppableTime
 from executive.types import conforms, describe_type
 from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
 
@@ -26,7 +27,8 @@ class SkillLeaf(Explained, Behaviour):
     its output ports are filled with the declared types. FAILURE with the skill's cause when it says `Failed`; with
     TIMEOUT when the robot's clock ran past `limit_s`, a late success included; with ERROR when it raised anything
     or returned no `Step`. INVALID with CANCELLED when stopped from outside. `end` is called on every way out.
-    Each attempt gets a new skill object, so that nothing leaks from one attempt to the next.
+    Each attempt gets a new skill object, so that nothing leaks from one attempt to the next. A suspended leaf stays
+    RUNNING; its skill goes on at the next tick (`Skill.resume`), and the time between does not count.
     """
 
     def __init__(
@@ -46,7 +48,8 @@ class SkillLeaf(Explained, Behaviour):
         self._skill_class, self._inputs, self._outputs = skill, dict(inputs), dict(outputs)
         self._limit_s, self._context = limit_s, context
         self._skill: Skill[Any] | None = None
-        self._started_s = 0.0
+        self._values: Any = None
+        self._time = StoppableTime(context.clock)
         self._false_start: Failed | None = None
         self.clear_explanation()
 
@@ -54,6 +57,11 @@ class SkillLeaf(Explained, Behaviour):
     def active(self) -> bool:
         """True between the skill's `begin` and its `end`."""
         return self._skill is not None
+
+    @property
+    def suspended(self) -> bool:
+        """True between `suspend` and the next tick."""
+        return self.active and self._time.stopped
 
     def initialise(self) -> None:
         """Begin a new attempt; a defect is kept for `update`, since an exception here would leave the tree hanging."""
@@ -63,6 +71,8 @@ class SkillLeaf(Explained, Behaviour):
 
     def update(self) -> Status:
         """One step of the skill, judged."""
+        if self.suspended:
+            self._go_on()
         step = self._false_start or self._judged(self._guarded(self._step))
         if isinstance(step, Running):
             self.message, self.progress = step.message, step.progress
@@ -71,6 +81,14 @@ class SkillLeaf(Explained, Behaviour):
         self.message = self.feedback_message = step.message
         self.cause = step.cause if isinstance(step, Failed) else None
         return Status.FAILURE if isinstance(step, Failed) else Status.SUCCESS
+
+    def suspend(self) -> None:
+        """Let the skill stop its motion and keep its place; does nothing on an idle or suspended leaf."""
+        if not self.active or self.suspended:
+            return
+        assert self._skill is not None
+        self._time.stop()
+        self._false_start = self._guarded(self._skill.suspend) or self._false_start
 
     def terminate(self, new_status: Status) -> None:
         """Stopped from outside: end the skill if it is still active, else merely forget an old result."""
@@ -91,11 +109,19 @@ class SkillLeaf(Explained, Behaviour):
             self.cause, self.message = defect.cause, defect.message
 
     def _begin(self) -> None:
-        self._started_s = self._context.clock.now()
+        self._time = StoppableTime(self._context.clock)
         board = self._context.board
         values = {port: binding.read(board) for port, binding in self._inputs.items()}
         self._skill = self._skill_class(self._context.for_skill(self.path_id))
-        self._skill.begin(self._skill_class.Inputs(**values))
+        self._values = self._skill_class.Inputs(**values)
+        self._skill.begin(self._values)
+
+    def _go_on(self) -> None:
+        """The first tick after a suspension; a defect is kept, as in `initialise`."""
+        assert self._skill is not None
+        skill = self._skill
+        self._time.go_on()
+        self._false_start = self._false_start or self._guarded(lambda: skill.resume(self._values))
 
     def _step(self) -> Step:
         assert self._skill is not None
@@ -106,7 +132,7 @@ class SkillLeaf(Explained, Behaviour):
 
     def _judged(self, step: Step) -> Step:
         """Time over turns going on, and a success that comes too late, into a failure."""
-        late = self._context.clock.now() - self._started_s > self._limit_s
+        late = self._time.elapsed_s() > self._limit_s
         if late and not isinstance(step, Failed):
             return Failed(Cause.TIMEOUT, f"{self.name} took longer than {self._limit_s:g} s ({step.message})")
         return step
@@ -117,15 +143,20 @@ class SkillLeaf(Explained, Behaviour):
         return None if skill is None else self._guarded(skill.end)
 
     def _written(self, step: Succeeded | Failed) -> Succeeded | Failed:
-        """Put the outputs on the blackboard; a missing or wrongly typed output is a defect of the skill."""
-        if isinstance(step, Failed):
-            return step
+        """Put the outputs on the blackboard; a missing or wrongly typed output is a defect of the skill.
+
+        A failure need not fill all ports: what it learnt is for the next attempt.
+        """
+        given = step.outputs if isinstance(step, Failed) else self._skill_class.outputs
         for port, kind in self._skill_class.outputs.items():
+            if port not in given:
+                continue
             if not conforms(step.outputs.get(port), kind):
-                given = type(step.outputs[port]).__name__ if port in step.outputs else "nothing"
-                return Failed(Cause.ERROR, f"{self.name} gave {given} on port '{port}', not {describe_type(kind)}")
+                found = type(step.outputs[port]).__name__ if port in step.outputs else "nothing"
+                return Failed(Cause.ERROR, f"{self.name} gave {found} on port '{port}', not {describe_type(kind)}")
         for port, key in self._outputs.items():
-            self._context.board.put(key, step.outputs[port])
+            if port in given:
+                self._context.board.put(key, step.outputs[port])
         return step
 
     def _guarded(self, call: Callable[[], ResultT]) -> ResultT | Failed:

@@ -12,6 +12,7 @@ from executive.behaviours.context import RunContext
 from executive.behaviours.skill_leaf import ERROR_TOPIC
 from executive.compiler import CompiledTree
 from executive.compiling.workshop import slug
+from executive.journal import Journal
 from executive.outcome import Outcome, RobotResult, RunResult
 from executive.record.schemas import WALL
 from executive.session import Ending, Session
@@ -25,12 +26,13 @@ HOLDER = "errand"
 
 @dataclass(frozen=True)
 class RunEntry:
-    """One robot with its tree and estimators."""
+    """One robot with its tree and estimators, and who keeps notes of its mission."""
 
     tree: CompiledTree
     robot: Robot
     localiser: Localiser
     costmap: Costmap
+    journal: Journal | None = None
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ class _Run:
             seed=self._settings.seed,
             board=Board(slug(entry.tree.robot_name)),
         )
-        return Session(entry.tree, context)
+        return Session(entry.tree, context, entry.journal)
 
     def _cycle(self) -> None:
         """One period: time passes, estimators see, trees tick."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
@@ -14,6 +14,7 @@ from executive.behaviours.context import RunContext
 from executive.behaviours.explained import Explained
 from executive.behaviours.skill_leaf import ERROR_TOPIC, SkillLeaf
 from executive.compiler import CompiledTree
+from executive.journal import Journal, TickNote
 from executive.outcome import Outcome, RobotResult
 from executive.record.event_log import stamp
 from executive.record.schemas import OUTCOME, POSE, TRANSITIONS, TREE
@@ -39,8 +40,9 @@ class Ending:
 class Session:
     """One robot's mission. The runner calls `sense` and `tick` in turn until `finished`, and `close` in any case."""
 
-    def __init__(self, tree: CompiledTree, context: RunContext) -> None:
+    def __init__(self, tree: CompiledTree, context: RunContext, journal: Journal | None = None) -> None:
         self.context = context
+        self._journal = journal
         self.root: Behaviour = tree.build(context)
         self.states: Snapshot = snapshot(self.root)
         self.result: RobotResult | None = None
@@ -69,7 +71,9 @@ class Session:
     def tick(self) -> None:
         """Tick the tree once and log what changed."""
         self.root.tick_once()
-        self._log_changes()
+        changes = self._log_changes()
+        if self._journal is not None:
+            self._journal.note(self._tick_note(changes))
 
     def close(self, ending: Ending | None = None) -> RobotResult:
         """Stop the tree and the robot, give the lease back, log the end. Idempotent; raises nothing."""
@@ -109,10 +113,19 @@ class Session:
         answers = {n.path_id: n.answer for n in walk(root) if isinstance(n, Answer) and n.answer is not None}
         return RobotResult(self.name, outcome, cause, message, answers, self.states)
 
-    def _log_changes(self) -> None:
+    def _log_changes(self) -> Sequence[Transition]:
         before, self.states = self.states, snapshot(self.root)
-        for change in transitions(before, self.states):
+        changes = tuple(transitions(before, self.states))
+        for change in changes:
             self.context.publish(TRANSITIONS, self._transition(change))
+        return changes
+
+    def _tick_note(self, changes: Sequence[Transition]) -> TickNote:
+        context = self.context
+        estimate = context.localiser.estimate()
+        X_WB = estimate.X_WO @ context.robot.odometry().X_OB
+        pose = Pose2D.from_transform(X_WB) if estimate.localised else None
+        return TickNote(context.clock.now(), changes, context.board.values(), pose)
 
     def _transition(self, change: Transition) -> dict[str, object]:
         after = change.after

@@ -175,6 +175,62 @@ class Worker(Protocol):
         """Start `work`, which takes latency_s on the robot's clock."""
 
 
+@dataclass(frozen=True)
+class Question:
+    """A question to the operator.
+
+    `id` is unique among the open ones (a path id); with `options`, nothing else is an answer. `default` counts when
+    nobody answers within `limit_s` of the robot's clock. Raises ValueError when the default is none of the options.
+    """
+
+    id: str
+    text: str
+    options: tuple[str, ...]
+    default: str
+    limit_s: float
+
+    def __post_init__(self) -> None:
+        if self.options and self.default not in self.options:
+            raise ValueError(f"question '{self.id}': the default '{self.default}' is none of {list(self.options)}")
+
+
+class Asked(Job[str], Protocol):
+    """A question that was put to the operator. `result` is the answer, or the default once its time is over."""
+
+    def withdraw(self) -> None:
+        """Nobody waits for the answer any more; idempotent."""
+
+
+class Ask(Protocol):
+    """Puts questions to the operator."""
+
+    def __call__(self, question: Question) -> Asked:
+        """Ask; returns at once. Raises ValueError when a question of that id is open already."""
+
+
+@dataclass(frozen=True)
+class _Unheard:
+    """A question where there is nobody to ask: its default is the answer."""
+
+    question: Question
+
+    def done(self) -> bool:
+        """True."""
+        return True
+
+    def result(self) -> str:
+        """The default."""
+        return self.question.default
+
+    def withdraw(self) -> None:
+        """Nothing to withdraw."""
+
+
+def nobody_to_ask(question: Question) -> Asked:
+    """An `Ask` that takes the default at once."""
+    return _Unheard(question)
+
+
 class Publish(Protocol):
     """Writes a message to the event log."""
 
@@ -194,6 +250,7 @@ class SkillContext:
     costmap: Costmap
     publish: Publish
     seed: int
+    ask: Ask = nobody_to_ask
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""

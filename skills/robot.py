@@ -317,6 +317,9 @@ class Robot(Protocol):
     def command_status(self, command: CommandId) -> CommandStatus:
         """What became of a command. Raises KeyError for an id never given."""
 
+    def lease_holder(self) -> Lease | None:
+        """The lease that counts now; None while it is free."""
+
     def acquire_lease(self, holder: str) -> Lease:
         """Take a free lease. Raises LeaseError when another holds it."""
 

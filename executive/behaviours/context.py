@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import dataclass
 
 from executive.behaviours.board import Board
-from skills.api import Costmap, Localiser, Publish, SkillContext, Worker
+from skills.api import Ask, Costmap, Localiser, Publish, SkillContext, Worker, nobody_to_ask
 from skills.robot import Clock, Lease, Robot
 
 
@@ -29,6 +29,7 @@ class RunContext:
     publish: Publish
     seed: int
     board: Board
+    ask: Ask = nobody_to_ask
 
     def for_skill(self, path_id: str) -> SkillContext:
         """The part of it that a skill may touch."""
@@ -41,4 +42,5 @@ class RunContext:
             costmap=self.costmap,
             publish=self.publish,
             seed=leaf_seed(self.seed, path_id),
+            ask=self.ask,
         )

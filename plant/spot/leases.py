@@ -13,6 +13,11 @@ class LeaseDesk:
         self._number = 0
         self._current: Lease | None = None
 
+    @property
+    def current(self) -> Lease | None:
+        """The lease that counts, None while it is free."""
+        return self._current
+
     def acquire(self, holder: str) -> Lease:
         """A lease for `holder`. Raises LeaseError while another's is out."""
         if self._current is not None:

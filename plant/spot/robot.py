@@ -176,6 +176,10 @@ class SpotRobot:
 
     # -- own ------------------------------------------------------------------------------------------------------
 
+    def lease_holder(self) -> Lease | None:
+        """The lease that counts now; None while it is free."""
+        return self._desk.current
+
     def acquire_lease(self, holder: str) -> Lease:
         """Take a free lease. Raises LeaseError when another holds it."""
         return self._desk.acquire(holder)

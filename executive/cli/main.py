@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-import sys
-from collections.abc import Callable, Mapping
-from enum import StrEnum
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Final
 
 import typer
@@ -17,17 +13,17 @@ from rich.table import Table
 
 from executive.cli.assembly import knowledge_of, open_world
 from executive.cli.live import live_view
+from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.output import BAD_INPUT, NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.requests import Request, filed, said
 from executive.cli.sweep import rows, seed_range, sweep, totals
+from executive.cli.tree_command import tree
 from executive.compiler import CompiledTree
 from executive.errors import InputError
 from executive.language import Status, Understanding, load_parser, parse_lines
 from executive.mission import DEFAULT_WORLD
-from executive.view.model import NodeView, node_view, to_json
-from executive.view.svg import to_svg
-from executive.view.text import to_rich, to_text
+from executive.view.text import to_rich
 
 app = typer.Typer(
     name="errand",
@@ -44,12 +40,8 @@ NoWake = Annotated[bool, typer.Option("--no-wake", help="The robot's name need n
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 
 
-class TreeFormat(StrEnum):
-    """How `errand tree` shows a tree."""
-
-    TEXT = "text"
-    SVG = "svg"
-    JSON = "json"
+app.command()(tree)
+app.command()(log)
 
 
 @app.command()
@@ -80,25 +72,6 @@ def parse(
             print_json(meanings[0].to_json() if file is None else {"sentences": [m.to_json() for m in meanings]})
         if any(meaning.status is not Status.OK for meaning in meanings):
             raise typer.Exit(BAD_INPUT)
-
-
-@app.command()
-def tree(
-    file: Annotated[str | None, typer.Argument(metavar="FILE|SENTENCE", show_default=False)] = None,
-    say: Say = None,
-    world: World = None,
-    form: Annotated[TreeFormat, typer.Option("--format", help="How to show it.")] = TreeFormat.TEXT,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Write it to this file.")] = None,
-    ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
-) -> None:
-    """Show the tree of a sentence or a mission file before it runs."""
-    with refusals():
-        compiled = _request_of_text(file, say, world).compile()
-        text = _FORMS[form](node_view(compiled.root), ascii_only)
-        if output is None:
-            sys.stdout.write(text)
-        else:
-            _write(output, text)
 
 
 @app.command()
@@ -174,16 +147,6 @@ def _request(file: Path | None, say: str | None, world: str | None, *, require_w
     return filed(file, world=world)
 
 
-def _request_of_text(text: str | None, say: str | None, world: str | None) -> Request:
-    """`errand tree` takes a sentence where others take a file: what ends in .yaml or exists is a file."""
-    is_file = text is not None and (text.endswith((".yaml", ".yml")) or Path(text).is_file())
-    if text is None or is_file:
-        return _request(None if text is None else Path(text), say, world, require_wake=False)
-    if say is not None:
-        raise InputError("two sentences were given", mend="leave one of them out")
-    return said(text, world=world, require_wake=False)
-
-
 def _run_shown(
     request: Request, compiled: CompiledTree, seed: int, out: Path, *, record: bool, as_json: bool, quiet: bool
 ) -> Finished:
@@ -219,18 +182,4 @@ def _lines_of(file: Path | None) -> list[str]:
         raise InputError(f"cannot read it ({error})", mend="name a text file in UTF-8", file=file) from error
 
 
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", mend="name another file", file=path) from error
-
-
 _COUNTS: Final = ("successes", "referee_successes", "false_claims")
-_FORMS: Final[Mapping[TreeFormat, Callable[[NodeView, bool], str]]] = MappingProxyType(
-    {
-        TreeFormat.TEXT: lambda view, ascii_only: to_text(view, ascii_only=ascii_only) + "\n",
-        TreeFormat.SVG: lambda view, _: to_svg(view),
-        TreeFormat.JSON: lambda view, _: json.dumps(to_json(view), ensure_ascii=False) + "\n",
-    }
-)

@@ -15,6 +15,11 @@ POSE: Final = "pose"
 OUTCOME: Final = "outcome"
 RUN: Final = "run"
 WALL: Final = "wall"
+ERRORS: Final = "errors"
+PATH: Final = "path"
+MAP: Final = "map"
+DETECTIONS: Final = "detections"
+BOXES: Final = "detections/boxes"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,9 @@
-"""How a node's state looks: one word, one symbol, one colour; told apart without colour vision."""
+"""How a node's state looks: one word, one symbol, one colour; told apart without colour vision.
+
+Lines are drawn in the colours of Okabe and Ito, which stay apart for all common kinds of colour vision; each state also
+has its own symbol and its own kind of line. Text stands in a darker ink of the same hue, readable on white and on the
+fill.
+"""
 
 from __future__ import annotations
 
@@ -13,24 +18,26 @@ from skills.api import Cause
 
 @dataclass(frozen=True)
 class Look:
-    """A state's word, symbols (Unicode and ASCII), hex colours (line, fill), and rich style."""
+    """A state's word, symbols (Unicode and ASCII), hex colours (line, text, fill), rich style, and SVG line dashes."""
 
     word: str
     symbol: str
     ascii: str
     line: str
+    ink: str
     fill: str
     style: str
+    dashes: str = ""
 
 
 class Looks(enum.Enum):
     """The looks of all states."""
 
-    IDLE = Look("not run", "○", "[ ]", "#8b949e", "#ffffff", "dim")
-    RUNNING = Look("running", "▶", "[>]", "#0550ae", "#ddf0ff", "bold blue")
-    SUCCESS = Look("success", "✓", "[+]", "#116329", "#e3f7e8", "green")
-    FAILURE = Look("failure", "✗", "[x]", "#b3261e", "#ffe8e4", "bold red")
-    CANCELLED = Look("cancelled", "⊘", "[/]", "#6b3fa0", "#f3eafc", "magenta")
+    IDLE = Look("not run", "○", "[ ]", "#8b949e", "#57606a", "#ffffff", "dim", "2 3")
+    RUNNING = Look("running", "▶", "[>]", "#0072b2", "#00537f", "#e5f3fb", "bold blue", "7 3")
+    SUCCESS = Look("success", "✓", "[+]", "#009e73", "#00573f", "#e6f6f1", "green")
+    FAILURE = Look("failure", "✗", "[x]", "#d55e00", "#8f3f00", "#fdeee3", "bold red")
+    CANCELLED = Look("cancelled", "⊘", "[/]", "#cc79a7", "#84305d", "#faeef5", "magenta", "9 3 2 3")
 
 
 def look_of(state: NodeState) -> Look:

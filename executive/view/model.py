@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from executive.compiling.plans import NodePlan, Source
 from executive.snapshot import NodeState
+from executive.view.ports import Port, ports_of
 
 
 @dataclass(frozen=True)
 class NodeView:
-    """One node as shown. A state of INVALID without a cause means: not run yet."""
+    """One node as shown. A state of INVALID without a cause means: not run yet; `hidden` nodes below are left out."""
 
     path_id: str
     kind: str
@@ -20,6 +22,13 @@ class NodeView:
     state: NodeState = field(default_factory=NodeState)
     source: Source | None = None
     children: tuple[NodeView, ...] = ()
+    ports: tuple[Port, ...] = ()
+    hidden: int = 0
+
+    @property
+    def below(self) -> int:
+        """How many nodes there are below, the hidden ones included."""
+        return self.hidden + sum(1 + child.below for child in self.children)
 
     def walk(self, depth: int = 0) -> Iterator[tuple[int, NodeView]]:
         """Every node with its depth, parents first."""
@@ -28,9 +37,15 @@ class NodeView:
             yield from child.walk(depth + 1)
 
     def structure(self) -> dict[str, Any]:
-        """The tree without states."""
-        children = [child.structure() for child in self.children]
-        return {"id": self.path_id, "type": self.kind, "name": self.name, "children": children}
+        """The tree without states, as it is logged."""
+        return {
+            "id": self.path_id,
+            "type": self.kind,
+            "name": self.name,
+            "source": _place(self.source),
+            "ports": [asdict(port) for port in self.ports],
+            "children": [child.structure() for child in self.children],
+        }
 
 
 def node_view(plan: NodePlan, states: Mapping[str, NodeState] | None = None) -> NodeView:
@@ -43,18 +58,37 @@ def node_view(plan: NodePlan, states: Mapping[str, NodeState] | None = None) -> 
         state=known.get(plan.path_id, NodeState()),
         source=plan.source,
         children=tuple(node_view(child, known) for child in plan.children),
+        ports=ports_of(plan),
+    )
+
+
+def logged_view(structure: Mapping[str, Any], states: Mapping[str, NodeState]) -> NodeView:
+    """The view of a logged structure. Raises KeyError or TypeError for what is no structure."""
+    source = structure.get("source")
+    return NodeView(
+        path_id=structure["id"],
+        kind=structure["type"],
+        name=structure["name"],
+        state=states.get(structure["id"], NodeState()),
+        source=None if source is None else Source(Path(source["file"]), int(source["line"])),
+        children=tuple(logged_view(child, states) for child in structure["children"]),
+        ports=tuple(Port(**port) for port in structure.get("ports", ())),
     )
 
 
 def to_json(node: NodeView) -> dict[str, Any]:
     """The node and all below as `errand tree --format json` prints them."""
-    source, state = node.source, node.state
+    state = node.state
     return {
         "id": node.path_id,
         "type": node.kind,
         "name": node.name,
         "status": state.status.value,
         "cause": None if state.cause is None else state.cause.value,
-        "source": None if source is None else {"file": str(source.file), "line": source.line},
+        "source": _place(node.source),
         "children": [to_json(child) for child in node.children],
     }
+
+
+def _place(source: Source | None) -> dict[str, Any] | None:
+    return None if source is None else {"file": str(source.file), "line": source.line}

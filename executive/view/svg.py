@@ -11,7 +11,7 @@ from typing import Final
 
 from executive.view.looks import Look, Looks, look_of
 from executive.view.model import NodeView
-from executive.view.text import note_of
+from executive.view.text import note_of, printable
 
 BOX_W: Final = 232
 BOX_H: Final = 40
@@ -25,7 +25,6 @@ NOTE_CHARS: Final = 36
 NOTE_LINES: Final = 3
 NAME_CHARS: Final = 30
 FONT: Final = "DejaVu Sans, Helvetica, Arial, sans-serif"
-DASHES: Final[Mapping[str, str]] = MappingProxyType({"not run": "2 3", "running": "7 3", "cancelled": "9 3 2 3"})
 SYMBOLS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "not run": '<circle r="5" fill="none"/>',
@@ -69,7 +68,7 @@ def to_svg(root: NodeView, *, title: str = "") -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}" '
         f'viewBox="0 0 {width:g} {height:g}" font-family="{FONT}">'
         f'<rect width="100%" height="100%" fill="#ffffff"/>'
-        f'<text x="{MARGIN}" y="{MARGIN + 14}" font-size="16" font-weight="bold">{escape(title or root.name)}</text>'
+        f'<text x="{MARGIN}" y="{MARGIN + 14}" font-size="16" font-weight="bold">{_safe(title or root.name)}</text>'
     )
     return "\n".join([head, *body, _legend(height - MARGIN - 6), "</svg>", ""])
 
@@ -91,7 +90,7 @@ def _laid_out(node: NodeView, x: float, y: float) -> tuple[_Box, float]:
 
 
 def _wrapped(note: str) -> tuple[str, ...]:
-    return tuple(textwrap.wrap(note, NOTE_CHARS, max_lines=NOTE_LINES, placeholder=" …"))
+    return tuple(textwrap.wrap(printable(note), NOTE_CHARS, max_lines=NOTE_LINES, placeholder=" …"))
 
 
 def _edges(box: _Box) -> Iterator[str]:
@@ -105,22 +104,26 @@ def _edges(box: _Box) -> Iterator[str]:
 
 def _drawn(box: _Box) -> str:
     node, look = box.node, look_of(box.node.state)
-    tooltip = "\n".join(filter(None, (node.path_id, look.word, note_of(node))))
-    name = textwrap.shorten(node.name, NAME_CHARS, placeholder="…")
+    tooltip = "\n".join(map(printable, filter(None, (node.path_id, look.word, note_of(node)))))
+    name = textwrap.shorten(printable(node.name), NAME_CHARS, placeholder="…")
     rows = "".join(
-        f'<text x="12" y="{BOX_H + 8 + n * NOTE_LINE_H}" font-size="10.5" fill="{look.line}">{escape(row)}</text>'
+        f'<text x="12" y="{BOX_H + 8 + n * NOTE_LINE_H}" font-size="10.5" fill="{look.ink}">{escape(row)}</text>'
         for n, row in enumerate(box.note)
     )
     return (
-        f'<g transform="translate({box.x:g},{box.y:g})" data-id="{escape(node.path_id)}">'
+        f'<g transform="translate({box.x:g},{box.y:g})" data-id="{_safe(node.path_id)}">'
         f"<title>{escape(tooltip)}</title>{_frame(look, box.height)}{_symbol(look, 20, 20)}"
-        f'<text x="38" y="15" font-size="9" letter-spacing="0.8" fill="#57606a">{escape(node.kind.upper())}</text>'
+        f'<text x="38" y="15" font-size="9" letter-spacing="0.8" fill="#57606a">{_safe(node.kind.upper())}</text>'
         f'<text x="38" y="31" font-size="12.5" fill="#1f2328">{escape(name)}</text>{rows}</g>'
     )
 
 
+def _safe(text: str) -> str:
+    return escape(printable(text))
+
+
 def _frame(look: Look, height: float) -> str:
-    dash = f' stroke-dasharray="{DASHES[look.word]}"' if look.word in DASHES else ""
+    dash = f' stroke-dasharray="{look.dashes}"' if look.dashes else ""
     thickness = 2.4 if look.word == "failure" else 1.4
     return (
         f'<rect width="{BOX_W}" height="{height:g}" rx="6" fill="{look.fill}" stroke="{look.line}" '
@@ -130,7 +133,7 @@ def _frame(look: Look, height: float) -> str:
 
 def _symbol(look: Look, x: float, y: float) -> str:
     return (
-        f'<g transform="translate({x:g},{y:g})" stroke="{look.line}" color="{look.line}" stroke-width="1.8" '
+        f'<g transform="translate({x:g},{y:g})" stroke="{look.ink}" color="{look.ink}" stroke-width="1.8" '
         f'stroke-linecap="round" stroke-linejoin="round">{SYMBOLS[look.word]}</g>'
     )
 

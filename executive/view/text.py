@@ -25,10 +25,11 @@ class Line:
 
 def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
     """The tree as plain lines."""
-    return "\n".join(
+    text = "\n".join(
         f"{line.branches}{line.look.ascii if ascii_only else line.look.symbol} {_label(line)}{_dashed(line.note)}"
         for line in lines(root, ascii_only=ascii_only)
     )
+    return text.encode("ascii", "replace").decode() if ascii_only else text
 
 
 def to_rich(root: NodeView, *, collapsed: bool = True) -> Text:
@@ -51,10 +52,11 @@ def lines(root: NodeView, *, ascii_only: bool = False, collapsed: bool = False) 
 
 def _lines(node: NodeView, own: str, below: str, pieces: tuple[str, str, str, str], collapsed: bool) -> Iterator[Line]:
     branch, last_branch, bar, blank = pieces
-    hidden = collapsed and _closed(node)
+    hidden = collapsed and closed(node)
     note = note_of(node)
-    if hidden and node.children:
-        note = " ".join(filter(None, (note, f"({sum(1 for _ in node.walk()) - 1} nodes)")))
+    unseen = node.below if hidden else node.hidden
+    if unseen:
+        note = " ".join(filter(None, (note, f"({unseen} nodes)")))
     yield Line(own, look_of(node.state), node.kind, node.name, note)
     for child in () if hidden else node.children:
         last = child is node.children[-1]
@@ -71,13 +73,19 @@ def note_of(node: NodeView) -> str:
     return ": ".join(filter(None, (state.cause.value if state.cause else "", sentence)))
 
 
-def _closed(node: NodeView) -> bool:
+def closed(node: NodeView) -> bool:
+    """True of a node that is done well or not begun: what lies below it can be left out of sight."""
     return node.state.status in (Status.SUCCESS, Status.INVALID) and node.state.cause is None
 
 
+def printable(text: str) -> str:
+    """The text on one line, without control characters, which XML and terminals do not bear."""
+    return "".join(" " if char in "\n\r\t" else char if char.isprintable() else "\ufffd" for char in text)
+
+
 def _label(line: Line) -> str:
-    return line.name if line.kind == "skill" else f"{line.kind} {line.name}"
+    return printable(line.name if line.kind == "skill" else f"{line.kind} {line.name}")
 
 
 def _dashed(note: str) -> str:
-    return f" - {note}" if note else ""
+    return f" - {printable(note)}" if note else ""

@@ -1,0 +1,51 @@
+"""`errand log`: the timeline of an event log."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from executive.cli.output import refusals
+from executive.record.history import History, read_history
+from executive.record.timeline import Entry, timeline
+from executive.view.looks import look_of
+from executive.view.text import printable
+
+
+def log(
+    file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
+    as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
+    every_node: Annotated[bool, typer.Option("--all", help="Also the inner nodes that did not fail.")] = False,
+) -> None:
+    """Print what happened in a run: what each node did and why, commands, detections, overruns, the outcome."""
+    with refusals():
+        history = read_history(file)
+        if as_json:
+            sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
+            return
+        Console(highlight=False).print(_table(history, every_node))
+
+
+def _table(history: History, every_node: bool) -> Table:
+    table = Table("t (s)", "", "node or topic", "what", title=printable(str(history.file)), title_style="bold")
+    table.columns[0].justify = "right"
+    for column, share in ((2, 2), (3, 3)):
+        table.columns[column].ratio, table.columns[column].overflow = share, "fold"
+    for entry in timeline(history.events, leaves_only=not every_node):
+        table.add_row(*_row(entry))
+    return table
+
+
+def _row(entry: Entry) -> tuple[str | Text, ...]:
+    if entry.state is None:
+        return f"{entry.t:.2f}", "·", Text(entry.about, style="cyan"), Text(printable(entry.text))
+    look = look_of(entry.state)
+    symbol = Text(f"{look.symbol} {look.word}", style=look.style)
+    return f"{entry.t:.2f}", symbol, Text(printable(entry.about)), Text(printable(entry.text), style=look.style)

@@ -1,0 +1,97 @@
+"""`errand tree`: the tree of a sentence or a mission file before it runs, or of a log as it last was."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Mapping
+from enum import StrEnum
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Final
+
+import typer
+
+from executive.cli.output import refusals
+from executive.cli.requests import Request, filed, said
+from executive.errors import InputError
+from executive.record.history import read_history
+from executive.view.btcpp import to_btcpp
+from executive.view.collapse import MANY_NODES, folded_below, folded_to
+from executive.view.mermaid import to_mermaid
+from executive.view.model import NodeView, node_view, to_json
+from executive.view.svg import to_svg
+from executive.view.text import to_text
+
+LOG_SUFFIX: Final = ".mcap"
+
+
+class TreeFormat(StrEnum):
+    """How `errand tree` shows a tree."""
+
+    TEXT = "text"
+    SVG = "svg"
+    MERMAID = "mermaid"
+    XML = "xml"
+    JSON = "json"
+
+
+_FORMS: Final[Mapping[TreeFormat, Callable[[NodeView, bool], str]]] = MappingProxyType(
+    {
+        TreeFormat.TEXT: lambda view, ascii_only: to_text(view, ascii_only=ascii_only) + "\n",
+        TreeFormat.SVG: lambda view, _: to_svg(view),
+        TreeFormat.MERMAID: lambda view, _: to_mermaid(view),
+        TreeFormat.XML: lambda view, _: to_btcpp(view),
+        TreeFormat.JSON: lambda view, _: json.dumps(to_json(view), ensure_ascii=False) + "\n",
+    }
+)
+_WHOLE: Final = frozenset({TreeFormat.XML, TreeFormat.JSON})  # for programs, which do not mind a large tree
+
+
+def tree(
+    file: Annotated[str | None, typer.Argument(metavar="FILE|SENTENCE|LOG", show_default=False)] = None,
+    say: Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')] = None,
+    world: Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")] = None,
+    form: Annotated[TreeFormat, typer.Option("--format", help="How to show it.")] = TreeFormat.TEXT,
+    depth: Annotated[int | None, typer.Option(min=0, help="Show only so many levels below the root.")] = None,
+    most: Annotated[int, typer.Option(min=1, help="Fold what is done or not begun above so many nodes.")] = MANY_NODES,
+    at: Annotated[float | None, typer.Option(min=0.0, help="Of a log: at this time (s), not at its end.")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Write it to this file.")] = None,
+    ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
+) -> None:
+    """Show the tree of a sentence or a mission file before it runs, or of a log as it last was."""
+    with refusals():
+        whole = _view(file, say, world, at)
+        shown = whole if depth is None else folded_below(whole, depth)
+        text = _FORMS[form](shown if form in _WHOLE else folded_to(shown, most), ascii_only)
+        if output is None:
+            sys.stdout.write(text)
+        else:
+            _write(output, text)
+
+
+def _view(text: str | None, say: str | None, world: str | None, at_s: float | None) -> NodeView:
+    """What ends in .mcap is a log, what ends in .yaml or exists a mission file, and all else a sentence."""
+    if text is not None and text.endswith(LOG_SUFFIX):
+        return read_history(Path(text)).trees(at_s)[-1]
+    if at_s is not None:
+        raise InputError("--at is for logs", mend="name a log.mcap that a run has written")
+    return node_view(_request(text, say, world).compile().root)
+
+
+def _request(text: str | None, say: str | None, world: str | None) -> Request:
+    if text is not None and say is not None:
+        raise InputError("a sentence and --say were given", mend="leave one of them out")
+    if text is not None and (text.endswith((".yaml", ".yml")) or Path(text).is_file()):
+        return filed(Path(text), world=world)
+    sentence = say if text is None else text
+    if sentence is None:
+        raise InputError("a mission file, a sentence or a log is needed", mend='try: errand tree "go to the kitchen"')
+    return said(sentence, world=world, require_wake=False)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write it ({error.strerror})", mend="name another file", file=path) from error

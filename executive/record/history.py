@@ -1,0 +1,77 @@
+"""What an event log tells of a run: its trees in their state at any time, and its transitions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from py_trees.common import Status
+
+from executive.errors import InputError
+from executive.record.reader import Event, read_events
+from executive.record.schemas import TRANSITIONS, TREE
+from executive.snapshot import NodeState
+from executive.view.model import NodeView, logged_view
+from skills.api import Cause
+
+TRANSITION_KEYS = ("t", "node", "from", "to", "cause", "message")
+
+
+@dataclass(frozen=True)
+class History:
+    """The events of one log, and where it came from."""
+
+    file: Path
+    events: tuple[Event, ...]
+
+    def transitions(self) -> Iterator[dict[str, Any]]:
+        """Each change of a node: `t` (s), `node`, `from`, `to`, `cause`, `message`."""
+        for event in self.events:
+            if event.topic == TRANSITIONS:
+                yield {"t": event.data.get("t", event.stamp_s), **_picked(event.data, TRANSITION_KEYS[1:])}
+
+    def trees(self, until_s: float | None = None) -> tuple[NodeView, ...]:
+        """The trees in the order of their beginning, in their state at a time (s) of the robot's clock, or the last.
+
+        Raises:
+            InputError: the log holds no tree, or a broken one.
+        """
+        found: list[tuple[dict[str, Any], dict[str, NodeState]]] = []
+        for event in _before(self.events, until_s):
+            if event.topic == TREE:
+                found.append((event.data, {}))
+            elif event.topic == TRANSITIONS and found:
+                _latest(found, event.data.get("robot"))[event.data["node"]] = logged_state(event.data)
+        if not found:
+            raise InputError("the log holds no tree", mend="it ended before the mission began", file=self.file)
+        try:
+            return tuple(logged_view(data["root"], states) for data, states in found)
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"the log's tree is broken ({error})", mend="run it again", file=self.file) from error
+
+
+def read_history(path: Path) -> History:
+    """The history of a log, also of one that was cut off. Raises InputError for a file that is no log."""
+    return History(path, read_events(path))
+
+
+def logged_state(transition: dict[str, Any]) -> NodeState:
+    """The state that a logged transition led to."""
+    cause = transition.get("cause")
+    return NodeState(Status(transition["to"]), None if not cause else Cause(cause), transition.get("message") or "")
+
+
+def _before(events: Iterable[Event], until_s: float | None) -> Iterator[Event]:
+    return (event for event in events if until_s is None or event.stamp_s <= until_s + 1e-9)
+
+
+def _latest(found: list[tuple[dict[str, Any], dict[str, NodeState]]], robot: Any) -> dict[str, NodeState]:
+    """The states of the robot's latest tree; of the latest of all when the robot is not named."""
+    mine = [states for data, states in found if data.get("robot") == robot]
+    return mine[-1] if mine else found[-1][1]
+
+
+def _picked(data: dict[str, Any], keys: Iterable[str]) -> dict[str, Any]:
+    return {key: data.get(key) for key in keys}

@@ -1,0 +1,93 @@
+"""A log as a list of what happened, for people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final
+
+from executive.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
+from executive.record.history import logged_state
+from executive.record.reader import Event
+from executive.record.schemas import ERRORS, OUTCOME, RUN, TRANSITIONS, TREE, WALL
+from executive.snapshot import NodeState
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line: time on the robot's clock (s), what it is about, and what happened; `state` of a node's change."""
+
+    t: float
+    about: str
+    text: str
+    state: NodeState | None = None
+
+
+def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[Entry]:
+    """The entries of a log in order; `leaves_only` leaves the changes of inner nodes out that did not fail."""
+    inner: set[str] = set()
+    for event in events:
+        if event.topic == TREE:
+            inner |= _inner_nodes(event.data["root"])
+        if event.topic == TRANSITIONS:
+            entry = _transition(event)
+            if not leaves_only or entry.about not in inner or (entry.state is not None and entry.state.cause):
+                yield entry
+        elif event.topic in _TEXTS:
+            text = _TEXTS[event.topic](event.data)
+            if text:
+                yield Entry(event.stamp_s, event.topic, text)
+
+
+def _inner_nodes(structure: Mapping[str, Any]) -> set[str]:
+    below = [_inner_nodes(child) for child in structure["children"]]
+    return set().union(*below) | ({structure["id"]} if structure["children"] else set())
+
+
+def _transition(event: Event) -> Entry:
+    data = event.data
+    state = logged_state(data)
+    cause = state.cause.value if state.cause else ""
+    return Entry(data.get("t", event.stamp_s), data["node"], ": ".join(filter(None, (cause, state.message))), state)
+
+
+def _run(data: Mapping[str, Any]) -> str:
+    versions = ", ".join(f"{name} {version}" for name, version in data.get("versions", {}).items())
+    return f"world {data.get('world')}, seed {data.get('seed')}; {versions}"
+
+
+def _outcome(data: Mapping[str, Any]) -> str:
+    cause = f" ({data['cause']})" if data.get("cause") else ""
+    return f"{data.get('robot')}: {data.get('outcome')}{cause}: {data.get('message')}"
+
+
+def _task(data: Mapping[str, Any]) -> str:
+    count = f"command {data.get('task_count')} of {data.get('mission_count')}"
+    return f"{count} for {data.get('robot_name')}: {data.get('text') or 'objects ' + str(data.get('obj_type'))}"
+
+
+def _seen(data: Mapping[str, Any]) -> str:
+    x, y, z = (data.get(f"goal_{axis}") or 0.0 for axis in "xyz")
+    return f"{data.get('class_name')} at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+
+
+def _ticks(data: Mapping[str, Any]) -> str:
+    late = [tick for tick in data.get("tick_s", ()) if tick > (data.get("limit_s") or float("inf"))]
+    longest = f"longest {max(late) * 1e3:.0f} ms" if late else ""
+    if "wall_time_s" in data:
+        return f"{data['wall_time_s']:.1f} s on the wall's clock, {data.get('overruns')} ticks overran"
+    return f"{len(late)} ticks overran; {longest}" if late else ""
+
+
+_TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = MappingProxyType(
+    {
+        RUN: _run,
+        OUTCOME: _outcome,
+        TASK_TOPIC: _task,
+        DETECT_TOPIC: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
+        DESTINATION_TOPIC: _seen,
+        ERRORS: lambda data: str(data.get("traceback", "")).strip().splitlines()[-1:][0] if data else "",
+        WALL: _ticks,
+    }
+)

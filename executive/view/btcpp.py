@@ -1,0 +1,145 @@
+"""The tree in the XML format of BehaviorTree.CPP 4, which Groot2 opens.
+
+Sequences and selectors become `Sequence` and `Fallback`, whose meaning is the same; every other node stands under its
+own name in explicit form, and the `TreeNodesModel` tells its ports. Each step of the mission is a tree of its own, so
+that the editor can fold it. State, cause, path id and source line stand in the node's description.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
+from xml.etree.ElementTree import Element, SubElement
+
+from executive.view.looks import look_of
+from executive.view.model import NodeView
+from executive.view.ports import Port
+from executive.view.text import note_of, printable
+
+FORMAT: Final = "4"
+_BUILT_IN: Final[Mapping[str, str]] = MappingProxyType({"sequence": "Sequence", "selector": "Fallback"})
+_CONDITIONS: Final = frozenset({"condition"})
+_RESERVED: Final = frozenset({"ID", "name"})
+_BUILT_IN_NAMES: Final = """
+    Root BehaviorTree TreeNodesModel SubTree Action Condition Control Decorator
+    Sequence AsyncSequence SequenceWithMemory ReactiveSequence Fallback AsyncFallback ReactiveFallback
+    Parallel ParallelAll IfThenElse WhileDoElse Switch2 Switch3 Switch4 Switch5 Switch6 ManualSelector
+    Inverter Repeat Delay RetryUntilSuccessful KeepRunningUntilFailure ForceFailure ForceSuccess RunOnce Timeout
+    Precondition LoopInt LoopBool LoopDouble LoopString SkipUnlessUpdated WaitValueUpdate ConsumeQueue
+    AlwaysFailure AlwaysSuccess Script ScriptCondition SetBlackboard UnsetBlackboard Sleep TestNode WasEntryUpdated
+"""
+_TAKEN: Final = frozenset(re.findall(r"\w+", _BUILT_IN_NAMES))
+
+
+def to_btcpp(root: NodeView) -> str:
+    """The tree as an XML document."""
+    steps = {id(child): tree_id for child, tree_id in _step_ids(root)}
+    main = _identifier(root.name)
+    document = Element("root", {"BTCPP_format": FORMAT, "main_tree_to_execute": main})
+    _tree(document, main, root, steps)
+    for child in root.children:
+        if id(child) in steps:
+            _tree(document, steps[id(child)], child, {})
+    document.append(_models(root, list(steps.values())))
+    ElementTree.indent(document)
+    return ElementTree.tostring(document, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _step_ids(root: NodeView) -> Iterator[tuple[NodeView, str]]:
+    """The root's children that have nodes below, each with a name that no other tree has."""
+    taken = {_identifier(root.name)}
+    for child in root.children:
+        if not child.children or root.kind not in _BUILT_IN:
+            continue
+        wish = _identifier(child.path_id.rsplit("/", 1)[-1], "Step")
+        names = (wish if n == 1 else f"{wish}_{n}" for n in range(1, len(taken) + 2))
+        tree_id = next(name for name in names if name not in taken)
+        taken.add(tree_id)
+        yield child, tree_id
+
+
+def _tree(document: Element, tree_id: str, node: NodeView, steps: Mapping[int, str]) -> None:
+    tree = SubElement(document, "BehaviorTree", {"ID": tree_id})
+    tree.append(_element(node, steps))
+
+
+def _element(node: NodeView, steps: Mapping[int, str]) -> Element:
+    category, model = _category(node), _model_id(node)
+    own = {} if node.kind in _BUILT_IN else {"ID": model}
+    ports = {name: _value(port) for name, port in _named(node.ports)} if own else {}
+    element = Element(category, {**own, "name": printable(node.name), **ports, "_description": _description(node)})
+    for child in node.children:
+        if id(child) in steps:
+            attributes = {"ID": steps[id(child)], "name": printable(child.name), "_autoremap": "true"}
+            SubElement(element, "SubTree", {**attributes, "_description": _description(child)})
+        else:
+            element.append(_element(child, steps))
+    return element
+
+
+def _category(node: NodeView) -> str:
+    """The element's name: a built-in control node, else what the number of children says."""
+    if node.kind in _BUILT_IN and node.children:
+        return _BUILT_IN[node.kind]
+    if not node.children:
+        return "Condition" if node.kind in _CONDITIONS else "Action"
+    return "Decorator" if len(node.children) == 1 else "Control"
+
+
+def _model_id(node: NodeView) -> str:
+    return _identifier(node.name if node.kind == "skill" else node.kind)
+
+
+def _identifier(text: str, prefix: str = "Errand") -> str:
+    """A name as the format allows one: letters and digits, a letter first, and none that is built in."""
+    words = re.findall(r"[A-Za-z0-9]+", text)
+    name = "".join(word[0].upper() + word[1:] for word in words) or "Unnamed"
+    return name if name[0].isalpha() and name not in _TAKEN else f"{prefix}{name}"
+
+
+def _named(ports: Iterable[Port]) -> Iterator[tuple[str, Port]]:
+    """The ports with their names in the file; an output that is called as an input is called differently there."""
+    inputs = {port.name for port in ports if not port.output}
+    for port in ports:
+        yield f"{_port_name(port)}_out" if port.output and port.name in inputs else _port_name(port), port
+
+
+def _port_name(port: Port) -> str:
+    name = re.sub(r"[^A-Za-z0-9_]", "_", port.name)
+    return f"port_{name}" if name in _RESERVED or not name[:1].isalpha() else name
+
+
+def _value(port: Port) -> str:
+    """A blackboard key in braces; other text that looks like one is quoted, so that it stays text."""
+    text = printable(port.value)
+    if port.on_board:
+        return f"{{{text}}}"
+    return f"'{text}'" if text.startswith("{") and text.endswith("}") else text
+
+
+def _description(node: NodeView) -> str:
+    place = "" if node.source is None else f"{node.source.file}:{node.source.line}"
+    state = ": ".join(filter(None, (look_of(node.state).word, note_of(node))))
+    folded = f"{node.hidden} nodes below are left out" if node.hidden else ""
+    return printable(" | ".join(filter(None, (state, node.path_id, place, folded))))
+
+
+def _models(root: NodeView, trees: Sequence[str]) -> Element:
+    """One model for each kind of node that is not built in, with all ports that such nodes have."""
+    models: dict[tuple[str, str], dict[str, Port]] = {}
+    for _, node in root.walk():
+        if node.kind not in _BUILT_IN or not node.children:
+            ports = models.setdefault((_category(node), _model_id(node)), {})
+            ports.update(_named(node.ports))
+    section = Element("TreeNodesModel")
+    for (category, model), ports in sorted(models.items(), key=lambda item: item[0]):
+        entry = SubElement(section, category, {"ID": model})
+        for name, port in ports.items():
+            kind = {"type": printable(port.type)} if port.type else {}
+            SubElement(entry, "output_port" if port.output else "input_port", {"name": name, **kind})
+    for tree in trees:
+        SubElement(section, "SubTree", {"ID": tree})
+    return section

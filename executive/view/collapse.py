@@ -1,0 +1,45 @@
+"""Makes a large tree small enough to look at: what is done or not begun is folded, what runs or failed is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from executive.view.model import NodeView
+from executive.view.text import closed
+
+MANY_NODES = 120
+
+
+def folded_below(root: NodeView, depth: int) -> NodeView:
+    """The tree down to `depth` levels below the root; what lies deeper is counted in `hidden`.
+
+    Raises:
+        ValueError: a negative depth.
+    """
+    if depth < 0:
+        raise ValueError(f"a depth is at least 0, not {depth}")
+    if depth == 0:
+        return replace(root, children=(), hidden=root.below)
+    return replace(root, children=tuple(folded_below(child, depth - 1) for child in root.children))
+
+
+def folded_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
+    """The tree with at most about `most` nodes in sight.
+
+    Subtrees that succeeded or have not begun are folded, the deepest first, until few enough are left; the way to
+    what runs, failed or was cancelled always stays in sight, and so do the root and its children.
+    """
+    deepest = max(depth for depth, _ in root.walk())
+    shown = root
+    for level in range(deepest, 0, -1):
+        if sum(1 for _ in shown.walk()) <= most:
+            break
+        shown = _folded_closed(root, level, 0)
+    return shown
+
+
+def _folded_closed(node: NodeView, level: int, depth: int) -> NodeView:
+    """The node with all closed nodes at `level` or deeper folded."""
+    if depth >= level and closed(node) and all(closed(below) for _, below in node.walk()):
+        return replace(node, children=(), hidden=node.below)
+    return replace(node, children=tuple(_folded_closed(child, level, depth + 1) for child in node.children))

@@ -1,0 +1,51 @@
+"""The tree as a Mermaid flowchart, which many documentation systems draw."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from executive.view.looks import Look, Looks, look_of
+from executive.view.model import NodeView
+from executive.view.text import note_of, printable
+
+_SAFE: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 .,:()-_/+'")
+
+
+def to_mermaid(root: NodeView) -> str:
+    """The tree from left to right: one box for each node, its state by symbol, colour and line, causes in the box."""
+    return "\n".join(["flowchart LR", *_nodes(root), *_classes(), ""])
+
+
+def _nodes(root: NodeView) -> Iterator[str]:
+    numbers = {id(node): number for number, (_, node) in enumerate(root.walk())}
+    for _, node in root.walk():
+        number = numbers[id(node)]
+        yield f'  n{number}["{_label(node)}"]:::{_class(look_of(node.state))}'
+        for child in node.children:
+            yield f"  n{number} --> n{numbers[id(child)]}"
+
+
+def _label(node: NodeView) -> str:
+    title = node.name if node.kind == "skill" else f"{node.kind} {node.name}"
+    folded = f"({node.hidden} nodes below)" if node.hidden else ""
+    rows = filter(None, (f"{look_of(node.state).symbol} {title}", note_of(node), folded))
+    return "<br/>".join(map(escaped, rows))
+
+
+def escaped(text: str) -> str:
+    """The text with every character that Mermaid might read as syntax written as its number."""
+    return "".join(char if char in _SAFE else f"#{ord(char)};" for char in printable(text))
+
+
+def _classes() -> Iterator[str]:
+    for member in Looks:
+        look: Look = member.value
+        dashes = f",stroke-dasharray:{look.dashes}" if look.dashes else ""
+        width = 3 if member is Looks.FAILURE else 2
+        colours = f"fill:{look.fill},stroke:{look.line},color:{look.ink}"
+        yield f"  classDef {_class(look)} {colours},stroke-width:{width}px{dashes}"
+
+
+def _class(look: Look) -> str:
+    return look.word.replace(" ", "")

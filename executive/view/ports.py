@@ -1,0 +1,89 @@
+"""A node's ports and settings as text, for views that show them."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from executive.behaviours.board import Constant, FromBoard
+from executive.compiling.plans import NodePlan, SkillPlan
+from executive.types import describe_type, field_types
+
+
+@dataclasses.dataclass(frozen=True)
+class Port:
+    """An input or output with its value as text; `on_board` when the value is a blackboard key."""
+
+    name: str
+    value: str
+    type: str = ""
+    output: bool = False
+    on_board: bool = False
+
+
+def ports_of(plan: NodePlan) -> tuple[Port, ...]:
+    """The ports of a skill, or the settings of any other node; nodes below are no settings."""
+    return tuple(_skill_ports(plan) if isinstance(plan, SkillPlan) else _settings(plan))
+
+
+def _skill_ports(plan: SkillPlan) -> Iterator[Port]:
+    types, bound = field_types(plan.skill.Inputs), dict(plan.inputs)
+    for field in dataclasses.fields(plan.skill.Inputs):
+        kind = describe_type(types[field.name])
+        match bound.get(field.name):
+            case FromBoard(key):
+                yield Port(field.name, key, kind, on_board=True)
+            case Constant(value):
+                yield Port(field.name, plain(value), kind)
+            case _:
+                yield Port(field.name, _default(field), kind)
+    for name, key in plan.outputs:
+        yield Port(name, key, describe_type(plan.skill.outputs.get(name, Any)), output=True, on_board=True)
+
+
+def _default(field: dataclasses.Field[Any]) -> str:
+    return "" if field.default is dataclasses.MISSING else plain(field.default)
+
+
+def _settings(plan: NodePlan) -> Iterator[Port]:
+    inherited = {field.name for field in dataclasses.fields(NodePlan)}
+    for field in dataclasses.fields(plan):
+        value = getattr(plan, field.name)
+        if field.name not in inherited and not _holds_nodes(value):
+            yield Port(field.name, plain(value))
+
+
+def _holds_nodes(value: Any) -> bool:
+    if isinstance(value, Mapping):
+        return any(map(_holds_nodes, value.values()))
+    if isinstance(value, tuple | list):
+        return any(map(_holds_nodes, value))
+    return isinstance(value, NodePlan)
+
+
+def plain(value: Any) -> str:
+    """A value in few words: numbers short, enum members by name, things and surfaces by their own text or name."""
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, enum.Enum):
+        return str(value.value)
+    if isinstance(value, frozenset | set):
+        return ", ".join(sorted(map(plain, value)))
+    if isinstance(value, Mapping):
+        return ", ".join(f"{plain(key)}: {plain(item)}" for key, item in value.items())
+    if isinstance(value, tuple | list):
+        return ", ".join(map(plain, value))
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return _record(value)
+    return "" if value is None else str(value)
+
+
+def _record(value: Any) -> str:
+    fields = [field.name for field in dataclasses.fields(value)]
+    if any("__str__" in vars(kind) for kind in type(value).__mro__[:-1]):
+        return str(value)
+    if "name" in fields:
+        return str(value.name)
+    return " ".join(f"{name}={plain(getattr(value, name))}" for name in fields)

@@ -6,19 +6,27 @@ import difflib
 from collections.abc import Iterable
 from pathlib import Path
 
-__all__ = ["InputError", "did_you_mean", "listing"]
+__all__ = ["InputError", "Problems", "did_you_mean", "listing"]
 
 
 class InputError(Exception):
     """Something that the user wrote cannot be used.
 
     `message` says what is wrong, `mend` what to do about it; `file` and `line` (from 1) name the place where known.
+    `others` are more errors that were found at once.
     """
 
     def __init__(
-        self, message: str, *, mend: str = "", file: Path | str | None = None, line: int | None = None
+        self,
+        message: str,
+        *,
+        mend: str = "",
+        file: Path | str | None = None,
+        line: int | None = None,
+        others: Iterable[InputError] = (),
     ) -> None:
         self.message = message
+        self.others = tuple(others)
         self.mend = mend
         self.file = None if file is None else Path(file)
         self.line = line
@@ -28,6 +36,44 @@ class InputError(Exception):
         """One line: "file:line: what; mend"."""
         place = "" if self.file is None else f"{self.file}: " if self.line is None else f"{self.file}:{self.line}: "
         return " ".join(f"{place}{self.message}{'; ' if self.mend else ''}{self.mend}".split())
+
+    def within(self, file: Path, line: int) -> InputError:
+        """The same error, and the line of the file that brought it about by using the file in which it is.
+
+        An error that names no place gets that line as its own.
+        """
+        others = [other.within(file, line) for other in self.others]
+        if self.file is None:
+            return InputError(self.message, mend=self.mend, file=file, line=line, others=others)
+        text = f"{self.message} (used by {file}:{line})"
+        return InputError(text, mend=self.mend, file=self.file, line=self.line, others=others)
+
+
+class Problems:
+    """Gathers errors, so that a user sees all at once."""
+
+    def __init__(self) -> None:
+        self._errors: list[InputError] = []
+
+    def __enter__(self) -> Problems:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> bool:
+        """Note an InputError and go on; all else passes."""
+        if isinstance(error, InputError):
+            self.add(error)
+            return True
+        return False
+
+    def add(self, error: InputError) -> None:
+        """Note an error and those that came with it."""
+        self._errors += [error, *error.others]
+
+    def raise_any(self) -> None:
+        """Raise the first, with the others; do nothing when there is none."""
+        if self._errors:
+            first, *others = self._errors
+            raise InputError(first.message, mend=first.mend, file=first.file, line=first.line, others=others)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str | None:

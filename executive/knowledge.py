@@ -13,7 +13,7 @@ from executive.command import Task
 from executive.errors import InputError, did_you_mean, listing
 from executive.yaml_source import YamlSource, read_yaml, validate
 
-__all__ = ["Knowledge", "Person", "Place", "Pose", "RobotFacts", "SurfaceFacts", "ThingFacts", "load_knowledge"]
+__all__ = ["Knowledge", "Person", "Place", "Pose", "RobotFacts", "SurfaceFacts", "ThingFacts", "knowledge_of_source", "load_knowledge"]
 
 Corner = tuple[float, float]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
@@ -167,7 +167,11 @@ def load_knowledge(path: Path | str) -> Knowledge:
         InputError: with file, line and mend, for broken YAML, unknown or missing keys, wrong values, and names that
             are used but nowhere defined or mean two things.
     """
-    source = read_yaml(path)
+    return knowledge_of_source(read_yaml(path))
+
+
+def knowledge_of_source(source: YamlSource) -> Knowledge:
+    """The knowledge in a document that has been read. Raises InputError as `load_knowledge`."""
     knowledge = validate(Knowledge, source)
     for error in _cross_errors(knowledge, source):
         raise error

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin
+from types import MappingProxyType, UnionType
+from typing import Any, Final, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -18,6 +18,7 @@ __all__ = ["YamlSource", "read_yaml", "validate"]
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 KeyPath = tuple[str | int, ...]
+MAX_BYTES: Final = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,12 @@ class YamlSource:
     path: Path
     data: Any
     lines: Mapping[KeyPath, int]
+    first_line: int = 1
 
     def line(self, path: KeyPath) -> int:
         """The line of `path`, or of the nearest part of it that stands in the file."""
         known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), None)
-        return 1 if known is None else self.lines[known]
+        return self.first_line if known is None else self.lines[known]
 
     def error(self, path: KeyPath, message: str, mend: str = "") -> InputError:
         """An error at `path`."""
@@ -42,24 +44,32 @@ def read_yaml(path: Path | str) -> YamlSource:
     """Read one YAML document of plain data.
 
     Raises:
-        InputError: the file cannot be read, is no YAML, or has a key twice.
+        InputError: the file cannot be read, is too large, is no YAML, has a key twice, or has anchors.
     """
     file = Path(path)
     try:
-        text = file.read_text(encoding="utf-8")
+        text = _text(file)
+        _refuse_aliases(text, file)
         root = yaml.compose(text, Loader=yaml.SafeLoader)
-        data = yaml.safe_load(text)
+        data = None if root is None else _plain(root)
     except OSError as error:
         raise InputError(f"cannot read it ({error.strerror})", mend="name a file that exists", file=file) from error
     except UnicodeDecodeError as error:
-        raise InputError("it is no UTF-8 text", mend="save it as UTF-8", file=file) from error
+        line = error.object[: error.start].count(b"\n") + 1
+        raise InputError("it is no UTF-8 text", mend="save it as UTF-8", file=file, line=line) from error
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = 1 if mark is None else mark.line + 1
         what = f"broken YAML: {error.problem or error.context}"
         raise InputError(what, mend="mend the indentation, brackets or quotes here", file=file, line=line) from error
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        what = f"broken YAML: the character {chr(error.character)!r} cannot stand in a text"  # type: ignore[arg-type]
+        raise InputError(what, mend="remove it", file=file, line=line) from error
     except (yaml.YAMLError, ValueError) as error:
         raise InputError(f"broken YAML: {error}", mend="mend it", file=file, line=1) from error
+    except RecursionError as error:
+        raise InputError("it is nested too deeply", mend="write it flatter", file=file, line=1) from error
     lines: dict[KeyPath, int] = {}
     for key_path, line in _walk(root, ()):
         if key_path in lines:
@@ -67,6 +77,30 @@ def read_yaml(path: Path | str) -> YamlSource:
             raise InputError(what, mend="remove one of the two", file=file, line=line)
         lines[key_path] = line
     return YamlSource(file, data, lines)
+
+
+def _text(file: Path) -> str:
+    """The file's text. Raises InputError when it is larger than anyone would write."""
+    size = file.stat().st_size
+    if size > MAX_BYTES:
+        what = f"it is too large ({size} bytes; at most {MAX_BYTES} are read)"
+        raise InputError(what, mend="split it into files that use each other", file=file, line=1)
+    return file.read_text(encoding="utf-8")
+
+
+def _refuse_aliases(text: str, file: Path) -> None:
+    """Anchors make small files huge, and lines ambiguous."""
+    if "*" not in text:
+        return
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            what = f"the alias '*{event.anchor}' cannot be used here"
+            raise InputError(what, mend="write it out", file=file, line=event.start_mark.line + 1)
+
+
+def _plain(root: yaml.Node) -> Any:
+    """The data of a composed document."""
+    return yaml.constructor.SafeConstructor().construct_document(root)
 
 
 def _walk(node: yaml.Node | None, path: KeyPath) -> Iterator[tuple[KeyPath, int]]:
@@ -85,7 +119,7 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
     """The document as `model`.
 
     Raises:
-        InputError: the first thing that does not fit the model, with its line and what would fit.
+        InputError: the first thing that does not fit the model, with its line and what would fit; the rest in `others`.
     """
     if not isinstance(source.data, dict):
         mend = f"begin with the keys {listing(_field_names(model))}"
@@ -93,8 +127,23 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
     try:
         return model.model_validate(source.data)
     except ValidationError as error:
-        first = min(error.errors(), key=lambda e: (e["type"] != "extra_forbidden", source.line(_path(e))))
-        raise _input_error(model, source, first) from error
+        first, *others = [_input_error(model, source, fault) for fault in _telling(error.errors(), source)]
+        raise InputError(
+            first.message, mend=first.mend, file=first.file, line=first.line, others=others
+        ) from error
+
+
+def _telling(errors: list[ErrorDetails], source: YamlSource) -> list[ErrorDetails]:
+    """The errors that tell most, one for each place; what an unknown key has brought about is left out."""
+    misspelled = {_path(error)[:-1] for error in errors if error["type"] == "extra_forbidden"}
+    causes = (e for e in errors if e["type"] == "extra_forbidden" or _parent(e) not in misspelled)
+    ordered = sorted(causes, key=lambda e: (e["type"] != "extra_forbidden", source.line(_path(e))))
+    return list({_path(error): error for error in reversed(ordered)}.values())[::-1]
+
+
+def _parent(error: ErrorDetails) -> KeyPath:
+    """Where a key is missing or several do not go together."""
+    return _path(error)[:-1] if error["type"] == "missing" else _path(error)
 
 
 def _path(error: ErrorDetails) -> KeyPath:
@@ -113,10 +162,26 @@ def _input_error(model: type[BaseModel], source: YamlSource, error: ErrorDetails
     if error["type"] == "missing":
         parent = ".".join(str(part) for part in path[:-1]) or "the file"
         return source.error(path[:-1], f"key {path[-1]!r} is missing in {parent}", f"add {path[-1]!r}")
-    what = error["msg"].removeprefix("Value error, ")
+    what = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
     return source.error(
         path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", f"it reads {error['input']!r} now"[:120]
     )
+
+
+_PLAINER: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "model_type": "should be a mapping of keys to values",
+        "model_attributes_type": "should be a mapping of keys to values",
+        "dict_type": "should be a mapping of keys to values",
+        "tuple_type": "should be a list",
+        "string_type": "should be a text",
+        "float_type": "should be a number",
+        "int_type": "should be a whole number",
+        "bool_type": "should be true or false",
+        "string_too_short": "should not be empty",
+        "finite_number": "should be a finite number",
+    }
+)
 
 
 def _field_names(model: type[BaseModel] | None) -> list[str]:

@@ -1,0 +1,1 @@
+"""Mission files: their schema, their parameters, and what becomes of them."""

@@ -14,13 +14,14 @@ from skills.robot import Pose2D
 class TickNote:
     """One tick: what changed in the tree, all values on the blackboard, where the robot believes to be.
 
-    `pose` is X_WB, None while the robot is not localised.
+    `pose` is X_WB, None while the robot is not localised; `checkpoints` those of the active skills by path id.
     """
 
     now_s: float
     changes: Sequence[Transition]
     board: Mapping[str, Any]
     pose: Pose2D | None
+    checkpoints: Mapping[str, Mapping[str, Any]]
 
 
 class Journal(Protocol):

@@ -125,7 +125,9 @@ class Session:
         estimate = context.localiser.estimate()
         X_WB = estimate.X_WO @ context.robot.odometry().X_OB
         pose = Pose2D.from_transform(X_WB) if estimate.localised else None
-        return TickNote(context.clock.now(), changes, context.board.values(), pose)
+        leaves = (node for node in walk(self.root) if isinstance(node, SkillLeaf))
+        checkpoints = {leaf.path_id: leaf.checkpoint for leaf in leaves if leaf.checkpoint}
+        return TickNote(context.clock.now(), changes, context.board.values(), pose, checkpoints)
 
     def _transition(self, change: Transition) -> dict[str, object]:
         after = change.after

@@ -10,6 +10,7 @@ import enum
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -266,7 +267,7 @@ class Skill(ABC, Generic[InputsT]):
 
     `Inputs` is a frozen dataclass whose fields are the input ports (defaults allowed); `outputs` names the output
     ports and their types; `causes` documents which failures it gives and when. `default_timeout_s` counts the
-    robot's clock.
+    robot's clock. `checkpoint` holds what a later `resume` needs beyond the inputs, as JSON values; it is kept durably.
     """
 
     name: ClassVar[str]
@@ -274,6 +275,7 @@ class Skill(ABC, Generic[InputsT]):
     outputs: ClassVar[Mapping[str, type]] = {}
     causes: ClassVar[Mapping[Cause, str]] = {}
     default_timeout_s: ClassVar[float] = 60.0
+    checkpoint: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, context: SkillContext) -> None:
         self.context = context
@@ -299,6 +301,7 @@ class Skill(ABC, Generic[InputsT]):
     def resume(self, inputs: InputsT) -> None:
         """Go on after `suspend`. Time has passed, and the robot may have been elsewhere in between.
 
+        After a restart of the executive a new object is told this in place of `begin`, with the last `checkpoint` set.
         By default the attempt begins anew. Override it where that would undo or repeat what is done already.
         """
         self.begin(inputs)

@@ -59,6 +59,11 @@ class SkillLeaf(Explained, Behaviour):
         return self._skill is not None
 
     @property
+    def checkpoint(self) -> Mapping[str, Any]:
+        """What the active skill keeps for a restart; empty on an idle leaf."""
+        return {} if self._skill is None else self._skill.checkpoint
+
+    @property
     def suspended(self) -> bool:
         """True between `suspend` and the next tick."""
         return self.active and self._time.stopped

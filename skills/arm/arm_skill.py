@@ -37,9 +37,30 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def begin(self, inputs: InputsT) -> None:
         """Forget an earlier attempt: what stood around, what was held, the random numbers drawn."""
+        self._forget()
+        super().begin(inputs)
+
+    def resume(self, inputs: InputsT) -> None:
+        """Go on after a pause or a restart: what stood around may have moved."""
+        self._forget()
+        super().resume(inputs)
+
+    def _forget(self) -> None:
         self.boxes, self.held, self._scene = (), (), None
         self._rng = np.random.default_rng(self.context.seed)
-        super().begin(inputs)
+
+    def hand_near(self, p_W: FloatArray, within_m: float) -> bool:
+        """Whether the hand is this near to a point in the world."""
+        p_BP = self.X_WB().inverse() @ np.asarray(p_W)
+        return float(np.linalg.norm(self.model.X_BH(self.q_rad()).translation() - p_BP)) < within_m
+
+    def try_shift_hand(self, offset_B: FloatArray, message: str) -> Routine[None]:
+        """Shift the hand where a straight way is found."""
+        try:
+            yield from self.shift_hand(offset_B, message)
+        except SkillFailure as failure:
+            if failure.cause is not Cause.PLANNING:
+                raise
 
     @property
     def model(self) -> ArmModel:

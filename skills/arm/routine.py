@@ -49,6 +49,15 @@ class RoutineSkill(Skill[InputsT]):
         self.end()
         self._routine = self.run(inputs)
 
+    def run_again(self, inputs: InputsT) -> Routine[Succeeded]:
+        """Go on from an attempt that was broken off; looks first what is done already. Raises SkillFailure."""
+        return self.run(inputs)
+
+    def resume(self, inputs: InputsT) -> None:
+        """Go on after a pause or a restart."""
+        self.end()
+        self._routine = self.run_again(inputs)
+
     def step(self) -> Step:
         """Go on to the routine's next yield. Raises RuntimeError before `begin`."""
         if self._routine is None:

@@ -29,6 +29,9 @@ _CLOSED_RAD = 0.06
 _SLIP_RAD = 0.12
 _PULL_BACK_M = 0.12
 _SURFACE_AROUND_M = 0.2
+_FEEL_S = 0.4
+_AT_THING_M = 0.4
+_LIFT_AGAIN_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,30 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self._carry(view, plan.candidate, str(thing))
         yield from self.stand_at(capabilities.standing_height_m, f"carrying the {thing}")
         return Succeeded(f"holding the {thing}")
+
+    def run_again(self, inputs: GraspInputs) -> Routine[Succeeded]:
+        """A thing in the jaw is taken along and not taken again; from an empty jaw's side all begins anew."""
+        seen = inputs.observation
+        yield from self.pause(_FEEL_S, "feeling what the jaw holds")
+        at_thing = self.hand_near(np.array(seen.position_W), _AT_THING_M)
+        if not self.context.robot.gripper().holding:
+            if at_thing:
+                yield from self._let_go()
+            return (yield from self.run(inputs))
+        yield from self._take_along(seen, at_thing)
+        return Succeeded(f"the {seen.thing} was in the jaw already; holding it")
+
+    def _take_along(self, seen: ObjectObservation, at_thing: bool) -> Routine[None]:
+        """Lift and draw back what the jaw has hold of, hold it near the body, and make sure that it is held."""
+        message, opening = f"carrying the {seen.thing}", self._check_held(str(seen.thing), None)
+        R_BH = self.model.X_BH(self.q_rad()).rotation()
+        if at_thing:
+            yield from self.try_shift_hand(_LIFT_AGAIN_M * self._up_B(), f"lifting the {seen.thing}")
+            yield from self.try_shift_hand(-_PULL_BACK_M * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
+        yield from self.pause(0.2, message)
+        self._check_held(str(seen.thing), opening)
+        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
         """A view of the thing from 0.4 m; the plane and what stands around come with it."""

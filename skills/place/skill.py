@@ -30,6 +30,8 @@ _LOWEST_M = 0.02
 _STEP_M = 0.008
 _CONTACT_M = 0.005
 _SEEN_AGAIN_M = 0.12
+_FEEL_S = 0.4
+_OVER_SPOT_M = 0.45
 
 
 @dataclass(frozen=True)
@@ -62,11 +64,31 @@ class Place(ArmSkill[PlaceInputs]):
         view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
         yield from self._go_above(surface, view, carried)
         spot_W = self._below_hand_W()
+        self.checkpoint = {"spot_W": spot_W.tolist()}
         yield from self._lower(surface)
         yield from self._let_go()
         yield from self._check(surface, spot_W)
         yield from self.stow()
         return Succeeded(f"put the thing down on the {surface.name}")
+
+    def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
+        """With an empty jaw: draw the hand back, and look whether the thing stands where it was to be put."""
+        surface = inputs.surface
+        yield from self.pause(_FEEL_S, "feeling what the jaw holds")
+        spot = self.checkpoint.get("spot_W")
+        spot_W = None if spot is None else np.array([*spot, surface.height_m])
+        over_spot = spot_W is not None and self.hand_near(spot_W, _OVER_SPOT_M)
+        if self.context.robot.gripper().holding:
+            if over_spot:
+                yield from self.try_shift_hand(np.array([0.0, 0.0, _SURELY_FREE_M]), "lifting the thing again")
+            return (yield from self.run(inputs))
+        if spot_W is None:
+            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the jaw, and it was not yet over its place")
+        if over_spot:
+            yield from self._let_go()
+        yield from self._check(surface, spot_W[:2])
+        yield from self.stow()
+        return Succeeded(f"the thing stood on the {surface.name} already")
 
     def _go_near(self, surface: Surface) -> Routine[None]:
         """Drive nearer when the surface is out of the arm's reach."""

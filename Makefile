@@ -7,8 +7,8 @@
 PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV := .venv
 BIN := $(VENV)/bin
-# What the wheels need beyond Python: EGL and software rendering for the cameras.
-DEBIAN := libegl1 libgl1 libgl1-mesa-dri libx11-6
+# What the wheels need beyond Python: libraries of Drake, and software rendering through EGL for the cameras.
+DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
 JOBS ?= 2
 
 .PHONY: env demo test fast check bench format debian clean

@@ -14,7 +14,7 @@ from executive.compiler import CompiledTree
 from executive.compiling.workshop import slug
 from executive.journal import Journal
 from executive.outcome import Outcome, RobotResult, RunResult
-from executive.record.schemas import WALL
+from executive.record.ticks import TickMeter
 from executive.session import Ending, Session
 from executive.snapshot import Snapshot
 from executive.watchdog import VERB_LIMIT_S, VerbHung, watched
@@ -116,7 +116,8 @@ class _Run:
         self._clock, self._worker, self._publish = clock, worker, publish
         self._settings, self._cancel, self._observer = settings, cancel, observer
         self._sessions: list[Session] = []
-        self._ticks = self._overruns = 0
+        self._ticks = 0
+        self._meter = TickMeter(publish, clock, limit_s=settings.tick_period_s)
         self._begun_s, self._begun_wall_s = clock.now(), time.perf_counter()
 
     def run(self, entries: Sequence[RunEntry]) -> RunResult:
@@ -163,13 +164,13 @@ class _Run:
         for session in live:
             session.tick()
         self._ticks += 1
-        self._overruns += time.perf_counter() - begun > self._settings.tick_period_s
+        self._meter(time.perf_counter() - begun)
         for session in live:
             if session.finished:
                 session.close()
         if self._observer is not None:
             states = {session.name: session.states for session in self._sessions}
-            self._observer(Progress(self._clock.now(), self._ticks, self._overruns, states))
+            self._observer(Progress(self._clock.now(), self._ticks, self._meter.overruns, states))
 
     def _ending(self, stop: BaseException) -> Ending:
         """What an exception means for the missions that are not done yet."""
@@ -185,10 +186,11 @@ class _Run:
         for session in self._sessions:
             session.log_end(self._ticks)
         wall_time_s = time.perf_counter() - self._begun_wall_s
-        self._publish(WALL, {"wall_time_s": wall_time_s, "overruns": self._overruns})
+        self._meter.close(wall_time_s)
         began = {session.name for session in self._sessions}
         absent = tuple(_never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
-        return RunResult(robots + absent, self._ticks, self._overruns, self._clock.now() - self._begun_s, wall_time_s)
+        sim_time_s = self._clock.now() - self._begun_s
+        return RunResult(robots + absent, self._ticks, self._meter.overruns, sim_time_s, wall_time_s)
 
 
 def _never_began(entry: RunEntry, ending: Ending) -> RobotResult:

@@ -16,7 +16,7 @@ from executive.behaviours.skill_leaf import ERROR_TOPIC, SkillLeaf
 from executive.compiler import CompiledTree
 from executive.journal import Journal, TickNote
 from executive.outcome import Outcome, RobotResult
-from executive.record.event_log import stamp
+from executive.record.drawable import stamp
 from executive.record.schemas import OUTCOME, POSE, TRANSITIONS, TREE
 from executive.snapshot import Snapshot, Transition, snapshot, transitions, walk
 from executive.view.model import node_view

@@ -5,23 +5,24 @@ Two runs of one seed give equal logs: wall times stand in a topic of their own, 
 
 from __future__ import annotations
 
-import base64
 import dataclasses
 import enum
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import cv2
 import numpy as np
 from mcap.writer import Writer
 
+from executive.record.drawable import drawable
 from executive.record.schemas import Schema, schema_of
 from skills.robot import Clock
 
 FLUSH_EVERY_S = 1.0
+
+Listener = Callable[[str, float, Mapping[str, Any]], None]
 
 
 class EventLog:
@@ -43,20 +44,29 @@ class EventLog:
         self._flushed_s = -math.inf
         self._sequence = 0
         self._closed = False
+        self._listeners: list[Listener] = []
+
+    def listen(self, listener: Listener) -> None:
+        """Tell `listener` of every message from now on: topic, the robot's clock (s), and the plain values."""
+        self._listeners.append(listener)
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
         """Log a message under a topic. Raises ValueError on a closed log."""
         if self._closed:
             raise ValueError("the event log is closed")
         now_s = self._clock.now()
-        plain = plain_values(with_picture(message, now_s))
-        schema = schema_of(topic, plain)
-        stamp_ns, self._sequence = round(now_s * 1e9), self._sequence + 1
-        data = json.dumps(plain, allow_nan=False, separators=(",", ":")).encode()
-        channel = self._channel(topic, schema)
-        self._writer.add_message(channel, stamp_ns, data, stamp_ns, self._sequence)
+        for shown_under, shown in drawable(topic, message, now_s):
+            self._write(shown_under, plain_values(shown), now_s)
         if now_s - self._flushed_s >= FLUSH_EVERY_S:
             self.flush()
+
+    def _write(self, topic: str, plain: dict[str, Any], now_s: float) -> None:
+        stamp_ns, self._sequence = round(now_s * 1e9), self._sequence + 1
+        data = json.dumps(plain, allow_nan=False, separators=(",", ":")).encode()
+        channel = self._channel(topic, schema_of(topic, plain))
+        self._writer.add_message(channel, stamp_ns, data, stamp_ns, self._sequence)
+        for listener in self._listeners:
+            listener(topic, now_s, plain)
 
     def flush(self) -> None:
         """Bring everything to the file."""
@@ -78,25 +88,6 @@ class EventLog:
                 self._schemas[schema.name] = self._writer.register_schema(schema.name, "jsonschema", data)
             self._channels[key] = self._writer.register_channel(topic, "json", self._schemas[schema.name])
         return self._channels[key]
-
-
-def with_picture(message: Mapping[str, Any], now_s: float) -> Mapping[str, Any]:
-    """A message with a numpy picture (RGB or grey, uint8) under "image" becomes a compressed picture."""
-    picture = message.get("image")
-    if not isinstance(picture, np.ndarray):
-        return message
-    colour_order = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR) if picture.ndim == 3 else picture
-    data = cv2.imencode(".jpg", colour_order, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
-    rest = {key: value for key, value in message.items() if key != "image"}
-    frame = str(message.get("frame_id", message.get("source", "camera")))
-    encoded = base64.b64encode(data).decode()
-    return {**rest, "timestamp": stamp(now_s), "frame_id": frame, "format": "jpeg", "data": encoded}
-
-
-def stamp(time_s: float) -> dict[str, int]:
-    """Seconds as the message formats have them."""
-    nanoseconds = round(time_s * 1e9)
-    return {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9}
 
 
 def plain_values(value: Any) -> Any:

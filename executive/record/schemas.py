@@ -40,13 +40,18 @@ def _fields(kind: str, *names: str) -> dict[str, Any]:
 
 _STAMP: Final = {"type": "object", "properties": _fields("integer", "sec", "nsec")}
 _VECTOR: Final = {"type": "object", "properties": _fields("number", "x", "y", "z")}
+_POINT: Final = {"type": "object", "properties": _fields("number", "x", "y")}
 _TURN: Final = {"type": "object", "properties": _fields("number", "x", "y", "z", "w")}
 _NUMBERS: Final = {"type": "array", "items": {"type": "integer"}}
+_POSE: Final = {"type": "object", "properties": {"position": _VECTOR, "orientation": _TURN}}
+_OBJECTS: Final = {"type": "array", "items": {"type": "object"}}
+_SOME_NUMBERS: Final = {"type": "array", "items": {"type": "number"}}
 _NODE: Final = _fields("string", "robot", "node")
 
 IMAGE_SCHEMA: Final = Schema(
     "foxglove.CompressedImage",
     {
+        "detections": _OBJECTS,
         "timestamp": _STAMP,
         **_fields("string", "frame_id", "format"),
         "data": {"type": "string", "contentEncoding": "base64"},
@@ -75,14 +80,42 @@ SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType(
             {
                 "timestamp": _STAMP,
                 **_fields("string", "frame_id", "robot"),
-                "pose": {"type": "object", "properties": {"position": _VECTOR, "orientation": _TURN}},
+                "pose": _POSE,
             },
         ),
         OUTCOME: Schema(
             "errand.Outcome",
             {**_fields("string", "robot", "outcome", "cause", "message"), **_fields("integer", "ticks")},
         ),
-        WALL: Schema("errand.Wall", {**_fields("number", "wall_time_s"), **_fields("integer", "overruns")}),
+        PATH: Schema(
+            "foxglove.PosesInFrame",
+            {
+                "timestamp": _STAMP,
+                **_fields("string", "frame_id", "robot"),
+                "poses": {"type": "array", "items": _POSE},
+            },
+        ),
+        BOXES: Schema("foxglove.ImageAnnotations", dict.fromkeys(("circles", "points", "texts"), _OBJECTS)),
+        MAP: Schema(
+            "errand.Map",
+            {
+                **_fields("string", "world", "frame_id", "format"),
+                **_fields("number", "resolution_m"),
+                "origin_m": _POINT,
+                "size_m": _POINT,
+                "data": {"type": "string", "contentEncoding": "base64"},
+                "places": _OBJECTS,
+            },
+        ),
+        ERRORS: Schema("errand.Error", _fields("string", "node", "what", "traceback")),
+        WALL: Schema(
+            "errand.Wall",
+            {
+                **_fields("number", "wall_time_s", "limit_s"),
+                **_fields("integer", "overruns"),
+                "tick_s": _SOME_NUMBERS,
+            },
+        ),
         TASK_TOPIC: Schema(
             "errand.TaskMessage",
             {

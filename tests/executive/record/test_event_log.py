@@ -101,10 +101,11 @@ def test_pictures_become_compressed_images_that_viewers_draw(tmp_path, clock):
     log("detections", {"image": picture, "source": "hand"})
     log.close()
     with log.path.open("rb") as file:
-        ((schema, _, _),) = list(make_reader(file).iter_messages())
+        (schema, _, _), (boxes, _, _) = list(make_reader(file).iter_messages())
     data = read_events(log.path)[0].data
     decoded = cv2.imdecode(np.frombuffer(base64.b64decode(data["data"]), np.uint8), cv2.IMREAD_COLOR)
     assert schema is not None
+    assert boxes is not None and boxes.name == "foxglove.ImageAnnotations"
     assert (schema.name, data["format"], data["frame_id"]) == ("foxglove.CompressedImage", "jpeg", "hand")
     assert decoded[4, 4, 2] > 230 > 60 > decoded[4, 4, 0]
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
+
+from skills.robot import Pose2D
 
 
 class Board:
@@ -25,6 +28,11 @@ class Board:
         if key not in self._values:
             raise KeyError(f"nothing was written to the blackboard under '{key}' yet")
         return self._values[key]
+
+    def forget(self, keys: Iterable[str]) -> None:
+        """Take values off the board, so that nothing leaks into another attempt; unknown keys are let pass."""
+        for key in keys:
+            self._values.pop(key, None)
 
     def __contains__(self, key: str) -> bool:
         return key in self._values
@@ -61,3 +69,32 @@ class FromBoard:
     def read(self, board: Board) -> Any:
         """The value under the key. Raises KeyError when nothing wrote it yet."""
         return board.get(self.key)
+
+
+@dataclass(frozen=True)
+class FromBoardOr(FromBoard):
+    """A port bound to a blackboard key, with a value for as long as nothing wrote it."""
+
+    default: Any
+
+    def read(self, board: Board) -> Any:
+        """The value under the key, else the default."""
+        return board.get(self.key) if self.key in board else self.default
+
+
+@dataclass(frozen=True)
+class BesideBoard(FromBoard):
+    """A port bound to a pose a little beside the one under a blackboard key, in metres along that pose's axes."""
+
+    forward_m: float
+    left_m: float
+
+    def read(self, board: Board) -> Pose2D:
+        """The shifted pose. Raises KeyError when nothing wrote it yet."""
+        return beside(board.get(self.key), self.forward_m, self.left_m)
+
+
+def beside(pose: Pose2D, forward_m: float, left_m: float) -> Pose2D:
+    """The pose shifted along its own axes, turned the same way."""
+    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    return Pose2D(pose.x_m + c * forward_m - s * left_m, pose.y_m + s * forward_m + c * left_m, pose.yaw_rad)

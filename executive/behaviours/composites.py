@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Protocol, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -14,7 +15,15 @@ from skills.api import Cause
 _MERELY_NOT_SO = frozenset({Cause.PRECONDITION, Cause.POSTCONDITION})
 
 
-class _MemoryComposite(Explained, Composite):
+@runtime_checkable
+class Conditional(Protocol):
+    """A child that a selector passes over untouched when it does not apply: that is no failure."""
+
+    def applies(self) -> bool:
+        """Whether there is any sense in ticking it now."""
+
+
+class MemoryComposite(Explained, Composite):
     """Ticks its children one after the other and never goes back to one that is done."""
 
     goes_on_after: Status
@@ -33,8 +42,11 @@ class _MemoryComposite(Explained, Composite):
             self._restart()
         while True:
             child = self.current_child = self.children[self._index]
-            yield from child.tick()
-            if child.status != self.goes_on_after or self._index + 1 == len(self.children):
+            passed_over = self._passes_over(child)
+            if not passed_over:
+                yield from child.tick()
+            goes_on = passed_over or child.status == self.goes_on_after
+            if not goes_on or self._index + 1 == len(self.children):
                 break
             self._index += 1
         self._take_over(child)
@@ -53,6 +65,9 @@ class _MemoryComposite(Explained, Composite):
                 self.clear_explanation()
         self.status = new_status
         self.iterator = self.tick()
+
+    def _passes_over(self, child: Behaviour) -> bool:
+        return False
 
     def _restart(self) -> None:
         self._index = 0
@@ -73,7 +88,7 @@ class _MemoryComposite(Explained, Composite):
         return cause_of(child), message_of(child)
 
 
-class MemorySequence(_MemoryComposite):
+class MemorySequence(MemoryComposite):
     """One after the other.
 
     Child RUNNING: RUNNING. Child FAILURE: FAILURE with its cause; later children stay untouched. Child SUCCESS: on to
@@ -83,12 +98,13 @@ class MemorySequence(_MemoryComposite):
     goes_on_after = Status.SUCCESS
 
 
-class MemorySelector(_MemoryComposite):
+class MemorySelector(MemoryComposite):
     """One way after the other until one works.
 
-    Child RUNNING: RUNNING. Child SUCCESS: SUCCESS. Child FAILURE: on to the next in the same tick; after the last:
-    FAILURE with the sentences of all that could begin. Its cause is ERROR when one child had that, else the first
-    that is neither PRECONDITION nor POSTCONDITION, else `exhausted_cause` where given, else the last child's.
+    Child that does not apply (`Conditional`): passed over, it stays idle. Child RUNNING: RUNNING. Child SUCCESS:
+    SUCCESS. Child FAILURE: on to the next in the same tick; after the last: FAILURE with the sentences of all that
+    could begin. Its cause is ERROR when one child had that, else the first that is neither PRECONDITION nor
+    POSTCONDITION, else `exhausted_cause` where given, else the last child's.
     """
 
     goes_on_after = Status.FAILURE
@@ -105,9 +121,15 @@ class MemorySelector(_MemoryComposite):
         super().__init__(path_id=path_id, name=name, children=children)
         self._exhausted_cause, self._exhausted_message = exhausted_cause, exhausted_message
 
+    def _passes_over(self, child: Behaviour) -> bool:
+        return child.status != Status.RUNNING and isinstance(child, Conditional) and not child.applies()
+
     def _explanation(self, child: Behaviour) -> tuple[Cause, str]:
-        cause = self._decisive_cause([cause_of(one) for one in self.children])
-        tried = [one for one in self.children if cause_of(one) is not Cause.PRECONDITION] or self.children
+        failed = [one for one in self.children if one.status == Status.FAILURE]
+        if not failed:
+            return self._exhausted_cause or Cause.PRECONDITION, self._exhausted_message or "nothing of it applies"
+        cause = self._decisive_cause([cause_of(one) for one in failed])
+        tried = [one for one in failed if cause_of(one) is not Cause.PRECONDITION] or failed
         sentences = list(dict.fromkeys(map(message_of, tried)))
         shown = "; ".join(sentences[:4]) + (f"; and {len(sentences) - 4} more" if len(sentences) > 4 else "")
         return cause, f"{self._exhausted_message}: {shown}" if self._exhausted_message else shown

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
+from executive.behaviours.conditions import Condition as Condition
+from executive.behaviours.conditions import Waiting
 from executive.behaviours.context import RunContext
 from executive.behaviours.explained import Explained, cause_of, message_of
-from executive.behaviours.suspension import StoppableTime
+from executive.behaviours.suspension import StoppableTime, suspend
 from skills.api import Cause, Failed
 from skills.robot import Clock
 
@@ -117,20 +118,11 @@ class Retry(ExplainedDecorator):
         return any(isinstance(node, Behaviour) and node.status == Status.FAILURE for node in nodes)
 
 
-class Condition(Protocol):
-    """Something that must hold while a subtree runs."""
-
-    def begin(self, context: RunContext) -> None:
-        """The subtree starts anew."""
-
-    def violated(self, context: RunContext) -> Failed | None:
-        """A failure when it does not hold, else None. Called before each tick of the subtree."""
-
-
 class Guard(ExplainedDecorator):
     """A condition above actions, looked at before every tick.
 
-    Condition violated: child halted, FAILURE with the condition's cause. Else as the child.
+    Condition violated: child halted, FAILURE with the condition's cause. Condition waiting: child suspended, RUNNING.
+    Else as the child.
     """
 
     def __init__(self, *, path_id: str, name: str, child: Behaviour, condition: Condition, context: RunContext) -> None:
@@ -141,11 +133,15 @@ class Guard(ExplainedDecorator):
         """Look at the condition, then tick the child."""
         if self.status != Status.RUNNING:
             self._condition.begin(self._context)
-        failure = self._condition.violated(self._context)
-        if failure is None:
+        verdict = self._condition.violated(self._context)
+        if verdict is None:
             yield from super().tick()
             return
-        self.stop(self.fail(failure))
+        if isinstance(verdict, Waiting):
+            suspend(self.decorated)
+            self.status, self.cause, self.message = Status.RUNNING, None, verdict.message
+        else:
+            self.stop(self.fail(verdict))
         yield self
 
     def update(self) -> Status:

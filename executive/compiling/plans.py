@@ -15,7 +15,7 @@ from py_trees.behaviour import Behaviour
 from executive.behaviours.answer import Answer
 from executive.behaviours.board import Binding
 from executive.behaviours.composites import MemorySelector, MemorySequence
-from executive.behaviours.conditions import Holding
+from executive.behaviours.conditions import holding
 from executive.behaviours.context import RunContext
 from executive.behaviours.decorators import Guard, Retry, Timeout
 from executive.behaviours.leaves import Known, RememberPose
@@ -214,7 +214,7 @@ class HoldingPlan(_Decorator):
 
     def build(self, context: RunContext) -> Behaviour:
         """A Guard with the condition Holding."""
-        child, condition = self.child.build(context), Holding(self.thing)
+        child, condition = self.child.build(context), holding(self.thing)
         return Guard(path_id=self.path_id, name=self.name, child=child, condition=condition, context=context)
 
 

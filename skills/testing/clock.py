@@ -1,0 +1,35 @@
+"""A clock that only the test moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+STEP_S = 0.01
+
+
+class VirtualClock:
+    """Time that only `advance` moves; what is attached moves along in steps of 0.01 s.
+
+    Implements `skills.robot.Clock`.
+    """
+
+    def __init__(self) -> None:
+        self._now_s = 0.0
+        self._followers: list[Callable[[float], None]] = []
+
+    def attach(self, follower: Callable[[float], None]) -> None:
+        """Call `follower(dt_s)` after each step of time."""
+        self._followers.append(follower)
+
+    def now(self) -> float:
+        """Seconds since the clock began."""
+        return self._now_s
+
+    def advance(self, dt_s: float) -> None:
+        """Let dt_s seconds pass, in whole steps of 0.01 s and a remainder."""
+        whole, rest = divmod(round(dt_s, 9), STEP_S)
+        steps = [STEP_S] * int(whole) + ([rest] if rest > 1e-9 else [])
+        for step_s in steps:
+            self._now_s = round(self._now_s + step_s, 9)
+            for follower in self._followers:
+                follower(step_s)

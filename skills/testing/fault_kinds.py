@@ -1,0 +1,280 @@
+"""The faults that can be injected by name: what each pattern of words does to the calls of a robot's verbs."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.robot import CommandState, CommandStatus, Robot
+
+THIEF: Final = "the tablet"
+"""Who takes the lease in "lease taken"."""
+
+VERBS: Final = (
+    "capabilities", "odometry", "imu", "scan", "image", "joints", "gripper", "battery", "faults",
+    "drive", "stand", "sit", "move_arm", "set_gripper", "stop", "command_status",
+    "acquire_lease", "take_lease", "return_lease", "lease_holder",
+)  # fmt: skip
+SENSE_VERBS: Final = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")
+MOTION_VERBS: Final = ("drive", "stand", "sit", "move_arm", "set_gripper")
+
+_OTHER_WORDS: Final[Mapping[str, str]] = MappingProxyType(
+    {"camera": "image", "lidar": "scan", "arm": "move_arm", "jaw": "set_gripper", "base": "drive", "body": "stand"}
+)
+
+
+@dataclass
+class Call:
+    """One call of a verb: `proceed` makes it; `memory` is the fault's own, kept from call to call."""
+
+    robot: Robot
+    verb: str
+    proceed: Callable[[], Any]
+    arguments: tuple[Any, ...]
+    memory: dict[str, Any]
+
+    @property
+    def source(self) -> str:
+        """What is asked: the verb, and for pictures the camera."""
+        return f"{self.verb} {self.arguments[0]}" if self.verb == "image" else self.verb
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a fault does: to which verbs, and `act(call)` while it is on; `watch(result, call)` sees the calls before.
+
+    Calls of the verbs in `always` go to `act` at all times.
+    """
+
+    verbs: frozenset[str]
+    act: Callable[[Call], Any]
+    watch: Callable[[Any, Call], None] = field(default=lambda result, call: None)
+    always: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class FaultKind:
+    """A fault by name: the words (a pattern with named groups), an example, and the effect of a match.
+
+    Raises ValueError from `effect` when the words match but name nothing that there is.
+    """
+
+    pattern: str
+    example: str
+    meaning: str
+    effect: Callable[[re.Match[str]], Effect]
+
+
+class InjectedFault(RuntimeError):  # noqa: N818 - it stands for any defect of a driver
+    """What a verb raises under "VERB raises"."""
+
+
+def verb_of(word: str) -> str:
+    """The verb that a word names. Raises ValueError."""
+    verb = _OTHER_WORDS.get(word, word)
+    if verb not in VERBS:
+        raise ValueError(f"'{word}' is no verb of the robot; known are {', '.join((*VERBS, *_OTHER_WORDS))}")
+    return verb
+
+
+def _among(match: re.Match[str], verbs: tuple[str, ...]) -> frozenset[str]:
+    verb = verb_of(match["verb"])
+    if verb not in verbs:
+        raise ValueError(f"'{match['verb']}' cannot do that; those that can are {', '.join(verbs)}")
+    return frozenset((verb,))
+
+
+def _freezes(match: re.Match[str]) -> Effect:
+    """The last reading stays."""
+
+    def watch(result: Any, call: Call) -> None:
+        call.memory[call.source] = result
+
+    def act(call: Call) -> Any:
+        if call.source not in call.memory:
+            call.memory[call.source] = call.proceed()
+        return call.memory[call.source]
+
+    everything = match["verb"] in ("sensors", "everything")
+    return Effect(frozenset(SENSE_VERBS) if everything else _among(match, SENSE_VERBS), act, watch)
+
+
+def _raises(match: re.Match[str]) -> Effect:
+    def act(call: Call) -> Any:
+        raise InjectedFault(f"{call.verb} does not answer")
+
+    return Effect(frozenset((verb_of(match["verb"]),)), act)
+
+
+def _refuses(match: re.Match[str]) -> Effect:
+    return _answered(match, CommandStatus(CommandState.REFUSED, f"{verb_of(match['verb'])} is out of order"))
+
+
+def _never_ends(match: re.Match[str]) -> Effect:
+    return _answered(match, CommandStatus(CommandState.RUNNING))
+
+
+def _is_stopped(match: re.Match[str]) -> Effect:
+    return _answered(match, CommandStatus(CommandState.STOPPED, "an emergency stop"))
+
+
+def _answered(match: re.Match[str], status: CommandStatus) -> Effect:
+    """The verb's commands are not carried out, and have this status for ever."""
+
+    def act(call: Call) -> Any:
+        made_up = call.memory.setdefault("ids", set())
+        if call.verb == "command_status":
+            return status if call.arguments[0] in made_up else call.proceed()
+        command = call.robot.stop(lease=call.arguments[-1], only=_NO_COMMAND)
+        made_up.add(command)
+        return command
+
+    return Effect(_among(match, MOTION_VERBS), act, always=frozenset(("command_status",)))
+
+
+def _gripper(match: re.Match[str]) -> Effect:
+    holding = match["what"] != "nothing"
+
+    def act(call: Call) -> Any:
+        return dataclasses.replace(call.proceed(), holding=holding, force_n=20.0 if holding else 0.0)
+
+    return Effect(frozenset(("gripper",)), act)
+
+
+def _no_depth(match: re.Match[str]) -> Effect:
+    value = np.nan if match["what"].lower() == "nan" else 0.0
+
+    def act(call: Call) -> Any:
+        image = call.proceed()
+        return dataclasses.replace(image, depth_m=np.full_like(image.depth_m, value))
+
+    return Effect(frozenset(("image",)), act)
+
+
+def _black(_: re.Match[str]) -> Effect:
+    def act(call: Call) -> Any:
+        image = call.proceed()
+        colour = None if image.colour is None else np.zeros_like(image.colour)
+        return dataclasses.replace(image, colour=colour, grey=np.zeros_like(image.grey))
+
+    return Effect(frozenset(("image",)), act)
+
+
+def _missing(_: re.Match[str]) -> Effect:
+    return Effect(frozenset(("scan",)), lambda call: None)
+
+
+def _garbage(match: re.Match[str]) -> Effect:
+    """Numbers become NaN."""
+    return Effect(_among(match, SENSE_VERBS), lambda call: _spoiled(call.proceed()))
+
+
+def _spoiled(reading: Any) -> Any:
+    """The reading with every float that is not its stamp made NaN."""
+    changes: dict[str, Any] = {}
+    for each in dataclasses.fields(reading) if dataclasses.is_dataclass(reading) else ():
+        value = getattr(reading, each.name)
+        if each.name != "stamp_s":
+            changes[each.name] = _nan_like(value)
+    return dataclasses.replace(reading, **changes) if changes else reading
+
+
+def _nan_like(value: Any) -> Any:
+    if isinstance(value, float):
+        return float("nan")
+    if isinstance(value, tuple) and value and all(isinstance(item, float) for item in value):
+        return tuple(float("nan") for _ in value)
+    if isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.floating):
+        return np.full_like(value, np.nan)
+    if isinstance(value, Mapping):
+        return {key: _nan_like(item) for key, item in value.items()}
+    return value
+
+
+def _jumps(match: re.Match[str]) -> Effect:
+    ahead = RigidTransform(np.array([float(match["metres"]), 0.0, 0.0]))
+
+    def act(call: Call) -> Any:
+        reading = call.proceed()
+        return dataclasses.replace(reading, X_OB=reading.X_OB @ ahead)
+
+    return Effect(frozenset(("odometry",)), act)
+
+
+def _battery(match: re.Match[str]) -> Effect:
+    charge = float(match["percent"]) / 100.0
+
+    def act(call: Call) -> Any:
+        return dataclasses.replace(call.proceed(), charge=charge)
+
+    return Effect(frozenset(("battery",)), act)
+
+
+def _reports(match: re.Match[str]) -> Effect:
+    return Effect(frozenset(("faults",)), lambda call: (*call.proceed(), match["fault"]))
+
+
+def _lease(_: re.Match[str]) -> Effect:
+    """Another takes the lease, once."""
+
+    def act(call: Call) -> Any:
+        if "taken" not in call.memory:
+            call.memory["taken"] = call.robot.take_lease(THIEF)
+        return call.proceed()
+
+    return Effect(frozenset(VERBS) - {"take_lease"}, act)
+
+
+_NO_COMMAND: Final[Any] = -1
+
+STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
+    FaultKind(
+        r"(?P<verb>\w+) (?:freezes|is stale)",
+        "camera freezes at 3 s",
+        'a sensor, or all ("sensors"), gives its last reading over and over',
+        _freezes,
+    ),
+    FaultKind(r"(?P<verb>\w+)(?: verb)? raises", "drive raises at 2 s", "a verb raises an exception", _raises),
+    FaultKind(r"(?P<verb>\w+) refuses", "arm refuses", "a motion verb refuses its commands", _refuses),
+    FaultKind(r"(?P<verb>\w+) never ends", "stand never ends", "commands stay under way and do nothing", _never_ends),
+    FaultKind(r"(?P<verb>\w+) is stopped", "arm is stopped at 1 s", "commands are stopped at once", _is_stopped),
+    FaultKind(
+        r"gripper reports holding(?: (?P<what>nothing|something))?",
+        "gripper reports holding nothing",
+        "the gripper says so, whatever there is",
+        _gripper,
+    ),
+    FaultKind(
+        r"(?:image|camera) returns (?P<what>NaN|nan|no) depth",
+        "image returns NaN depth",
+        "pictures come with depth that is NaN, or none",
+        _no_depth,
+    ),
+    FaultKind(r"(?:image|camera) is black", "camera is black from 1 s", "pictures show nothing, depth stays", _black),
+    FaultKind(r"(?:scan|lidar) is missing", "scan is missing", "there is no scan", _missing),
+    FaultKind(r"(?P<verb>\w+) returns garbage", "joints returns garbage", "a sensor's numbers are NaN", _garbage),
+    FaultKind(
+        r"odometry jumps (?P<metres>-?\d+(?:\.\d+)?) m",
+        "odometry jumps 0.5 m at 2 s",
+        "dead reckoning is off by so much ahead",
+        _jumps,
+    ),
+    FaultKind(
+        r"battery falls to (?P<percent>\d+(?:\.\d+)?) ?%",
+        "battery falls to 5 % at 3 s",
+        "the battery says that it has so much left",
+        _battery,
+    ),
+    FaultKind(
+        r"robot reports (?P<fault>\w[\w -]*?)", "robot reports motor too hot at 2 s", "`faults` holds it", _reports
+    ),
+    FaultKind(r"lease taken", "lease taken at 4 s", "somebody else takes the lease, once", _lease),
+)
+"""All faults that come with the project."""

@@ -1,0 +1,360 @@
+"""A robot without dynamics that keeps the whole Robot protocol: expiry, lease, limits, LiDAR, depth, an arm, a jaw."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from skills.arm.kinematics import ArmModel, arm_model
+from skills.estimate.planar import compose
+from skills.robot import (
+    ArmTrajectory,
+    Battery,
+    Capabilities,
+    CommandId,
+    CommandState,
+    CommandStatus,
+    FloatArray,
+    FrameTree,
+    Gripper,
+    Image,
+    Imu,
+    Joints,
+    Lease,
+    LeaseError,
+    Odometry,
+    Pose2D,
+    Scan,
+)
+from skills.testing.blocks import Block
+from skills.testing.clock import VirtualClock
+from skills.testing.commands import Commands
+from skills.testing.sensing import CAMERAS, picture, sweep
+
+_ACCELERATION_M_S2 = 2.5
+_BRAKING_M_S2 = 8.0
+_RISE_M_S = 0.4
+_JAW_RAD_S = 3.0
+_SCAN_PERIOD_S = 0.1
+_TRAJECTORY_START_RAD = 0.25
+_BATTERY_RUNTIME_S = 5400.0
+
+BASE_ONLY = Capabilities(
+    footprint_m=((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25)),
+    max_speed_m_s=1.6,
+    max_turn_rate_rad_s=2.0,
+    standing_height_m=0.52,
+    height_range_m=(0.4, 0.6),
+    pitch_range_rad=(-0.3, 0.3),
+    arm=None,
+    gripper=None,
+    camera_sources=("frontleft", "frontright"),
+    description="",
+)
+"""A body that can go about, with two cameras, and no arm."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """How the robot begins: its true pose in the world, arm angles (stowed unless said), jaw, charge.
+
+    `in_jaw_rad` is the jaw's opening about what lies between its fingers: closing stops there and holds it. None means
+    that there is nothing. `holding` begins with the jaw closed about it.
+    """
+
+    pose: Pose2D = field(default_factory=lambda: Pose2D(0.0, 0.0, 0.0))
+    arm_rad: tuple[float, ...] | None = None
+    in_jaw_rad: float | None = None
+    holding: bool = False
+    charge: float = 0.9
+
+
+class ScriptedRobot:
+    """Moves exactly as it is told, at once where a real robot would take care; `calls` remembers the verbs used.
+
+    It stands in a world of `blocks`, in which it sees but touches nothing. Odometry is the truth unless
+    `odometry_scale` and `yaw_drift_rad_per_m` say otherwise. Time passes by its clock. Implements
+    `skills.robot.Robot`.
+    """
+
+    def __init__(
+        self,
+        clock: VirtualClock,
+        *,
+        name: str = "Alice",
+        capabilities: Capabilities = BASE_ONLY,
+        blocks: Sequence[Block] = (),
+        start: Start | None = None,
+        seed: int = 0,
+    ) -> None:
+        start = start or Start()
+        self._name, self._capabilities, self._clock = name, capabilities, clock
+        self.blocks = list(blocks)
+        self.pose, self.odometry_pose = start.pose, Pose2D(0.0, 0.0, 0.0)
+        self.velocity: FloatArray = np.zeros(3)
+        self.odometry_scale, self.yaw_drift_rad_per_m = 1.0, 0.0
+        self.height_m, self.pitch_rad = capabilities.standing_height_m, 0.0
+        self.q_rad, self.arm_rate_rad_s = self._first_angles(start), 0.0
+        self.in_jaw_rad = start.in_jaw_rad
+        self.opening_rad = (start.in_jaw_rad or 0.3) if start.holding else 0.0
+        self.in_jaw_rad = self.opening_rad if start.holding else start.in_jaw_rad
+        self.jaw_force_n = 20.0 if start.holding else 0.0
+        self.charge = start.charge
+        self.present_faults: tuple[str, ...] = ()
+        self.refuse_because: dict[str, str] = {}
+        self.calls: list[str] = []
+        self._commands = Commands()
+        self._lease_number = 0
+        self._lease: Lease | None = None
+        self._scan: Scan | None = None
+        self._rng = np.random.default_rng(seed)
+        clock.attach(self._pass_time)
+
+    def _first_angles(self, start: Start) -> FloatArray:
+        arm = self._capabilities.arm
+        if arm is None:
+            return np.zeros(0)
+        return np.array(start.arm_rad or arm.stowed_rad[: len(arm.joint_names)], dtype=np.float64)
+
+    # -- know and sense -------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self._name
+
+    @property
+    def arm(self) -> ArmModel:
+        """The arm's kinematics. Raises ValueError when the robot has none."""
+        return arm_model(self._capabilities)
+
+    @property
+    def holding(self) -> bool:
+        """Whether the jaw is closed about something."""
+        return self.in_jaw_rad is not None and self.jaw_force_n > 0.0 and self.opening_rad <= self.in_jaw_rad + 0.02
+
+    def capabilities(self) -> Capabilities:
+        """What the robot is and can do."""
+        return self._capabilities
+
+    def odometry(self) -> Odometry:
+        """Latest dead reckoning."""
+        self.calls.append("odometry")
+        vx, vy, wz = (float(v) for v in self.velocity)
+        return Odometry(self._clock.now(), self._X_OB(), (vx, vy, wz))
+
+    def imu(self) -> Imu:
+        """Latest inertial measurement: at rest but for the turn rate."""
+        self.calls.append("imu")
+        return Imu(self._clock.now(), (0.0, 0.0, float(self.velocity[2])), (0.0, 0.0, 9.81))
+
+    def scan(self) -> Scan | None:
+        """Latest LiDAR revolution, ten a second."""
+        self.calls.append("scan")
+        now_s = self._clock.now()
+        if self._scan is None or now_s - self._scan.stamp_s > _SCAN_PERIOD_S - 1e-9:
+            self._scan = sweep(self.blocks, self._X_WB(), self._X_OB(), now_s, self._rng)
+        return self._scan
+
+    def image(self, source: str) -> Image:
+        """Take a picture now. Raises ValueError for an unknown source."""
+        self.calls.append("image")
+        if source not in self._capabilities.camera_sources:
+            raise ValueError(f"{self._name} has no camera '{source}'; it has {self._capabilities.camera_sources}")
+        mount = CAMERAS[source]
+        X_BF = self.arm.X_BH(self.q_rad) if mount.frame == "hand" else RigidTransform()
+        edges = {"body": ("odom", self._X_OB())}
+        if self._capabilities.arm is not None:
+            edges["hand"] = ("body", self.arm.X_BH(self.q_rad))
+        stamp_s = self._clock.now()
+        return picture(self.blocks, self._X_WB() @ X_BF, mount, FrameTree(edges), source, stamp_s, self._rng)
+
+    def joints(self) -> Joints:
+        """Latest joint state."""
+        self.calls.append("joints")
+        names = () if self._capabilities.arm is None else self._capabilities.arm.joint_names
+        position = dict(zip(names, self.q_rad.tolist(), strict=True))
+        still = dict.fromkeys(names, 0.0)
+        return Joints(self._clock.now(), position, still, still)
+
+    def gripper(self) -> Gripper:
+        """Latest gripper state."""
+        self.calls.append("gripper")
+        return Gripper(self._clock.now(), self.opening_rad, self.jaw_force_n if self.holding else 0.0, self.holding)
+
+    def battery(self) -> Battery:
+        """Latest battery state."""
+        self.calls.append("battery")
+        return Battery(self._clock.now(), self.charge)
+
+    def faults(self) -> tuple[str, ...]:
+        """Present faults, empty when well."""
+        self.calls.append("faults")
+        return self.present_faults
+
+    # -- act ------------------------------------------------------------------------------------------------------
+
+    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Walk at a body-frame velocity until the clock reads until_s."""
+        fault = "" if all(map(math.isfinite, (vx, vy, wz))) else f"velocity ({vx}, {vy}, {wz}) is not finite"
+        return self._begin("drive", np.array([vx, vy, wz]), until_s, lease, fault)
+
+    def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Hold the body origin at a height above the floor and a pitch."""
+        low, high = self._capabilities.height_range_m
+        fault = "" if low <= height_m <= high else f"height {height_m:.2f} m is not in [{low}, {high}]"
+        return self._begin("stand", (height_m, pitch_rad), until_s, lease, fault)
+
+    def sit(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Lower the body to the floor."""
+        return self._begin("stand", (0.2, 0.0), until_s, lease, "", verb="sit")
+
+    def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
+        """Follow a joint trajectory from about where the arm is."""
+        fault = ""
+        if self._capabilities.arm is None:
+            fault = "there is no arm"
+        elif trajectory.positions_rad.shape[1] != len(self.q_rad):
+            fault = f"the arm has {len(self.q_rad)} joints, not {trajectory.positions_rad.shape[1]}"
+        elif float(np.max(np.abs(trajectory.positions_rad[0] - self.q_rad))) > _TRAJECTORY_START_RAD + 4.0 * float(
+            trajectory.times_s[0]
+        ):
+            fault = "the trajectory does not begin where the arm is"
+        return self._begin("move_arm", (trajectory, self.q_rad.copy()), until_s, lease, fault)
+
+    def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Move the jaw; it stops where something lies between its fingers."""
+        fault = "" if self._capabilities.gripper is not None else "there is no gripper"
+        return self._begin("set_gripper", (opening_rad, force_n), until_s, lease, fault)
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        """Stop all motion, or only the given command; the jaw keeps its force."""
+        self.calls.append("stop")
+        if lease != self._lease:
+            return self._commands.note(CommandStatus(CommandState.REFUSED, "the lease was taken away"))
+        self._commands.stop(only)
+        return self._commands.note(CommandStatus(CommandState.DONE))
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        """What became of a command. Raises KeyError for an id never given."""
+        self.calls.append("command_status")
+        return self._commands.status(command)
+
+    # -- own ------------------------------------------------------------------------------------------------------
+
+    def acquire_lease(self, holder: str) -> Lease:
+        """Take a free lease. Raises LeaseError when another holds it."""
+        if self._lease is not None:
+            raise LeaseError(f"{self._name}: the lease is held by '{self._lease.holder}'")
+        return self.take_lease(holder)
+
+    def take_lease(self, holder: str) -> Lease:
+        """Take the lease from whoever holds it; the robot stops."""
+        self._commands.stop(None)
+        self._lease_number += 1
+        self._lease = Lease(self._name, holder, self._lease_number)
+        return self._lease
+
+    def return_lease(self, lease: Lease) -> None:
+        """Give the lease back; the robot stops."""
+        self.calls.append("return_lease")
+        if lease == self._lease:
+            self._commands.stop(None)
+            self._lease = None
+
+    def lease_holder(self) -> Lease | None:
+        """The lease that counts now; None while it is free."""
+        return self._lease
+
+    # -- the test's side ------------------------------------------------------------------------------------------
+
+    @property
+    def moving_parts(self) -> tuple[str, ...]:
+        """What truly moves now: "drive", "stand", "move_arm", "set_gripper"."""
+        driving = ("drive",) if float(np.max(np.abs(self.velocity))) > 0.01 else ()
+        return (*driving, *(part for part in self._commands.moving_parts if part != "drive"))
+
+    def put_in_jaw(self, opening_rad: float | None) -> None:
+        """From now on closing the jaw stops at this opening and holds something; None takes it away."""
+        self.in_jaw_rad = opening_rad
+
+    def _begin(
+        self, part: str, goal: object, until_s: float, lease: Lease, fault: str, *, verb: str | None = None
+    ) -> CommandId:
+        verb = verb or part
+        self.calls.append(verb)
+        refusal = "the lease was taken away" if lease != self._lease else fault or self.refuse_because.get(verb, "")
+        if refusal:
+            return self._commands.note(CommandStatus(CommandState.REFUSED, refusal))
+        return self._commands.begin(part, goal, self._clock.now(), until_s)
+
+    def _X_WB(self) -> RigidTransform:
+        return self.pose.transform(self.height_m) @ RigidTransform(RollPitchYaw(0.0, self.pitch_rad, 0.0), [0, 0, 0])
+
+    def _X_OB(self) -> RigidTransform:
+        return self.odometry_pose.transform(self.height_m) @ RigidTransform(
+            RollPitchYaw(0.0, self.pitch_rad, 0.0), [0, 0, 0]
+        )
+
+    def _pass_time(self, dt_s: float) -> None:
+        self._commands.expire(self._clock.now())
+        self._move_base(dt_s)
+        self._move_body(dt_s)
+        self._move_arm()
+        self._move_jaw(dt_s)
+        self.charge = max(0.0, self.charge - dt_s / _BATTERY_RUNTIME_S)
+
+    def _move_base(self, dt_s: float) -> None:
+        """Towards the commanded velocity within the acceleration; without a command it brakes harder."""
+        active = self._commands.active("drive")
+        wanted = np.zeros(3) if active is None else active.goal
+        most = (_BRAKING_M_S2 if active is None else _ACCELERATION_M_S2) * dt_s
+        self.velocity = self.velocity + np.clip(wanted - self.velocity, -most, most)
+        step = self.velocity * dt_s
+        way_m = math.hypot(step[0], step[1])
+        if way_m == 0.0 and step[2] == 0.0:
+            return
+        self.pose = compose(self.pose, Pose2D(*step.tolist()))
+        scale, turn = self.odometry_scale, step[2] + self.yaw_drift_rad_per_m * way_m
+        self.odometry_pose = compose(self.odometry_pose, Pose2D(scale * step[0], scale * step[1], turn))
+
+    def _move_body(self, dt_s: float) -> None:
+        active = self._commands.active("stand")
+        if active is None:
+            return
+        height_m, self.pitch_rad = active.goal
+        off = height_m - self.height_m
+        self.height_m += max(-_RISE_M_S * dt_s, min(_RISE_M_S * dt_s, off))
+        if abs(height_m - self.height_m) < 1e-6:
+            self._commands.finish("stand", CommandState.DONE)
+
+    def _move_arm(self) -> None:
+        active = self._commands.active("move_arm")
+        if active is None:
+            return
+        trajectory, q_before = active.goal
+        times, positions = trajectory.times_s, trajectory.positions_rad
+        if times[0] > 0.0:
+            times, positions = np.concatenate([[0.0], times]), np.vstack([q_before, positions])
+        t = self._clock.now() - active.since_s
+        self.q_rad = np.array([np.interp(t, times, positions[:, j]) for j in range(positions.shape[1])])
+        if t >= times[-1]:
+            self._commands.finish("move_arm", CommandState.DONE)
+
+    def _move_jaw(self, dt_s: float) -> None:
+        active = self._commands.active("set_gripper")
+        if active is None:
+            return
+        opening_rad, self.jaw_force_n = active.goal
+        before, least = self.opening_rad, self.in_jaw_rad
+        most = _JAW_RAD_S * dt_s
+        self.opening_rad += max(-most, min(most, opening_rad - self.opening_rad))
+        met = least is not None and before >= least > self.opening_rad
+        if met and least is not None:
+            self.opening_rad = least
+        if met or abs(self.opening_rad - opening_rad) < 1e-6:
+            self._commands.finish("set_gripper", CommandState.DONE)

@@ -1,0 +1,153 @@
+"""Faults by name: what they do, when they are on, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+from skills.robot import CommandState
+from skills.testing.blocks import ROOM
+from skills.testing.clock import VirtualClock
+from skills.testing.fault_kinds import STANDARD_FAULTS, InjectedFault
+from skills.testing.faults import parse_fault, with_faults
+from skills.testing.robot import ScriptedRobot
+
+
+@pytest.fixture
+def clock():
+    return VirtualClock()
+
+
+@pytest.fixture
+def faulty(clock, spot):
+    """A robot with the given faults, and its lease."""
+
+    def make(*faults):
+        robot = with_faults(ScriptedRobot(clock, capabilities=spot, blocks=ROOM), clock, faults)
+        return robot, robot.acquire_lease("test")
+
+    return make
+
+
+@pytest.mark.parametrize("kind", STANDARD_FAULTS, ids=lambda kind: kind.example)
+def test_every_example_is_a_fault(kind):
+    assert parse_fault(kind.example).words == kind.example
+
+
+def test_a_fault_is_on_from_its_time_and_until_its_end(faulty, clock):
+    robot, _ = faulty("gripper reports holding from 1 s to 2 s")
+    seen = []
+    for _ in range(3):
+        seen.append(robot.gripper().holding)
+        clock.advance(1.0)
+    assert seen == [False, True, False]
+
+
+def test_times_count_from_when_the_robot_was_wrapped(faulty, clock):
+    clock.advance(5.0)
+    robot, _ = faulty("gripper reports holding at 1 s")
+    assert not robot.gripper().holding
+    clock.advance(1.0)
+    assert robot.gripper().holding
+
+
+def test_a_frozen_sensor_keeps_its_last_reading_and_the_others_go_on(faulty, clock):
+    robot, _ = faulty("scan is stale from 1 s")
+    clock.advance(0.9)
+    before = robot.scan().stamp_s
+    clock.advance(3.0)
+    assert robot.scan().stamp_s == before == 0.9
+    assert robot.odometry().stamp_s == pytest.approx(3.9)
+
+
+def test_each_camera_freezes_on_its_own_picture(faulty, clock):
+    robot, _ = faulty("camera freezes at 1 s")
+    robot.image("hand")
+    clock.advance(2.0)
+    assert robot.image("hand").stamp_s == 0.0
+    assert robot.image("left").source == "left"
+
+
+def test_a_verb_raises_from_its_nth_call_on(faulty):
+    robot, _ = faulty("joints verb raises after 2 calls")
+    robot.joints()
+    robot.joints()
+    with pytest.raises(InjectedFault, match="joints does not answer"):
+        robot.joints()
+
+
+def test_a_refused_command_says_why_and_nothing_moves(faulty, clock):
+    robot, lease = faulty("drive refuses from 1 s")
+    fine = robot.drive(0.1, 0.0, 0.0, until_s=0.5, lease=lease)
+    clock.advance(1.0)
+    refused = robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)
+    assert robot.command_status(fine).state is CommandState.DONE
+    assert robot.command_status(refused).state is CommandState.REFUSED
+    assert "out of order" in robot.command_status(refused).reason
+    assert robot.moving_parts == ()
+
+
+def test_a_command_that_never_ends_stays_under_way(faulty, clock):
+    robot, lease = faulty("stand never ends")
+    command = robot.stand(0.55, 0.0, until_s=1.0, lease=lease)
+    clock.advance(30.0)
+    assert robot.command_status(command).state is CommandState.RUNNING
+
+
+def test_depth_can_be_nan(faulty):
+    robot, _ = faulty("image returns NaN depth")
+    assert np.all(np.isnan(robot.image("hand").depth_m))
+
+
+def test_garbage_spoils_numbers_and_keeps_the_stamp(faulty, clock):
+    clock.advance(1.0)
+    robot, _ = faulty("joints returns garbage", "odometry returns garbage")
+    assert all(math.isnan(angle) for angle in robot.joints().position_rad.values())
+    assert all(math.isnan(v) for v in robot.odometry().velocity)
+    assert robot.joints().stamp_s == 1.0
+
+
+def test_the_lease_is_taken_once_and_motion_ends(faulty, clock):
+    robot, lease = faulty("lease taken at 1 s")
+    robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)
+    clock.advance(1.0)
+    robot.odometry()
+    clock.advance(0.2)
+    assert robot.moving_parts == ()
+    assert robot.command_status(robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)).state is CommandState.REFUSED
+    assert robot.lease_holder().holder == "the tablet"
+
+
+def test_odometry_can_jump(faulty, clock):
+    robot, _ = faulty("odometry jumps 0.5 m at 1 s")
+    assert robot.odometry().pose.x_m == 0.0
+    clock.advance(1.0)
+    assert robot.odometry().pose.x_m == pytest.approx(0.5)
+
+
+def test_battery_and_faults_can_be_set(faulty):
+    robot, _ = faulty("battery falls to 5 %", "robot reports motor too hot")
+    assert robot.battery().charge == 0.05
+    assert robot.faults() == ("motor too hot",)
+
+
+def test_several_faults_act_together(faulty):
+    robot, _ = faulty("gripper reports holding", "gripper raises after 1 call")
+    assert robot.gripper().holding
+    with pytest.raises(InjectedFault):
+        robot.gripper()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("camera freeses at 3 s", "did you mean 'camera freezes at 3 s'"),
+        ("the cat sleeps", "known are"),
+        ("tail raises", "'tail' is no verb of the robot"),
+        ("drive freezes", "'drive' cannot do that"),
+        ("camera freezes from 3 s to 2 s", "ends before it begins"),
+    ],
+)
+def test_words_that_are_no_fault_are_refused_with_the_mend(words, message):
+    with pytest.raises(ValueError, match=message):
+        parse_fault(words)

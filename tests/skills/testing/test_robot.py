@@ -1,0 +1,161 @@
+"""The scripted robot keeps the Robot protocol."""
+
+import math
+
+import numpy as np
+import pytest
+
+from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
+from skills.testing.blocks import ROOM, TABLE_CAN, Block
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot, Start
+
+
+@pytest.fixture
+def clock():
+    return VirtualClock()
+
+
+@pytest.fixture
+def robot(clock):
+    return ScriptedRobot(clock)
+
+
+def test_time_passes_in_whole_steps(clock):
+    steps = []
+    clock.attach(steps.append)
+    clock.advance(0.05)
+    assert clock.now() == 0.05
+    assert len(steps) == 5
+
+
+def test_a_drive_moves_the_robot_until_it_expires_and_then_it_brakes(clock, robot):
+    lease = robot.acquire_lease("test")
+    command = robot.drive(0.5, 0.0, 0.0, until_s=1.0, lease=lease)
+    clock.advance(1.0)
+    assert robot.pose.x_m == pytest.approx(0.45, abs=0.03)
+    assert robot.command_status(command).state is CommandState.RUNNING
+    clock.advance(0.2)
+    assert robot.command_status(command).state is CommandState.DONE
+    assert robot.moving_parts == ()
+
+
+def test_a_new_drive_replaces_the_old_one(clock, robot):
+    lease = robot.acquire_lease("test")
+    first = robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)
+    robot.drive(0.0, 0.0, 0.5, until_s=9.0, lease=lease)
+    assert robot.command_status(first).state is CommandState.STOPPED
+    assert "replaced" in robot.command_status(first).reason
+
+
+def test_stop_can_be_for_one_command_only(clock, robot):
+    lease = robot.acquire_lease("test")
+    first = robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)
+    second = robot.drive(0.4, 0.0, 0.0, until_s=9.0, lease=lease)
+    robot.stop(lease=lease, only=first)
+    assert robot.command_status(second).state is CommandState.RUNNING
+    robot.stop(lease=lease)
+    assert robot.command_status(second).state is CommandState.STOPPED
+
+
+def test_a_lease_that_was_taken_moves_nothing(clock, robot):
+    old = robot.acquire_lease("test")
+    with pytest.raises(LeaseError, match="test"):
+        robot.acquire_lease("other")
+    command = robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=old)
+    robot.take_lease("other")
+    assert robot.command_status(command).state is CommandState.STOPPED
+    assert robot.command_status(robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=old)).state is CommandState.REFUSED
+
+
+def test_nonsense_is_refused(clock, robot):
+    lease = robot.acquire_lease("test")
+    assert robot.command_status(robot.drive(math.nan, 0.0, 0.0, until_s=9.0, lease=lease)).state is CommandState.REFUSED
+    reach = ArmTrajectory(np.array([1.0]), np.zeros((1, 6)))
+    refused = robot.command_status(robot.move_arm(reach, until_s=9.0, lease=lease))
+    assert (refused.state, refused.reason) == (CommandState.REFUSED, "there is no arm")
+
+
+def test_the_body_rises_to_where_it_is_sent(clock, robot):
+    lease = robot.acquire_lease("test")
+    command = robot.stand(0.58, 0.0, until_s=3.0, lease=lease)
+    clock.advance(0.5)
+    assert robot.command_status(command).state is CommandState.DONE
+    assert robot.odometry().X_OB.translation()[2] == pytest.approx(0.58)
+
+
+def test_odometry_drifts_where_it_is_told_to(clock, robot):
+    lease = robot.acquire_lease("test")
+    robot.odometry_scale = 1.1
+    robot.drive(0.5, 0.0, 0.0, until_s=2.0, lease=lease)
+    clock.advance(2.5)
+    assert robot.odometry().pose.x_m == pytest.approx(1.1 * robot.pose.x_m)
+
+
+def test_the_lidar_sees_the_walls_of_the_room(clock):
+    robot = ScriptedRobot(clock, blocks=ROOM)
+    points = robot.scan().points_B()
+    wall = points[np.abs(points[:, 1]) < 0.1]
+    assert wall[:, 0].max() == pytest.approx(4.0, abs=0.05)
+    assert wall[:, 0].min() == pytest.approx(-2.0, abs=0.05)
+
+
+def test_pictures_show_depth_and_colour_of_what_is_there(clock):
+    red = Block(1.0, -0.5, 1.2, 0.5, 0.0, 1.0, (255, 0, 0))
+    robot = ScriptedRobot(clock, blocks=[red])
+    image = robot.image("frontleft")
+    lens = image.intrinsics
+    middle = image.depth_m[int(lens.cy), int(lens.cx)]
+    assert middle == pytest.approx((1.0 - 0.42) / math.cos(math.radians(30)), abs=0.02)
+    assert tuple(image.colour[int(lens.cy), int(lens.cx)]) == (255, 0, 0)
+
+
+def test_an_unknown_camera_is_refused_with_those_that_there_are(robot):
+    with pytest.raises(ValueError, match="frontleft"):
+        robot.image("tail")
+
+
+def test_the_jaw_stops_at_what_is_in_it(clock, spot):
+    robot = ScriptedRobot(clock, capabilities=spot, start=Start(in_jaw_rad=0.4))
+    lease = robot.acquire_lease("test")
+    robot.set_gripper(1.4, 20.0, until_s=9.0, lease=lease)
+    clock.advance(1.0)
+    assert not robot.gripper().holding
+    robot.set_gripper(0.0, 60.0, until_s=9.0, lease=lease)
+    clock.advance(1.0)
+    assert robot.gripper().holding
+    assert robot.gripper().opening_rad == 0.4
+
+
+def test_an_empty_jaw_closes_on_nothing(clock, spot):
+    robot = ScriptedRobot(clock, capabilities=spot)
+    lease = robot.acquire_lease("test")
+    robot.set_gripper(1.4, 20.0, until_s=9.0, lease=lease)
+    clock.advance(1.0)
+    robot.set_gripper(0.0, 60.0, until_s=9.0, lease=lease)
+    clock.advance(1.0)
+    assert (robot.gripper().opening_rad, robot.gripper().holding) == (pytest.approx(0.0), False)
+
+
+def test_the_arm_follows_its_trajectory(clock, spot):
+    robot = ScriptedRobot(clock, capabilities=spot)
+    lease = robot.acquire_lease("test")
+    there = robot.q_rad + 0.5
+    command = robot.move_arm(ArmTrajectory(np.array([1.0]), there[None, :]), until_s=9.0, lease=lease)
+    clock.advance(0.5)
+    assert robot.q_rad == pytest.approx(there - 0.25)
+    assert robot.moving_parts == ("move_arm",)
+    clock.advance(0.6)
+    assert robot.q_rad == pytest.approx(there)
+    assert robot.command_status(command).state is CommandState.DONE
+
+
+def test_it_starts_where_it_is_told(clock):
+    robot = ScriptedRobot(clock, start=Start(pose=Pose2D(1.0, 2.0, 0.5), charge=0.2))
+    assert robot.pose == Pose2D(1.0, 2.0, 0.5)
+    assert robot.battery().charge == 0.2
+
+
+def test_equal_seeds_give_equal_scans(clock):
+    one, two = (ScriptedRobot(clock, blocks=[*ROOM, TABLE_CAN], seed=4) for _ in range(2))
+    assert np.array_equal(one.scan().ranges_m, two.scan().ranges_m, equal_nan=True)

@@ -268,6 +268,8 @@ class Skill(ABC, Generic[InputsT]):
     `Inputs` is a frozen dataclass whose fields are the input ports (defaults allowed); `outputs` names the output
     ports and their types; `causes` documents which failures it gives and when. `default_timeout_s` counts the
     robot's clock. `checkpoint` holds what a later `resume` needs beyond the inputs, as JSON values; it is kept durably.
+    `max_data_age_s` says how old (s) the data may be on which a success rests, by name: a sense verb (not `image`),
+    "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.
     """
 
     name: ClassVar[str]
@@ -275,6 +277,7 @@ class Skill(ABC, Generic[InputsT]):
     outputs: ClassVar[Mapping[str, type]] = {}
     causes: ClassVar[Mapping[Cause, str]] = {}
     default_timeout_s: ClassVar[float] = 60.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {}
     checkpoint: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, context: SkillContext) -> None:

@@ -12,6 +12,7 @@ from py_trees.common import Status
 from executive.behaviours.board import Binding
 from executive.behaviours.context import RunContext
 from executive.behaviours.explained import Explained
+from executive.behaviours.freshness import refuse_stale
 from executive.behaviours.suspension import StoppableTime
 from executive.types import conforms, describe_type
 from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
@@ -140,6 +141,9 @@ class SkillLeaf(Explained, Behaviour):
         late = self._time.elapsed_s() > self._limit_s
         if late and not isinstance(step, Failed):
             return Failed(Cause.TIMEOUT, f"{self.name} took longer than {self._limit_s:g} s ({step.message})")
+        if isinstance(step, Succeeded):
+            success = step
+            return self._guarded(lambda: refuse_stale(self._skill_class, success, self._context))
         return step
 
     def _ended(self) -> Failed | None:

@@ -48,6 +48,7 @@ class Approach(ArmSkill[ApproachInputs]):
         Cause.POSTCONDITION: "the thing is not seen again from there",
     }
     default_timeout_s = 150.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5, "observation": 3.0}
 
     def run(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         """Choose a place, go, look again."""

@@ -19,6 +19,7 @@ Goal = Callable[[ArmScene, FloatArray], FloatArray]
 PLANNING_LATENCY_S = 0.3
 PICTURE_LATENCY_S = 0.1
 SETTLE_S = 0.15
+OLDEST_PICTURE_S = 0.5
 HAND_CAMERA = "hand"
 LINE_SPEED_RAD_S = 0.6
 JAW_FORCE_N = 20.0
@@ -143,14 +144,19 @@ class ArmSkill(RoutineSkill[InputsT]):
             yield from self.move_to(lambda scene, q: stowed, message)
 
     def picture(self, message: str) -> Routine[Image]:
-        """A picture of the hand camera, once the arm is still."""
+        """A new picture of the hand camera, once the arm is still.
+
+        Raises SkillFailure with cause EXECUTION when the camera gives an old one.
+        """
         yield from self.pause(SETTLE_S, message)
-        robot = self.context.robot
-        return (
-            yield from self.compute(
-                lambda: robot.image(HAND_CAMERA), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
-            )
+        robot, asked_s = self.context.robot, self.context.clock.now()
+        image = yield from self.compute(
+            lambda: robot.image(HAND_CAMERA), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
         )
+        if image.stamp_s < asked_s - OLDEST_PICTURE_S:
+            age_s = asked_s - image.stamp_s
+            raise SkillFailure(Cause.EXECUTION, f"the hand camera gives only a picture that is {age_s:.1f} s old")
+        return image
 
     def try_stow(self) -> Routine[None]:
         """Stow where a way is found; used on the way out of failures."""

@@ -62,6 +62,7 @@ class Detect(ArmSkill[DetectInputs]):
         Cause.POSTCONDITION: "no such thing is seen",
     }
     default_timeout_s = 90.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"observation": 3.0}
 
     def run(self, inputs: DetectInputs) -> Routine[Succeeded]:
         """Look at each surface in turn; a sighting counts when a second look from beside agrees."""

@@ -63,6 +63,7 @@ class Grasp(ArmSkill[GraspInputs]):
         Cause.POSTCONDITION: "the jaw closed on nothing, or the thing slipped out",
     }
     default_timeout_s = 120.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
 
     def run(self, inputs: GraspInputs) -> Routine[Succeeded]:
         """Look, plan, take, lift, carry."""

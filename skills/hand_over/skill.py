@@ -51,6 +51,7 @@ class HandOver(ArmSkill[HandOverInputs]):
         Cause.POSTCONDITION: "the thing is no longer held, or not near the person",
     }
     default_timeout_s = 120.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
 
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
         """Find, go, hold out."""

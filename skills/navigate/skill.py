@@ -57,6 +57,7 @@ class Navigate(Skill[NavigateInputs]):
         Cause.POSTCONDITION: "It stands still, but not where it should.",
     }
     default_timeout_s: ClassVar[float] = 180.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
 
     def __init__(self, context: SkillContext, options: NavigateOptions | None = None) -> None:
         super().__init__(context)

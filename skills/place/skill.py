@@ -53,6 +53,7 @@ class Place(ArmSkill[PlaceInputs]):
         Cause.POSTCONDITION: "the thing is not seen where it was put down, or is still in the jaw",
     }
     default_timeout_s = 150.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
 
     def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
         """Go near, look, put down, look again."""

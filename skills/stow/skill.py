@@ -32,6 +32,7 @@ class Stow(ArmSkill[StowInputs]):
         Cause.EXECUTION: "the arm did not get there",
     }
     default_timeout_s = 30.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
 
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
         """Stow, or carry."""

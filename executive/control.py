@@ -222,8 +222,10 @@ class Control:
     # -- for the runner -----------------------------------------------------------------------------------------------
 
     def begin(self, missions: Mapping[str, CompiledTree]) -> None:
-        """The run begins. Raises ValueError for a breakpoint at a node that it does not have."""
+        """The run begins. Raises ValueError for a breakpoint at a node that it does not have, or at a second run."""
         with self._changed:
+            if self._begun:
+                raise ValueError("a Control has its hands on one run only; make another")
             self._begun = True
             for robot_name, tree in missions.items():
                 self.mission_begun(robot_name, tree)

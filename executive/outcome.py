@@ -21,7 +21,10 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True)
 class RobotResult:
-    """How one robot's mission ended: its answers to status checks by path id, and the last state of its tree."""
+    """How one robot's mission ended: its answers to status checks by path id, and the last state of its tree.
+
+    `preempting` are the results of the missions that came in between, in the order of their ends.
+    """
 
     robot_name: str
     outcome: Outcome
@@ -29,6 +32,8 @@ class RobotResult:
     message: str
     answers: Mapping[str, bool]
     states: Snapshot
+    mission: str = ""
+    preempting: tuple[RobotResult, ...] = ()
 
 
 @dataclass(frozen=True)

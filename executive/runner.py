@@ -5,19 +5,25 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from executive.behaviours.board import Board
 from executive.behaviours.context import RunContext
 from executive.behaviours.skill_leaf import ERROR_TOPIC
+from executive.behaviours.suspension import StoppableTime
 from executive.compiler import CompiledTree
 from executive.compiling.workshop import slug
+from executive.control import Control, Event, Wishes
+from executive.guarded_robot import guarded, show_lease_behind
 from executive.journal import Journal
+from executive.lease_keeper import LeaseKeeper
 from executive.outcome import Outcome, RobotResult, RunResult
+from executive.record.schemas import CONTROL
 from executive.record.ticks import TickMeter
-from executive.session import Ending, Session
+from executive.session import Session
 from executive.snapshot import Snapshot
-from executive.watchdog import VERB_LIMIT_S, VerbHung, watched
+from executive.tree_run import Ending
+from executive.watchdog import VERB_LIMIT_S, VerbHung
 from skills.api import Cause, Costmap, Localiser, Publish, Worker
 from skills.robot import Clock, LeaseError, Robot
 
@@ -47,30 +53,20 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class Progress:
-    """What an observer is told after each tick."""
+    """What an observer is told after each tick: by robot, the states of all nodes and the mission under way."""
 
     now_s: float
     ticks: int
     overruns: int
     states: Mapping[str, Snapshot]
+    trees: Mapping[str, CompiledTree] = field(default_factory=dict)
 
 
 Observer = Callable[[Progress], None]
 
 
-class CancelToken:
-    """A wish to end the run, to be heard at the next tick. May be set from a signal handler or another thread."""
-
-    def __init__(self) -> None:
-        self.reason: str | None = None
-
-    def request(self, reason: str) -> None:
-        """Ask for the end; the first reason stays."""
-        self.reason = self.reason or reason
-
-
 class _CancelledError(Exception):
-    """The token was set."""
+    """Somebody cancelled the run."""
 
 
 class _TimeOverError(Exception):
@@ -84,21 +80,25 @@ def run(
     worker: Worker,
     publish: Publish,
     settings: RunSettings = RunSettings(),
-    cancel: CancelToken | None = None,
+    control: Control | None = None,
     observer: Observer | None = None,
 ) -> RunResult:
     """Run trees to their end, robots in the order of their names.
 
-    Each tick: advance the clock by the tick period, update each robot's estimators, tick each tree, log what changed.
-    Whatever happens, all trees and robots are stopped and all leases returned before this returns.
+    Each tick: heed `control`, advance the clock by the tick period, update each robot's estimators, tick each tree, log
+    what changed. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree is not
+    ticked, and what passes does not count against any limit. Whatever happens, all trees and robots are stopped and
+    all leases returned before this returns. Without control, equal seeds give equal logs.
 
     Raises:
-        ValueError: no entries, or two robots of one name.
+        ValueError: no entries, two robots of one name, or a breakpoint at a node that there is not.
     """
     names = [entry.robot.name for entry in entries]
     if not entries or len(set(names)) != len(names):
         raise ValueError(f"a run needs robots of different names, not {names}")
-    return _Run(clock, worker, publish, settings, cancel or CancelToken(), observer).run(entries)
+    control = control or Control(pace=None)
+    control.begin({entry.tree.robot_name: entry.tree for entry in entries})
+    return _Run(clock, worker, publish, settings, control, observer).run(entries)
 
 
 class _Run:
@@ -110,15 +110,16 @@ class _Run:
         worker: Worker,
         publish: Publish,
         settings: RunSettings,
-        cancel: CancelToken,
+        control: Control,
         observer: Observer | None,
     ) -> None:
         self._clock, self._worker, self._publish = clock, worker, publish
-        self._settings, self._cancel, self._observer = settings, cancel, observer
+        self._settings, self._control, self._observer = settings, control, observer
         self._sessions: list[Session] = []
         self._ticks = 0
         self._meter = TickMeter(publish, clock, limit_s=settings.tick_period_s)
         self._begun_s, self._begun_wall_s = clock.now(), time.perf_counter()
+        self._time = StoppableTime(clock)
 
     def run(self, entries: Sequence[RunEntry]) -> RunResult:
         """The whole run."""
@@ -133,13 +134,16 @@ class _Run:
         finally:
             for session in self._sessions:
                 session.close(ending)
+            self._tell(self._control.end())
         return self._result(entries, ending)
 
     def _open(self, entry: RunEntry) -> Session:
-        robot = watched(entry.robot, limit_s=self._settings.verb_limit_s)
+        robot = guarded(entry.robot, limit_s=self._settings.verb_limit_s)
+        keeper = LeaseKeeper(robot, HOLDER)
+        show_lease_behind(robot, keeper.behind)
         context = RunContext(
             robot=robot,
-            lease=robot.acquire_lease(HOLDER),
+            lease=keeper.token,
             clock=self._clock,
             worker=self._worker,
             localiser=entry.localiser,
@@ -147,30 +151,73 @@ class _Run:
             publish=self._publish,
             seed=self._settings.seed,
             board=Board(slug(entry.tree.robot_name)),
+            ask=lambda question: self._control.ask(question, self._clock),
         )
-        return Session(entry.tree, context, entry.journal)
+        return Session(entry.tree, context, keeper, self._control, entry.journal)
 
     def _cycle(self) -> None:
-        """One period: time passes, estimators see, trees tick."""
-        if self._cancel.reason is not None:
-            raise _CancelledError(self._cancel.reason)
-        if self._clock.now() - self._begun_s >= self._settings.time_limit_s:
-            raise _TimeOverError(f"the mission was not done within {self._settings.time_limit_s:g} s")
-        self._clock.advance(self._settings.tick_period_s)
+        """One period: wishes are heeded, time passes, estimators see, trees tick."""
+        begun_wall_s = time.perf_counter()
         live = [session for session in self._sessions if session.result is None]
+        wishes = self._heed(live)
+        self._clock.advance(self._settings.tick_period_s)
         for session in live:
             session.sense()
-        begun = time.perf_counter()
-        for session in live:
-            session.tick()
-        self._ticks += 1
-        self._meter(time.perf_counter() - begun)
+        self._tick([session for session in live if session.may_move() and wishes.hold is None], wishes.breakpoints)
         for session in live:
             if session.finished:
                 session.close()
         if self._observer is not None:
-            states = {session.name: session.states for session in self._sessions}
-            self._observer(Progress(self._clock.now(), self._ticks, self._meter.overruns, states))
+            self._observer(self._progress())
+        self._keep_pace(begun_wall_s)
+
+    def _heed(self, live: Sequence[Session]) -> Wishes:
+        """Do what is wished before time passes. Raises _CancelledError or _TimeOverError."""
+        wishes = self._control.heed()
+        self._tell(wishes.events)
+        if wishes.cancel is not None:
+            raise _CancelledError(wishes.cancel)
+        for tree in wishes.preempts:
+            for session in live:
+                if session.name == tree.robot_name:
+                    session.preempt(tree)
+        if wishes.hold is None:
+            self._time.go_on()
+        else:
+            self._time.stop()
+            for session in live:
+                session.hold()
+        if self._time.elapsed_s() >= self._settings.time_limit_s:
+            raise _TimeOverError(f"the mission was not done within {self._settings.time_limit_s:g} s")
+        return wishes
+
+    def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> None:
+        """Tick the trees of robots that may move."""
+        begun = time.perf_counter()
+        changes = [session.tick(breakpoints) for session in moving]
+        self._ticks += 1
+        self._meter(time.perf_counter() - begun)
+        if moving:
+            self._control.ticked(changed=any(changes))
+        for path_id in filter(None, (session.waiting_at for session in moving)):
+            self._control.arrived_at(path_id)
+
+    def _progress(self) -> Progress:
+        states = {session.name: session.states for session in self._sessions}
+        trees = {session.name: session.tree for session in self._sessions}
+        return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees)
+
+    def _keep_pace(self, begun_wall_s: float) -> None:
+        """Do not let simulated time run ahead of people who have something to decide."""
+        if self._control.pace is None or not self._control.slow:
+            return
+        left_s = self._settings.tick_period_s / self._control.pace - (time.perf_counter() - begun_wall_s)
+        if left_s > 0.0:
+            self._control.rest(left_s)
+
+    def _tell(self, events: Sequence[Event]) -> None:
+        for event in events:
+            self._publish(CONTROL, {"t": round(self._clock.now(), 6), "what": event.what, "message": event.message})
 
     def _ending(self, stop: BaseException) -> Ending:
         """What an exception means for the missions that are not done yet."""

@@ -1,53 +1,52 @@
-"""One robot's mission under way: its lease, its tree, its log entries, and its orderly end."""
+"""One robot in a run: its lease, its missions (others may come in between), and its orderly end."""
 
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
-from py_trees.behaviour import Behaviour
-from py_trees.common import Status
-
-from executive.behaviours.answer import Answer
+from executive.behaviours.board import Board
 from executive.behaviours.context import RunContext
-from executive.behaviours.explained import Explained
-from executive.behaviours.skill_leaf import ERROR_TOPIC, SkillLeaf
+from executive.behaviours.skill_leaf import ERROR_TOPIC
 from executive.compiler import CompiledTree
-from executive.journal import Journal, TickNote
+from executive.compiling.workshop import slug
+from executive.control import Control
+from executive.journal import Journal
+from executive.lease_keeper import LeaseKeeper
 from executive.outcome import Outcome, RobotResult
 from executive.record.drawable import stamp
-from executive.record.schemas import OUTCOME, POSE, TRANSITIONS, TREE
-from executive.snapshot import Snapshot, Transition, snapshot, transitions, walk
-from executive.view.model import node_view
+from executive.record.schemas import OUTCOME, POSE
+from executive.snapshot import NodeState, Snapshot
+from executive.tree_run import Ending, TreeRun
 from executive.watchdog import VerbHung
 from skills.api import Cause
 from skills.robot import Pose2D
 
 POSE_PERIOD_S = 0.5
+LEASE_PATIENCE_S = 60.0
 _EPSILON_S = 1e-9
 
 
-@dataclass(frozen=True)
-class Ending:
-    """An end that the tree did not come to by itself."""
-
-    outcome: Outcome
-    cause: Cause
-    message: str
-
-
 class Session:
-    """One robot's mission. The runner calls `sense` and `tick` in turn until `finished`, and `close` in any case."""
+    """One robot. The runner calls `sense`, `may_move` and `tick` or `hold` in turn until `finished`, then `close`."""
 
-    def __init__(self, tree: CompiledTree, context: RunContext, journal: Journal | None = None) -> None:
+    def __init__(
+        self,
+        tree: CompiledTree,
+        context: RunContext,
+        keeper: LeaseKeeper,
+        control: Control,
+        journal: Journal | None = None,
+    ) -> None:
         self.context = context
-        self._journal = journal
-        self.root: Behaviour = tree.build(context)
-        self.states: Snapshot = snapshot(self.root)
+        self._keeper, self._control = keeper, control
+        self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal),)
+        self._held = False
+        self._lost_since_s: float | None = None
+        self._preempting: tuple[RobotResult, ...] = ()
         self.result: RobotResult | None = None
         self._pose_due_s = context.clock.now()
-        context.publish(TREE, {"robot": tree.robot_name, "root": node_view(tree.root, self.states).structure()})
 
     @property
     def name(self) -> str:
@@ -55,9 +54,29 @@ class Session:
         return self.context.robot.name
 
     @property
+    def tree(self) -> CompiledTree:
+        """The mission under way."""
+        return self._top.tree
+
+    @property
+    def states(self) -> Snapshot:
+        """The states of all nodes, those of suspended missions included."""
+        if len(self._stack) == 1:
+            return self._top.states
+        merged: dict[str, NodeState] = {}
+        for run in self._stack:
+            merged |= run.states
+        return merged
+
+    @property
     def finished(self) -> bool:
-        """True when the tree has come to an end."""
-        return self.root.status in (Status.SUCCESS, Status.FAILURE)
+        """True when the mission that the robot began with has come to an end."""
+        return self.result is not None or (len(self._stack) == 1 and self._top.finished)
+
+    @property
+    def waiting_at(self) -> str | None:
+        """The breakpoint that the mission under way waits at."""
+        return self._top.waiting_at
 
     def sense(self) -> None:
         """Bring the estimators up to date, and log the pose twice a second."""
@@ -68,78 +87,93 @@ class Session:
             self._pose_due_s += POSE_PERIOD_S
             self._publish_pose()
 
-    def tick(self) -> None:
-        """Tick the tree once and log what changed."""
-        self.root.tick_once()
-        changes = self._log_changes()
-        if self._journal is not None:
-            self._journal.note(self._tick_note(changes))
+    def may_move(self) -> bool:
+        """Whether the lease counts. A lost one suspends the mission until it can be had again.
+
+        Raises nothing; when that takes longer than LEASE_PATIENCE_S, the session is closed with cause EXECUTION.
+        """
+        lost = self._keeper.lost()
+        if lost is None:
+            return True
+        now_s = self.context.clock.now()
+        if self._lost_since_s is None:
+            self._lost_since_s = now_s
+            self._top.suspend()
+            self._control.lease_lost(self.name, lost)
+        if self._keeper.regain():
+            self._lost_since_s = None
+            self._control.lease_lost(self.name, None)
+            return True
+        if now_s - self._lost_since_s > LEASE_PATIENCE_S:
+            message = f"{lost} and did not give it back within {LEASE_PATIENCE_S:g} s"
+            self._control.lease_lost(self.name, None)
+            self.close(Ending(Outcome.FAILURE, Cause.EXECUTION, message))
+        return False
+
+    def tick(self, breakpoints: frozenset[str]) -> bool:
+        """Tick the mission under way once; True when a node changed its status. Its end takes up the one before."""
+        self._held = False
+        changed = self._top.tick(breakpoints)
+        if self._top.finished and len(self._stack) > 1:
+            self._take_up_the_one_before()
+        return changed
+
+    def hold(self) -> None:
+        """Suspend the mission and stop the robot; done once until the next tick."""
+        if not self._held:
+            self._held = True
+            self._top.suspend()
+            if self._lost_since_s is None:
+                self.context.robot.stop(lease=self.context.lease)
+
+    def preempt(self, tree: CompiledTree) -> None:
+        """Suspend the mission under way and begin another; nothing of the one leaks into the other."""
+        self.hold()
+        self._held = False
+        context = replace(self.context, board=Board(slug(tree.robot_name)))
+        self._stack = (*self._stack, TreeRun(tree, context))
+        self._control.mission_begun(self.name, tree)
 
     def close(self, ending: Ending | None = None) -> RobotResult:
-        """Stop the tree and the robot, give the lease back, log the end. Idempotent; raises nothing."""
+        """Stop the trees and the robot, give the lease back, log the end. Idempotent; raises nothing."""
         if self.result is None:
-            self._halt()
-            self._log_changes()
+            for run in reversed(self._stack):
+                run.halt(self._attempt)
             context = self.context
             self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
-            self._attempt("return the lease", lambda: context.robot.return_lease(context.lease))
-            self.result = self._judge(ending)
+            self._attempt("return the lease", self._keeper.give_back)
+            for run in reversed(self._stack[1:]):
+                self._note_end(run.judge(ending))
+            self._stack = self._stack[:1]
+            self.result = self._top.judge(ending, self._preempting)
         return self.result
 
     def log_end(self, ticks: int) -> None:
         """Write the outcome to the log."""
         assert self.result is not None
-        result = self.result
+        self._publish_outcome(self.result, ticks)
+
+    @property
+    def _top(self) -> TreeRun:
+        return self._stack[-1]
+
+    def _take_up_the_one_before(self) -> None:
+        done = self._top
+        done.halt(self._attempt)
+        self._note_end(done.judge(None))
+        self._stack = self._stack[:-1]
+        self._top.show()
+
+    def _note_end(self, result: RobotResult) -> None:
+        """A mission that came in between is over."""
+        self._preempting += (result,)
+        self._control.mission_ended(self.name)
+        self._publish_outcome(result, None)
+
+    def _publish_outcome(self, result: RobotResult, ticks: int | None) -> None:
         end = {"robot": self.name, "outcome": result.outcome, "cause": result.cause, "message": result.message}
-        self.context.publish(OUTCOME, {**end, "answers": result.answers, "ticks": ticks})
-
-    def _halt(self) -> None:
-        """Stop all that runs; results that are there stay in sight. Also after an exception in the middle of a tick."""
-        if not self.finished:
-            self._attempt("stop the tree", lambda: self.root.stop(Status.INVALID))
-        for node in walk(self.root):
-            if isinstance(node, SkillLeaf):
-                self._attempt(f"end {node.path_id}", node.abandon)
-
-    def _judge(self, ending: Ending | None) -> RobotResult:
-        root = self.root
-        cause = root.cause if isinstance(root, Explained) else None
-        message = root.message if isinstance(root, Explained) else root.feedback_message
-        outcome = _OUTCOMES.get(root.status, Outcome.CANCELLED)
-        if outcome is Outcome.FAILURE and cause is Cause.ERROR:
-            outcome = Outcome.ERROR
-        if ending is not None and not self.finished:
-            outcome, cause, message = ending.outcome, ending.cause, ending.message
-        answers = {n.path_id: n.answer for n in walk(root) if isinstance(n, Answer) and n.answer is not None}
-        return RobotResult(self.name, outcome, cause, message, answers, self.states)
-
-    def _log_changes(self) -> Sequence[Transition]:
-        before, self.states = self.states, snapshot(self.root)
-        changes = tuple(transitions(before, self.states))
-        for change in changes:
-            self.context.publish(TRANSITIONS, self._transition(change))
-        return changes
-
-    def _tick_note(self, changes: Sequence[Transition]) -> TickNote:
-        context = self.context
-        estimate = context.localiser.estimate()
-        X_WB = estimate.X_WO @ context.robot.odometry().X_OB
-        pose = Pose2D.from_transform(X_WB) if estimate.localised else None
-        leaves = (node for node in walk(self.root) if isinstance(node, SkillLeaf))
-        checkpoints = {leaf.path_id: leaf.checkpoint for leaf in leaves if leaf.checkpoint}
-        return TickNote(context.clock.now(), changes, context.board.values(), pose, checkpoints)
-
-    def _transition(self, change: Transition) -> dict[str, object]:
-        after = change.after
-        return {
-            "t": round(self.context.clock.now(), 6),
-            "robot": self.name,
-            "node": change.path_id,
-            "from": change.before.status.value,
-            "to": after.status.value,
-            "cause": after.cause,
-            "message": after.message,
-        }
+        more: Mapping[str, object] = {"mission": result.mission} if ticks is None else {"ticks": ticks}
+        self.context.publish(OUTCOME, {**end, "answers": result.answers, **more})
 
     def _publish_pose(self) -> None:
         X_WB = self.context.localiser.estimate().X_WO @ self.context.robot.odometry().X_OB
@@ -165,6 +199,3 @@ class Session:
             call()
         except (Exception, VerbHung):
             self.context.publish(ERROR_TOPIC, {"node": self.name, "what": what, "traceback": traceback.format_exc()})
-
-
-_OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}

@@ -33,6 +33,22 @@ class Transition:
 
 
 Snapshot = Mapping[str, NodeState]
+_IDLE = NodeState()
+
+
+class Observed:
+    """A built tree whose states are read again and again; what did not change is the same object as before."""
+
+    def __init__(self, root: Behaviour) -> None:
+        self.nodes: tuple[Behaviour, ...] = tuple(walk(root))
+        self._explained = tuple(node for node in self.nodes if isinstance(node, Explained))
+        self._last: dict[str, NodeState] = {}
+
+    def snapshot(self) -> Snapshot:
+        """The present state of every explained node, parents first."""
+        last = self._last
+        self._last = {node.path_id: _renewed(last.get(node.path_id), node) for node in self._explained}
+        return self._last
 
 
 def snapshot(root: Behaviour) -> Snapshot:
@@ -43,8 +59,8 @@ def snapshot(root: Behaviour) -> Snapshot:
 def transitions(before: Snapshot, after: Snapshot) -> Iterator[Transition]:
     """What changed between two snapshots of one tree, in the order of the tree; mere new messages do not count."""
     for path_id, state in after.items():
-        old = before.get(path_id, NodeState())
-        if (old.status, old.cause) != (state.status, state.cause):
+        old = before.get(path_id, _IDLE)
+        if old is not state and (old.status, old.cause) != (state.status, state.cause):
             yield Transition(path_id, old, state)
 
 
@@ -62,6 +78,20 @@ def running_message(root: Behaviour) -> tuple[str, str, float | None]:
         return "", "", None
     state = _state(running[-1])
     return running[-1].path_id, state.message, state.progress
+
+
+def _renewed(last: NodeState | None, node: Explained) -> NodeState:
+    """The last state where it still holds, else a new one."""
+    assert isinstance(node, Behaviour)
+    if (
+        last is not None
+        and last.status is node.status
+        and last.message == node.message
+        and last.cause is node.cause
+        and last.progress == (node.progress if isinstance(node, SkillLeaf) else None)
+    ):
+        return last
+    return _state(node)
 
 
 def _state(node: Behaviour) -> NodeState:

@@ -6,7 +6,9 @@ import functools
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
+from queue import SimpleQueue
 from types import FrameType
 from typing import Any, cast
 
@@ -40,9 +42,12 @@ class _Watched:
 def watched(robot: Robot, *, limit_s: float = VERB_LIMIT_S, image_limit_s: float = IMAGE_LIMIT_S) -> Robot:
     """The robot with the watchdog around each verb.
 
-    A verb called from the main thread that takes longer than its limit on the wall's clock is broken off by an alarm
-    and raises `VerbHung`. A verb that hangs inside compiled code without giving way to Python is broken off when it
-    returns. Calls from other threads (images taken by a worker) are not watched.
+    A verb that takes longer than its limit on the wall's clock raises `VerbHung`. Called from the main thread, it is
+    broken off by an alarm. Called from another thread, it is done by a helper thread, and waited for no longer.
+
+    What this cannot do: an alarm breaks off compiled code only when that returns to Python; and a helper thread
+    cannot be broken off, so what hangs in it may still act when it comes back. By then the run has stopped the robot
+    and returned the lease, under which such a late command is refused.
     """
     return cast(Robot, _Watched(robot, limit_s, image_limit_s))
 
@@ -51,7 +56,7 @@ def _watched_call(call: Callable[..., Any], verb: str, limit_s: float) -> Callab
     @functools.wraps(call)
     def guarded(*arguments: Any, **options: Any) -> Any:
         if threading.current_thread() is not threading.main_thread():
-            return call(*arguments, **options)
+            return _helped(functools.partial(call, *arguments, **options), verb, limit_s)
         with _alarm(verb, limit_s):
             return call(*arguments, **options)
 
@@ -61,7 +66,7 @@ def _watched_call(call: Callable[..., Any], verb: str, limit_s: float) -> Callab
 @contextmanager
 def _alarm(verb: str, limit_s: float) -> Iterator[None]:
     def ring(_signal: int, _frame: FrameType | None) -> None:
-        raise VerbHung(f"the robot did not answer '{verb}' within {limit_s:g} s")
+        raise _hung(verb, limit_s)
 
     before = signal.signal(signal.SIGALRM, ring)
     signal.setitimer(signal.ITIMER_REAL, limit_s)
@@ -70,3 +75,50 @@ def _alarm(verb: str, limit_s: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+class _Helper:
+    """A thread that does one call after the other for its owner, and ends when the owner lets go of it."""
+
+    def __init__(self) -> None:
+        self._calls: SimpleQueue[_Call | None] = SimpleQueue()
+        threading.Thread(target=_work_off, args=(self._calls,), name="errand-verbs", daemon=True).start()
+
+    def do(self, call: Callable[[], Any]) -> Future[Any]:
+        """Have `call` done."""
+        future: Future[Any] = Future()
+        self._calls.put((call, future))
+        return future
+
+    def __del__(self) -> None:
+        self._calls.put(None)
+
+
+_Call = tuple[Callable[[], Any], Future[Any]]
+_helpers = threading.local()
+
+
+def _work_off(calls: SimpleQueue[_Call | None]) -> None:
+    for call, future in iter(calls.get, None):
+        try:
+            future.set_result(call())
+        except BaseException as defect:
+            future.set_exception(defect)
+
+
+def _helped(call: Callable[[], Any], verb: str, limit_s: float) -> Any:
+    """The call's result, done by this thread's helper; a helper that hangs is left to itself."""
+    if not hasattr(_helpers, "mine"):
+        _helpers.mine = _Helper()
+    future = _helpers.mine.do(call)
+    try:
+        return future.result(timeout=limit_s)
+    except TimeoutError:
+        if future.done():
+            raise
+        del _helpers.mine
+        raise _hung(verb, limit_s) from None
+
+
+def _hung(verb: str, limit_s: float) -> VerbHung:
+    return VerbHung(f"the robot did not answer '{verb}' within {limit_s:g} s")

@@ -15,10 +15,11 @@ from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Request
 from executive.cli.souvenirs import Souvenirs, draw_souvenirs
 from executive.compiler import CompiledTree
+from executive.control import Control
 from executive.outcome import RunResult
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
-from executive.runner import CancelToken, Observer, RunSettings, run
+from executive.runner import Observer, RunSettings, run
 from executive.view.model import NodeView, node_view
 from executive.view.svg import to_svg
 from executive.worker import LockStepWorker
@@ -33,9 +34,18 @@ class Finished:
 
 
 def run_request(
-    request: Request, tree: CompiledTree, *, seed: int, out: Path, record: bool, observer: Observer | None = None
+    request: Request,
+    tree: CompiledTree,
+    *,
+    seed: int,
+    out: Path,
+    record: bool,
+    observer: Observer | None = None,
+    control: Control | None = None,
 ) -> Finished:
     """Run a compiled request in the plant and write log, tree, recording and pictures into `out`.
+
+    The observer is told after each tick; through `control` the run is held, cancelled, and so on.
 
     Raises:
         InputError: the world cannot be used.
@@ -47,14 +57,14 @@ def run_request(
     souvenirs = Souvenirs(log)
     try:
         announce(log, clock, tree, request.knowledge, world=request.world.name, seed=seed)
-        with cancelled_by_signals() as cancel:
+        with cancelled_by_signals(control or Control(pace=None)) as heeded:
             result = run(
                 [entry],
                 clock=clock,
                 worker=LockStepWorker(clock),
                 publish=souvenirs,
                 settings=RunSettings(seed=seed),
-                cancel=cancel,
+                control=heeded,
                 observer=observer,
             )
     finally:
@@ -88,21 +98,22 @@ def _report(request: Request, result: RunResult, referee: RefereeReport, *, seed
 
 
 @contextmanager
-def cancelled_by_signals() -> Iterator[CancelToken]:
-    """A token that Ctrl-C and a polite kill set; a second Ctrl-C breaks in at once."""
-    cancel = CancelToken()
+def cancelled_by_signals(control: Control) -> Iterator[Control]:
+    """The control, which Ctrl-C and a polite kill cancel; a second Ctrl-C breaks in at once."""
+    asked: list[int] = []
 
     def on_signal(number: int, _frame: FrameType | None) -> None:
-        if cancel.reason is not None:
+        if asked:
             raise KeyboardInterrupt
-        cancel.request(f"cancelled by {signal.Signals(number).name}")
+        asked.append(number)
+        control.cancel(f"cancelled by {signal.Signals(number).name}")
 
     if threading.current_thread() is not threading.main_thread():
-        yield cancel
+        yield control
         return
     before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield cancel
+        yield control
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

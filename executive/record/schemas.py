@@ -15,6 +15,7 @@ POSE: Final = "pose"
 OUTCOME: Final = "outcome"
 RUN: Final = "run"
 WALL: Final = "wall"
+CONTROL: Final = "control"
 ERRORS: Final = "errors"
 PATH: Final = "path"
 MAP: Final = "map"
@@ -108,6 +109,7 @@ SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType(
             },
         ),
         ERRORS: Schema("errand.Error", _fields("string", "node", "what", "traceback")),
+        CONTROL: Schema("errand.Control", {**_fields("string", "what", "message"), **_fields("number", "t")}),
         WALL: Schema(
             "errand.Wall",
             {

@@ -63,7 +63,8 @@ class ScriptedRobot:
         self.clock = clock
         self.holding = False
         self.driving = False
-        self.holder: str | None = None
+        self.lease: Lease | None = None
+        self.leases = 0
         self.calls: list[str] = []
         self.raising: dict[str, BaseException] = {}
 
@@ -94,15 +95,29 @@ class ScriptedRobot:
     def command_status(self, command: CommandId) -> CommandStatus:
         return CommandStatus(CommandState.DONE)
 
+    @property
+    def holder(self) -> str | None:
+        return self.lease.holder if self.lease else None
+
+    @holder.setter
+    def holder(self, name: str | None) -> None:
+        self.leases += 1
+        self.lease = Lease(self.name, name, self.leases) if name else None
+
+    def lease_holder(self) -> Lease | None:
+        return self.lease
+
     def acquire_lease(self, holder: str) -> Lease:
         if self.holder is not None:
             raise LeaseError(f"{self.holder} holds the lease of {self.name}")
         self.holder = holder
-        return Lease(self.name, holder, 1)
+        assert self.lease is not None
+        return self.lease
 
     def return_lease(self, lease: Lease) -> None:
         self._called("return_lease")
-        self.holder = None
+        if lease == self.lease:
+            self.lease, self.driving = None, False
 
 
 class StillLocaliser:

@@ -8,8 +8,9 @@ from py_trees.common import Status
 
 from executive.command import parse_command
 from executive.compiler import Step, compile_commands
+from executive.control import Control
 from executive.outcome import Outcome
-from executive.runner import CancelToken, RunEntry, RunSettings, run
+from executive.runner import RunEntry, RunSettings, run
 from executive.worker import LockStepWorker
 from skills.api import Cause, Failed, Succeeded
 
@@ -129,13 +130,13 @@ LEAVES = [
 
 @pytest.mark.parametrize("leaf", LEAVES)
 def test_cancel_in_every_leaf_stops_the_robot(compiled, run_tree, make, robot, script, leaf):
-    path_id, cancel = f"alice/fetch-drink/{leaf}", CancelToken()
+    path_id, control = f"alice/fetch-drink/{leaf}", Control(pace=None)
 
     def observe(progress):
         if progress.states["Alice"][path_id].status is Status.RUNNING:
-            cancel.request("enough")
+            control.cancel("enough")
 
-    result = run_tree(compiled(*make.FETCH), observer=observe, cancel=cancel)
+    result = run_tree(compiled(*make.FETCH), observer=observe, control=control)
     assert (result.outcome, result.worst.cause, result.worst.message) == (Outcome.CANCELLED, Cause.CANCELLED, "enough")
     assert result.worst.states[path_id].cause is Cause.CANCELLED
     assert (robot.driving, robot.holder) == (False, None)
@@ -144,9 +145,9 @@ def test_cancel_in_every_leaf_stops_the_robot(compiled, run_tree, make, robot, s
 
 @pytest.mark.parametrize("tick", range(16))
 def test_cancel_at_every_tick_stops_the_robot(compiled, run_tree, make, robot, script, tick):
-    cancel = CancelToken()
+    control = Control(pace=None)
     result = run_tree(
-        compiled(*make.FETCH), observer=lambda p: cancel.request("enough") if p.ticks > tick else None, cancel=cancel
+        compiled(*make.FETCH), observer=lambda p: control.cancel("enough") if p.ticks > tick else None, control=control
     )
     assert result.ticks <= tick + 1
     assert (robot.driving, robot.holder) == (False, None)

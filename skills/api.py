@@ -268,6 +268,7 @@ class Skill(ABC, Generic[InputsT]):
     `Inputs` is a frozen dataclass whose fields are the input ports (defaults allowed); `outputs` names the output
     ports and their types; `causes` documents which failures it gives and when. `default_timeout_s` counts the
     robot's clock. `checkpoint` holds what a later `resume` needs beyond the inputs, as JSON values; it is kept durably.
+    `changes_world` marks what must not be done twice: after a restart such a skill is told to `resume` and looks first.
     `max_data_age_s` says how old (s) the data may be on which a success rests, by name: a sense verb (not `image`),
     "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.
     """
@@ -278,6 +279,7 @@ class Skill(ABC, Generic[InputsT]):
     causes: ClassVar[Mapping[Cause, str]] = {}
     default_timeout_s: ClassVar[float] = 60.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {}
+    changes_world: ClassVar[bool] = False
     checkpoint: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, context: SkillContext) -> None:
@@ -308,3 +310,10 @@ class Skill(ABC, Generic[InputsT]):
         By default the attempt begins anew. Override it where that would undo or repeat what is done already.
         """
         self.begin(inputs)
+
+    def undone(self, inputs: InputsT) -> str | None:
+        """After a restart: why what an earlier success brought about is no longer so; None when it is, or is not seen.
+
+        Looks at what the sensors tell at once; moves nothing. Half a sentence, such as "the jaw is empty".
+        """
+        return None

@@ -11,8 +11,14 @@ from skills.api import Cause, Failed, Skill, Succeeded
 _TOLERANCE_S = 1e-6
 
 
+class Remembered(Succeeded):
+    """A success from before a restart: its data was fresh then."""
+
+
 def refuse_stale(skill: type[Skill[Any]], success: Succeeded, context: RunContext) -> Succeeded | Failed:
     """The success, or a failed postcondition when data that it rests on is older than the skill allows."""
+    if isinstance(success, Remembered):
+        return success
     for source, most_s in skill.max_data_age_s.items():
         stamp_s = _stamp_s(source, success.outputs, context)
         if stamp_s is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -26,6 +27,7 @@ YAW_TOLERANCE_RAD = 0.08
 SPEED_M_S = 0.5
 _MOST_TRIES = 3
 _GOOD_GRASP = 0.1
+_STILL_BEFORE_M = 1.3
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,12 @@ class Approach(ArmSkill[ApproachInputs]):
             yield from self.stow()
             yield from self.go_to_one([place.pose for place in places[:_MOST_TRIES]])
         return (yield from self._look_again(inputs))
+
+    def undone(self, inputs: ApproachInputs) -> str | None:
+        """The robot's place tells."""
+        (x, y, _), pose = inputs.observation.position_W, self.context.pose()
+        off_m = math.hypot(x - pose.x_m, y - pose.y_m)
+        return None if off_m < _STILL_BEFORE_M else f"the robot is {off_m:.1f} m from the {inputs.observation.thing}"
 
     def go_to_one(self, poses: list[Pose2D]) -> Routine[None]:
         """Drive to the first of some poses to which there is a way."""

@@ -18,11 +18,11 @@ from skills.detect.appearance import load_appearance
 from skills.detect.interim_segmentation import Cluster, SurfaceView, sightings, view_surface
 from skills.detect.looking import cluster_boxes, surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, plan_grasp
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, plan_grasp
 from skills.grasp.posture import body_height_m
 from skills.robot import FloatArray, Image
 
-GRASP_FORCE_N = 60.0
+GRASP_FORCE_N = 80.0
 _LOOK_HALF_SIDE_M = 0.4
 _SAME_THING_M = 0.12
 _CLOSED_RAD = 0.06
@@ -64,6 +64,11 @@ class Grasp(ArmSkill[GraspInputs]):
     }
     default_timeout_s = 120.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
+    changes_world = True
+
+    def undone(self, inputs: GraspInputs) -> str | None:
+        """The jaw tells."""
+        return None if self.context.robot.gripper().holding else f"the {inputs.observation.thing} is not in the jaw"
 
     def run(self, inputs: GraspInputs) -> Routine[Succeeded]:
         """Look, plan, take, lift, carry."""
@@ -159,9 +164,22 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.move_gripper(0.0, GRASP_FORCE_N, f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
-        yield from self.shift_hand(plan.lift_B, f"lifting the {thing}")
+        yield from self._lift(plan.lift_B, f"lifting the {thing}")
         yield from self.pause(0.3, f"lifting the {thing}")
         self._check_held(thing, opening)
+
+    def _lift(self, planned_B: FloatArray, message: str) -> Routine[None]:
+        """Lift as planned or, where the hand came to stand otherwise, in another way. Raises SkillFailure."""
+        others = lifts(self.model, self.model.X_BH(self.q_rad()), self._up_B())
+        for lift_B in (planned_B, *others):
+            try:
+                yield from self.shift_hand(lift_B, message)
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING:
+                    raise
+            else:
+                return
+        raise SkillFailure(Cause.PLANNING, "the arm cannot lift the thing from where it has hold of it")
 
     def _check_held(self, thing: str, opening_before_rad: float | None) -> float:
         gripper = self.context.robot.gripper()

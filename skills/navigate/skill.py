@@ -18,6 +18,8 @@ from skills.navigate.path import Path
 from skills.navigate.planner import PlanningError, problem_of, solve
 from skills.robot import Pose2D
 
+_STILL_THERE_M = 1.0
+
 
 @dataclass(frozen=True)
 class NavigateInputs:
@@ -96,6 +98,12 @@ class Navigate(Skill[NavigateInputs]):
     def end(self) -> None:
         """Stop what this skill set in motion."""
         self._base.stop()
+
+    def undone(self, inputs: NavigateInputs) -> str | None:
+        """The robot's place tells; skills that came after may have gone a little aside."""
+        pose, goal = self.context.pose(), inputs.goal
+        off_m = math.hypot(goal.x_m - pose.x_m, goal.y_m - pose.y_m)
+        return None if off_m < _STILL_THERE_M else f"the robot is {off_m:.1f} m from where it went"
 
     def _now(self) -> float:
         return self.context.clock.now()

@@ -54,6 +54,11 @@ class Place(ArmSkill[PlaceInputs]):
     }
     default_timeout_s = 150.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
+    changes_world = True
+
+    def undone(self, inputs: PlaceInputs) -> str | None:
+        """The jaw tells."""
+        return "the thing is still in the jaw" if self.context.robot.gripper().holding else None
 
     def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
         """Go near, look, put down, look again."""

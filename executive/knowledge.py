@@ -6,14 +6,25 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.class_ids import CLASS_IDS
 from executive.command import Task
 from executive.errors import InputError, did_you_mean, listing
 from executive.yaml_source import YamlSource, read_yaml, validate
 
-__all__ = ["Knowledge", "Person", "Place", "Pose", "RobotFacts", "SurfaceFacts", "ThingFacts", "knowledge_of_source", "load_knowledge"]
+__all__ = [
+    "BatteryFacts",
+    "Knowledge",
+    "Person",
+    "Place",
+    "Pose",
+    "RobotFacts",
+    "SurfaceFacts",
+    "ThingFacts",
+    "knowledge_of_source",
+    "load_knowledge",
+]
 
 Corner = tuple[float, float]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
@@ -35,6 +46,19 @@ class RobotFacts(_Facts):
     """The robot: the name by which it is spoken to."""
 
     name: Annotated[str, Field(min_length=1)]
+
+
+class BatteryFacts(_Facts):
+    """When the robot goes to the dock and until when it charges there; states of charge from 0 to 1."""
+
+    low: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.15
+    charged: Annotated[float, Field(gt=0.0, le=1.0)] = 0.8
+
+    @model_validator(mode="after")
+    def _in_order(self) -> BatteryFacts:
+        if self.charged <= self.low:
+            raise ValueError("'charged' must be above 'low', or the robot never leaves the dock")
+        return self
 
 
 class Place(_Facts):
@@ -77,6 +101,7 @@ class Knowledge(_Facts):
     robot: RobotFacts
     start: Pose
     dock: Pose
+    battery: BatteryFacts = BatteryFacts()
     places: dict[str, Place]
     surfaces: dict[str, SurfaceFacts]
     things: dict[str, ThingFacts]

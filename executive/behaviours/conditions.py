@@ -6,12 +6,14 @@ A condition answers with None when it holds, `Failed` when it does not, and `Wai
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 from executive.behaviours.context import RunContext
 from skills.api import Cause, Failed
+from skills.robot import Pose2D
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,59 @@ class BatteryAbove:
         if charge >= self._least:
             return None
         return Failed(Cause.PRECONDITION, f"the battery is at {charge:.0%}, less than {self._least:.0%}")
+
+
+class StopReleased:
+    """No stop button is pressed. The mission stands still as long as one is."""
+
+    def begin(self, context: RunContext) -> None:
+        """Nothing is remembered."""
+
+    def violated(self, context: RunContext) -> Verdict:
+        """Waiting while it is pressed."""
+        pressed = context.stop_pressed()
+        return None if pressed is None else Waiting(pressed)
+
+
+class LeaseHeld:
+    """Nobody else may move the robot. The mission stands still as long as somebody does."""
+
+    def begin(self, context: RunContext) -> None:
+        """Nothing is remembered."""
+
+    def violated(self, context: RunContext) -> Verdict:
+        """Waiting while another holds the lease."""
+        held = context.robot.lease_holder()
+        if held is None or held.holder == context.lease.holder:
+            return None
+        return Waiting(f"{held.holder} holds the lease of {context.robot.name}")
+
+
+class BatteryReserve:
+    """The charge (0 to 1) is at least `low`, and enough for the way to the dock; PRECONDITION when not.
+
+    The way is taken as twice the distance as the crow flies, at `per_m` of charge for each metre.
+    """
+
+    def __init__(self, low: float, dock: Pose2D, per_m: float = 0.0008) -> None:
+        self._low, self._dock, self._per_m = low, dock, per_m
+
+    def begin(self, context: RunContext) -> None:
+        """Nothing is remembered."""
+
+    def violated(self, context: RunContext) -> Verdict:
+        """A failure when the charge is below."""
+        battery, here = context.robot.battery(), context.for_skill("").pose()
+        way_m = 2.0 * math.hypot(here.x_m - self._dock.x_m, here.y_m - self._dock.y_m)
+        least = max(self._low, self._per_m * way_m)
+        if battery.charge >= least:
+            return None
+        return Failed(Cause.PRECONDITION, f"the battery is at {battery.charge:.0%}, less than {least:.0%}")
+
+
+def battery_reserve(low: float, dock: Pose2D, freshness: Freshness = Freshness(10.0, StaleData.ACCEPT)) -> Condition:
+    """Enough charge is left for some work and for the way to the dock."""
+    return Fresh(BatteryReserve(low, dock), "the battery", lambda c: c.robot.battery().stamp_s, freshness)
 
 
 def battery_above(least: float, freshness: Freshness = Freshness(10.0, StaleData.ACCEPT)) -> Condition:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from executive.behaviours.board import Board
@@ -16,9 +17,17 @@ def leaf_seed(run_seed: int, path_id: str) -> int:
     return int.from_bytes(digest[:4], "big")
 
 
+def never_pressed() -> str | None:
+    """The answer where there is no stop button."""
+    return None
+
+
 @dataclass(frozen=True)
 class RunContext:
-    """One robot, its lease, its estimators, and what the run lends to all nodes of its tree."""
+    """One robot, its lease, its estimators, and what the run lends to all nodes of its tree.
+
+    `stop_pressed` says why nothing may move while a stop button is pressed, else None.
+    """
 
     robot: Robot
     lease: Lease
@@ -30,6 +39,7 @@ class RunContext:
     seed: int
     board: Board
     ask: Ask = nobody_to_ask
+    stop_pressed: Callable[[], str | None] = never_pressed
 
     def for_skill(self, path_id: str) -> SkillContext:
         """The part of it that a skill may touch."""

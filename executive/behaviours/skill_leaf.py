@@ -65,6 +65,11 @@ class SkillLeaf(Explained, Behaviour):
         return {} if self._skill is None else self._skill.checkpoint
 
     @property
+    def skill_name(self) -> str:
+        """The registered name of the skill."""
+        return self._skill_class.name
+
+    @property
     def suspended(self) -> bool:
         """True between `suspend` and the next tick."""
         return self.active and self._time.stopped

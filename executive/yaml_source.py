@@ -128,9 +128,7 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
         return model.model_validate(source.data)
     except ValidationError as error:
         first, *others = [_input_error(model, source, fault) for fault in _telling(error.errors(), source)]
-        raise InputError(
-            first.message, mend=first.mend, file=first.file, line=first.line, others=others
-        ) from error
+        raise InputError(first.message, mend=first.mend, file=first.file, line=first.line, others=others) from error
 
 
 def _telling(errors: list[ErrorDetails], source: YamlSource) -> list[ErrorDetails]:

@@ -162,7 +162,9 @@ class KnownPlan(NodePlan):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Decorator(NodePlan):
+class DecoratorPlan(NodePlan):
+    """A node with one node below."""
+
     child: NodePlan
 
     @property
@@ -172,7 +174,7 @@ class _Decorator(NodePlan):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RetryPlan(_Decorator):
+class RetryPlan(DecoratorPlan):
     """Up to `attempts` attempts, after failures of the given causes only, and not when the node `final` failed."""
 
     kind: ClassVar[str] = "retry"
@@ -193,7 +195,7 @@ class RetryPlan(_Decorator):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimeoutPlan(_Decorator):
+class TimeoutPlan(DecoratorPlan):
     """A limit on the robot's clock."""
 
     kind: ClassVar[str] = "timeout"
@@ -206,7 +208,7 @@ class TimeoutPlan(_Decorator):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HoldingPlan(_Decorator):
+class HoldingPlan(DecoratorPlan):
     """A guard: the gripper holds `thing` as long as the nodes below run."""
 
     kind: ClassVar[str] = "guard"
@@ -219,7 +221,7 @@ class HoldingPlan(_Decorator):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnswerPlan(_Decorator):
+class AnswerPlan(DecoratorPlan):
     """Turns the search below into a yes or no; `looks` names for each surface the leaves that look at it."""
 
     kind: ClassVar[str] = "answer"

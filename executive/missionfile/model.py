@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from executive.behaviours.conditions import StaleData
 from executive.command import Command
 from executive.compiling.plans import Source
 from executive.errors import InputError
@@ -54,12 +55,14 @@ class StepGuards:
     """What must hold while a step runs.
 
     `battery` is the least charge (0 to 1), `localised` that the robot knows where it is, `time_s` that no more than
-    so many seconds have passed on the robot's clock since the run began.
+    so many seconds have passed on the robot's clock since the run began; `stale` says what old readings mean (None:
+    an old charge is accepted, an old place is waited for).
     """
 
     battery: float | None = None
     localised: bool = False
     time_s: float | None = None
+    stale: StaleData | None = None
 
 
 @dataclass(frozen=True)

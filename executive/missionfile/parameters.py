@@ -45,7 +45,9 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
         if value is None:
             mend = f"give it a default, or 'with: {{{name}: ...}}' where the file is used"
             raise source.error((DECLARED, name), f"parameter '{name}' has no value", mend)
-    data = {key: part if key == DECLARED else _put_in(part, values, source, (key,)) for key, part in source.data.items()}
+    data = {
+        key: part if key == DECLARED else _put_in(part, values, source, (key,)) for key, part in source.data.items()
+    }
     return replace(source, data=data)
 
 

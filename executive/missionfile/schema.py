@@ -10,10 +10,18 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StrictBool, StrictInt, model_validator
 
+from executive.behaviours.conditions import StaleData
 from executive.command import Task
 from executive.errors import InputError, listing
-from executive.missionfile.model import DEFAULT_WORLD, KeyPath, OnFailure, OperatorQuestion, SourceLine
-from executive.missionfile.model import StepGuards, StepPolicy
+from executive.missionfile.model import (
+    DEFAULT_WORLD,
+    KeyPath,
+    OnFailure,
+    OperatorQuestion,
+    SourceLine,
+    StepGuards,
+    StepPolicy,
+)
 from executive.yaml_source import YamlSource
 
 __all__ = ["AskFile", "GuardsFile", "MissionFile", "PolicyFile", "StepFile", "mission_json_schema", "schema_text"]
@@ -39,6 +47,11 @@ class GuardsFile(_Strict):
     localised: StrictBool | None = Field(None, description="Whether the robot must know where it is.")
     time: Seconds | None = Field(
         None, description="The most seconds on the robot's clock since the run began; later than that it fails."
+    )
+    stale: StaleData | None = Field(
+        None,
+        description="What an old reading means. wait: stand still for a new one. fail: the guard does not hold. "
+        "accept: judge by the old one.",
     )
 
 
@@ -80,7 +93,7 @@ class PolicyFile(_Strict):
             retries=(ONCE if on_failure is OnFailure.RETRY else 0) if retries is None else retries,
             on_failure=on_failure,
             question=OperatorQuestion(ask.text, ask.limit, ask.default),
-            guards=StepGuards(guards.battery, bool(guards.localised), guards.time),
+            guards=StepGuards(guards.battery, bool(guards.localised), guards.time, guards.stale),
         )
 
     def _own_or(self, below: PolicyFile | None, key: str) -> Any:
@@ -135,7 +148,8 @@ class MissionFile(PolicyFile):
         None, description="Laid over the world's knowledge: what stands here replaces what stands there, key by key."
     )
     parameters: dict[str, Scalar] | None = Field(
-        None, description="Parameters with their defaults, read as ${name} in values; without a default one must be given."
+        None,
+        description="Parameters with their defaults, read as ${name} in values; without a default one must be given.",
     )
     each: PolicyFile | None = Field(None, description="The policy of every step that does not say otherwise.")
     steps: Annotated[tuple[StepFile, ...], Field(min_length=1)] = Field(description="What to do, one after the other.")
@@ -202,5 +216,3 @@ def _open_to_parameters(node: Any) -> Any:
         return opened
     outside = {key: opened.pop(key) for key in ("default", "description") if key in opened}
     return {"anyOf": [opened, dict(_PARAMETER)], **outside}
-
-

@@ -30,7 +30,7 @@ class JawGeometry:
     """
 
     palm_x: float = 0.142
-    tip_x: float = 0.246
+    tip_x: float = 0.250
     fixed_z: float = -0.038
     clearance: float = 0.010
     low_clearance: float = 0.017

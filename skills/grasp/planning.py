@@ -16,7 +16,7 @@ from skills.grasp.candidates import GraspCandidate
 from skills.robot import ArmTrajectory, FloatArray
 
 PREGRASPS_M = (0.12, 0.07)
-LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08))
+LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0))
 """Ways to lift, up and back towards the shoulder, the best first."""
 APPROACH_SPEED_RAD_S = 0.4
 _FINAL_PADDING_M = 0.003
@@ -91,11 +91,11 @@ def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, m
     X_BH, distance = candidate.X_BH, PREGRASPS_M[-1]
     if not (model.inverse(X_BH, margin_rad) and model.inverse(candidate.retreated(distance), margin_rad)):
         return False
-    lifted = (X_BH.translation() + offset for offset in _lifts(model, X_BH, up_B))
+    lifted = (X_BH.translation() + offset for offset in lifts(model, X_BH, up_B))
     return any(model.inverse(RigidTransform(X_BH.rotation(), p), margin_rad) for p in lifted)
 
 
-def _lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[FloatArray]:
+def lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[FloatArray]:
     """Ways to lift from a grasp, the best first."""
     back = (model.p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
     back = back / max(float(np.linalg.norm(back)), 1e-6)
@@ -105,7 +105,7 @@ def _lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[Floa
 def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray) -> FloatArray:
     """The first way to lift that the arm can follow. Raises PlanningError."""
     X_BH = scene.model.X_BH(q_rad)
-    for lift_B in _lifts(scene.model, X_BH, up_B):
+    for lift_B in lifts(scene.model, X_BH, up_B):
         try:
             plan_line(scene.model, q_rad, RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B))
         except PlanningError:

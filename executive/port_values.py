@@ -77,7 +77,7 @@ def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> 
     special = _SPECIAL.get(hint) if isinstance(hint, type) else None
     if special is not None and not isinstance(value, dict | list):
         return special(value, knowledge, path)
-    if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+    if _is_record(hint):
         return _record(value, hint, knowledge, path)
     if isinstance(hint, type) and issubclass(hint, enum.Enum):
         return _word(value, hint, path)
@@ -94,7 +94,7 @@ def _named(key: str, names: Iterable[str]) -> str | None:
 
 def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable[str]) -> str:
     """The one port whose type has all these fields."""
-    records = {port: field_types(hint) for port, hint in hints.items() if dataclasses.is_dataclass(hint)}
+    records = {port: field_types(hint) for port, hint in hints.items() if _is_record(hint)}
     fitting = [
         port for port, fields in records.items() if port not in taken and all(_named(key, fields) for key in loose)
     ]
@@ -106,6 +106,10 @@ def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable
     near = did_you_mean(wrong, known)
     ports = f"its ports are {listing(hints)}" if hints else "it has no input ports"
     raise PortValueError((wrong,), f"there is no input port '{wrong}'", f"did you mean '{near}'?" if near else ports)
+
+
+def _is_record(hint: Any) -> bool:
+    return isinstance(hint, type) and dataclasses.is_dataclass(hint)
 
 
 def _union(value: Any, options: tuple[Any, ...], knowledge: Knowledge, path: Path) -> Any:

@@ -64,7 +64,7 @@ def read_yaml(path: Path | str) -> YamlSource:
         raise InputError(what, mend="mend the indentation, brackets or quotes here", file=file, line=line) from error
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
-        what = f"broken YAML: the character {chr(error.character)!r} cannot stand in a text"  # type: ignore[arg-type]
+        what = f"broken YAML: the character {chr(error.character)!r} cannot stand in a text"
         raise InputError(what, mend="remove it", file=file, line=line) from error
     except (yaml.YAMLError, ValueError) as error:
         raise InputError(f"broken YAML: {error}", mend="mend it", file=file, line=1) from error
@@ -95,7 +95,11 @@ def _refuse_aliases(text: str, file: Path) -> None:
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
             what = f"the alias '*{event.anchor}' cannot be used here"
-            raise InputError(what, mend="write it out", file=file, line=event.start_mark.line + 1)
+            raise InputError(what, mend="write it out", file=file, line=_line(event))
+
+
+def _line(event: yaml.Event) -> int:
+    return 1 if event.start_mark is None else event.start_mark.line + 1
 
 
 def _plain(root: yaml.Node) -> Any:

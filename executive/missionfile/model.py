@@ -67,7 +67,7 @@ class StepGuards:
 
 @dataclass(frozen=True)
 class StepPolicy:
-    """How a step, or a whole mission, runs: a limit for each attempt, further attempts, guards, and what if it fails."""
+    """How a step or a mission runs: a limit for each attempt, further attempts, guards, and what if it fails."""
 
     timeout_s: float | None = None
     retries: int = 0

@@ -1,7 +1,7 @@
 """Parameters of mission files: `${name}` in a value stands for what the parameter holds; `$${` is a plain `${`.
 
-A value that is nothing but `${name}` takes the parameter's own type, so that `timeout: ${limit}` can be a number; within
-a longer text the parameter's text is put in.
+A value that is nothing but `${name}` takes the parameter's own type, so that `timeout: ${limit}` can be a number;
+within a longer text the parameter's text is put in.
 """
 
 from __future__ import annotations

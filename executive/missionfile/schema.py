@@ -87,13 +87,16 @@ class PolicyFile(_Strict):
         """This policy, with what it leaves open taken from `below`."""
         on_failure = self._own_or(below, "on_failure") or OnFailure.STOP
         retries = self._own_or(below, "retries")
-        ask, guards = self._own_or(below, "ask") or AskFile(), self._own_or(below, "guards") or GuardsFile()
+        ask: AskFile | None = self._own_or(below, "ask")
+        guards: GuardsFile | None = self._own_or(below, "guards")
         return StepPolicy(
             timeout_s=self._own_or(below, "timeout"),
             retries=(ONCE if on_failure is OnFailure.RETRY else 0) if retries is None else retries,
             on_failure=on_failure,
-            question=OperatorQuestion(ask.text, ask.limit, ask.default),
-            guards=StepGuards(guards.battery, bool(guards.localised), guards.time, guards.stale),
+            question=OperatorQuestion() if ask is None else OperatorQuestion(ask.text, ask.limit, ask.default),
+            guards=StepGuards()
+            if guards is None
+            else StepGuards(guards.battery, bool(guards.localised), guards.time, guards.stale),
         )
 
     def _own_or(self, below: PolicyFile | None, key: str) -> Any:
@@ -149,7 +152,7 @@ class MissionFile(PolicyFile):
     )
     parameters: dict[str, Scalar] | None = Field(
         None,
-        description="Parameters with their defaults, read as ${name} in values; without a default one must be given.",
+        description="Parameters with their defaults, read as ${name} in values; one without a default must be given.",
     )
     each: PolicyFile | None = Field(None, description="The policy of every step that does not say otherwise.")
     steps: Annotated[tuple[StepFile, ...], Field(min_length=1)] = Field(description="What to do, one after the other.")

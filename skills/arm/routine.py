@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Generator
-from typing import TypeVar
+from collections.abc import Callable, Generator, Mapping
+from typing import Any, TypeVar
 
 from skills.api import Cause, Failed, InputsT, Running, Skill, SkillContext, Step, Succeeded
 from skills.robot import ArmTrajectory, CommandId, CommandState
@@ -20,12 +20,13 @@ HEIGHT_TOLERANCE_M = 0.02
 
 
 class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program error
-    """Ends a routine: the cause and one plain sentence."""
+    """Ends a routine: the cause, one plain sentence, and what was learnt for the next attempt (see `Failed`)."""
 
-    def __init__(self, cause: Cause, message: str) -> None:
+    def __init__(self, cause: Cause, message: str, outputs: Mapping[str, Any] | None = None) -> None:
         super().__init__(message)
         self.cause = cause
         self.message = message
+        self.outputs: Mapping[str, Any] = outputs or {}
 
 
 class PlanningError(Exception):
@@ -68,7 +69,7 @@ class RoutineSkill(Skill[InputsT]):
             assert isinstance(finished.value, Succeeded)
             return finished.value
         except SkillFailure as failure:
-            return Failed(failure.cause, failure.message)
+            return Failed(failure.cause, failure.message, failure.outputs)
 
     def end(self) -> None:
         """Drop the routine and stop its commands that still run."""

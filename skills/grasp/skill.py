@@ -18,6 +18,7 @@ from skills.detect.appearance import load_appearance
 from skills.detect.interim_segmentation import Cluster, SurfaceView, sightings, view_surface
 from skills.detect.looking import cluster_boxes, surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, plan_grasp
 from skills.grasp.posture import body_height_m
 from skills.robot import FloatArray, Image
@@ -36,9 +37,10 @@ _LIFT_AGAIN_M = 0.1
 
 @dataclass(frozen=True)
 class GraspInputs:
-    """The thing to take, as it was seen."""
+    """The thing to take, as it was seen; grasps like those in `avoid` are chosen only when there are no others."""
 
     observation: ObjectObservation
+    avoid: tuple[TriedGrasp, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -52,10 +54,14 @@ class CloseView:
 
 
 class Grasp(ArmSkill[GraspInputs]):
-    """Ends with the thing held near the body; on failure the jaw is opened and the arm stowed."""
+    """Ends with the thing held near the body; on failure the jaw is opened and the arm stowed.
+
+    The output `tried` is `avoid` and the grasp of this attempt, also after a failure in which one was tried.
+    """
 
     name = "grasp"
     Inputs = GraspInputs
+    outputs: ClassVar[Mapping[str, type]] = {"tried": tuple[TriedGrasp, ...]}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the thing is not where it was seen, the jaw holds something already, or there is no arm",
         Cause.PLANNING: "no grasp is within reach and free",
@@ -80,14 +86,32 @@ class Grasp(ArmSkill[GraspInputs]):
             height_m = body_height_m(seen.position_W[2] - 0.5 * seen.size_m[2], capabilities)
             yield from self.stand_at(height_m, f"standing up to the {thing}")
             view = yield from self._look_closely(seen)
-            plan = yield from self._plan(view, str(thing))
+            plan = yield from self._plan(view, str(thing), inputs.avoid)
+            self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
             yield from self._take(plan, str(thing))
-        except SkillFailure:
+        except SkillFailure as failure:
             yield from self._let_go()
-            raise
-        yield from self._carry(view, plan.candidate, str(thing))
+            raise self._telling(failure) from failure
+        try:
+            yield from self._carry(view, plan.candidate, str(thing))
+        except SkillFailure as failure:
+            raise self._telling(failure) from failure
         yield from self.stand_at(capabilities.standing_height_m, f"carrying the {thing}")
-        return Succeeded(f"holding the {thing}")
+        return Succeeded(f"holding the {thing}", {"tried": self._tried})
+
+    def begin(self, inputs: GraspInputs) -> None:
+        """Forget an earlier attempt, but not what `inputs` tells of it."""
+        self._tried = inputs.avoid
+        super().begin(inputs)
+
+    def resume(self, inputs: GraspInputs) -> None:
+        """Go on after a pause or a restart."""
+        self._tried = inputs.avoid
+        super().resume(inputs)
+
+    def _telling(self, failure: SkillFailure) -> SkillFailure:
+        """A failure that tells which grasps were tried."""
+        return SkillFailure(failure.cause, failure.message, {"tried": self._tried})
 
     def run_again(self, inputs: GraspInputs) -> Routine[Succeeded]:
         """A thing in the jaw is taken along and not taken again; from an empty jaw's side all begins anew."""
@@ -99,7 +123,7 @@ class Grasp(ArmSkill[GraspInputs]):
                 yield from self._let_go()
             return (yield from self.run(inputs))
         yield from self._take_along(seen, at_thing)
-        return Succeeded(f"the {seen.thing} was in the jaw already; holding it")
+        return Succeeded(f"the {seen.thing} was in the jaw already; holding it", {"tried": self._tried})
 
     def _take_along(self, seen: ObjectObservation, at_thing: bool) -> Routine[None]:
         """Lift and draw back what the jaw has hold of, hold it near the body, and make sure that it is held."""
@@ -137,10 +161,11 @@ class Grasp(ArmSkill[GraspInputs]):
             raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} is no longer where it was seen")
         return view
 
-    def _plan(self, view: CloseView, thing: str) -> Routine[GraspPlan]:
+    def _plan(self, view: CloseView, thing: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         self.boxes = view.boxes
         up_B = view.X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
         candidates = grasp_candidates(view.target, self.model.p_BS)
+        candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
             raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the jaw")
         opening = 0.9 * self.open_rad

@@ -16,6 +16,7 @@ from executive.cli.live import live_view
 from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.output import BAD_INPUT, NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.replay_command import replay
 from executive.cli.requests import Request, filed, said
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.cli.tree_command import tree
@@ -42,6 +43,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard 
 
 app.command()(tree)
 app.command()(log)
+app.command()(replay)
 
 
 @app.command()

@@ -1,0 +1,75 @@
+"""What the page's buttons do: each action by its name, on the control of the run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+from executive.control import Control, ControlState
+
+Action = Callable[[Mapping[str, Any]], str]
+
+
+class RefusedError(Exception):
+    """An action that cannot be done; the text says why and what to do."""
+
+
+def control_actions(control: Control) -> Mapping[str, Action]:
+    """The actions of a run by name; each takes the page's values and gives one sentence, or raises RefusedError."""
+
+    def bound(call: Callable[[Control, Mapping[str, Any]], None], said: str) -> Action:
+        def action(values: Mapping[str, Any]) -> str:
+            try:
+                call(control, values)
+            except ValueError as error:
+                raise RefusedError(str(error)) from error
+            return said
+
+        return action
+
+    return MappingProxyType({name: bound(call, said) for name, (call, said) in _CALLS.items()})
+
+
+def text_of(values: Mapping[str, Any], key: str) -> str:
+    """A text among an action's values. Raises RefusedError when it is missing or empty."""
+    text = values.get(key)
+    if not isinstance(text, str) or not text.strip():
+        raise RefusedError(f"the action needs a text under '{key}'")
+    return text.strip()
+
+
+def control_json(state: ControlState) -> dict[str, Any]:
+    """What the page shows of a run's control."""
+    return {
+        "mode": state.mode.value,
+        "reason": state.reason,
+        "at": state.at,
+        "breakpoints": sorted(state.breakpoints),
+        "missions": {robot: list(names) for robot, names in state.missions.items()},
+        "questions": [
+            {
+                "id": each.id,
+                "text": each.question.text,
+                "options": list(each.options),
+                "default": each.question.default,
+                "until_s": each.until_s,
+            }
+            for each in state.questions
+        ],
+    }
+
+
+_CALLS: Final[Mapping[str, tuple[Callable[[Control, Mapping[str, Any]], None], str]]] = MappingProxyType(
+    {
+        "pause": (lambda control, _: control.pause("paused from the page"), "pausing"),
+        "resume": (lambda control, _: control.resume(), "going on"),
+        "step": (lambda control, _: control.step(), "one step"),
+        "cancel": (lambda control, _: control.cancel("cancelled from the page"), "cancelling"),
+        "stop": (lambda control, _: control.stop_button("the stop button on the page is pressed"), "stopped"),
+        "release": (lambda control, _: control.release_stop_button(), "stop button released"),
+        "break": (lambda control, values: control.set_breakpoint(text_of(values, "node")), "breakpoint set"),
+        "unbreak": (lambda control, values: control.clear_breakpoint(text_of(values, "node")), "breakpoint cleared"),
+        "answer": (lambda control, values: control.answer(text_of(values, "id"), text_of(values, "text")), "answered"),
+    }
+)

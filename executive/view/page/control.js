@@ -1,0 +1,84 @@
+"use strict";
+// The buttons, the sentence box and the keys; everything goes through one guarded request.
+(() => {
+  const { byId } = window.errand;
+
+  class ControlPanel {
+    constructor(token) {
+      this.token = token;
+      this.actions = new Set();
+      this.state = null;
+      byId("pause").addEventListener("click", () => this.do(this.state && this.state.mode === "paused" ? "resume" : "pause"));
+      byId("step").addEventListener("click", () => this.do("step"));
+      byId("cancel").addEventListener("click", () => this.do("cancel"));
+      byId("stop").addEventListener("click", () => this.do(this.state && this.state.mode === "stopped" ? "release" : "stop"));
+      byId("say").addEventListener("submit", (event) => { event.preventDefault(); this.say(); });
+      document.addEventListener("keydown", (event) => this.key(event));
+    }
+
+    allow(actions) {
+      this.actions = new Set(actions);
+      byId("controls").hidden = !this.actions.has("pause");
+      byId("say").hidden = !this.actions.has("say");
+    }
+
+    async do(name, values = {}) {
+      try {
+        const answer = await fetch(`action/${name}`, {
+          method: "POST",
+          headers: { "Content-Type": "application/json", "X-Errand-Token": this.token },
+          body: JSON.stringify(values),
+        });
+        const { said, error } = await answer.json();
+        this.tell(answer.ok ? said : error, !answer.ok);
+        return answer.ok;
+      } catch {
+        this.tell("errand does not answer: has it ended?", true);
+        return false;
+      }
+    }
+
+    tell(text, bad) {
+      byId("announced").textContent = text;
+      if (bad || this.saying) {
+        byId("said").textContent = text;
+        byId("said").classList.toggle("bad", bad);
+        clearTimeout(this.clearing);
+        this.clearing = setTimeout(() => { byId("said").textContent = ""; }, bad ? 12000 : 5000);
+      }
+    }
+
+    async say() {
+      const input = byId("sentence"), text = input.value.trim();
+      if (!text) return;
+      this.saying = true;
+      if (await this.do("say", { text })) input.value = "";
+      this.saying = false;
+    }
+
+    draw(state, ended) {
+      this.state = state;
+      const mode = state ? state.mode : "ready", over = ended || mode === "ended";
+      const paused = mode === "paused", stopped = mode === "stopped";
+      byId("pause").querySelector("span").textContent = paused ? "Go on" : "Pause";
+      byId("pause").querySelector("path").setAttribute("d", paused ? "M4 2.5l9 5.5-9 5.5z" : "M4 3h3v10H4zM9 3h3v10H9z");
+      byId("pause").setAttribute("aria-pressed", paused);
+      byId("stop").querySelector("span").textContent = stopped ? "Release" : "Stop";
+      byId("stop").setAttribute("aria-pressed", stopped);
+      for (const id of ["pause", "step", "cancel", "stop"]) byId(id).disabled = over;
+      byId("say").querySelectorAll("input, button").forEach((each) => { each.disabled = over; });
+    }
+
+    key(event) {
+      const typing = event.target.closest("input[type=text], select, textarea");
+      if (typing || event.ctrlKey || event.metaKey || event.altKey || byId("controls").hidden) return;
+      const button = { p: "pause", s: "step", c: "cancel", x: "stop" }[event.key];
+      if (button && !byId(button).disabled) {
+        byId(button).click();
+        event.preventDefault();
+      }
+    }
+  }
+
+  window.errand.ControlPanel = ControlPanel;
+})();

@@ -1,0 +1,89 @@
+"use strict";
+// The list of what happened; an entry leads the slider to its time.
+(() => {
+  const { LOOKS, lookOf, element } = window.errand;
+  const MOST = 600;
+
+  const metres = (value) => (value === null || value === undefined ? "?" : value.toFixed(2));
+  const TEXTS = {
+    run: (data) => ["run", `world ${data.world}, seed ${data.seed}: ${(data.commands || []).join(" · ")}`],
+    object_to_detect: (data) => ["look for", data.class_name.join(", ")],
+    object_destination: (data) => ["found", `${data.class_name} at (${metres(data.goal_x)}, ${metres(data.goal_y)}, ${metres(data.goal_z)}) m`],
+    errors: (data) => ["defect", (data.traceback || "").trim().split("\n").pop()],
+    control: (data) => [data.what || "control", data.message || ""],
+    question: (data) => ["question", data.text || data.message || ""],
+  };
+
+  class EventPanel {
+    constructor(list, choice, store, onChoose) {
+      Object.assign(this, { list, choice, store, onChoose, taken: 0, rows: [] });
+      choice.addEventListener("change", () => this.rebuild());
+    }
+
+    rebuild() {
+      this.taken = 0;
+      this.rows = [];
+      this.list.replaceChildren();
+      this.draw(this.t, this.following);
+    }
+
+    entry({ topic, data, t }) {
+      if (topic === "transitions") return this.change(data, t);
+      if (topic === "outcome") {
+        const look = data.outcome === "success" ? "success" : data.outcome === "cancelled" ? "cancelled" : "failure";
+        return { t, look, what: `${data.robot}: ${data.outcome}`, why: [data.cause, data.message].filter(Boolean).join(": ") };
+      }
+      if (!TEXTS[topic] || this.choice.value === "failures") return null;
+      const [what, why] = TEXTS[topic](data);
+      return { t, look: topic === "errors" ? "failure" : "idle", symbol: "·", what, why };
+    }
+
+    change(data, t) {
+      const look = lookOf({ status: data.to, cause: data.cause }), known = this.store.known.get(data.node) || {};
+      const failed = look === "failure" || look === "cancelled";
+      if (this.choice.value === "failures" ? !failed : this.choice.value === "leaves" && !known.leaf) return null;
+      if (look === "idle") return null;
+      const parts = data.node.split("/");
+      const what = known.leaf ? parts.slice(2).join(" / ") || data.node : known.name || data.node;
+      return { t, look, what, why: [data.cause, data.message].filter(Boolean).join(": ") };
+    }
+
+    draw(t, following) {
+      this.t = t;
+      this.following = following;
+      for (; this.taken < this.store.messages.length; this.taken += 1) {
+        const entry = this.entry(this.store.messages[this.taken]);
+        if (entry) this.append(entry);
+      }
+      let now = null;
+      for (const row of this.rows) {
+        row.li.classList.toggle("later", row.t > t + 1e-6);
+        row.li.classList.remove("now");
+        if (row.t <= t + 1e-6) now = row.li;
+      }
+      if (!following && now) now.classList.add("now");
+      const target = following ? this.list.lastElementChild : now;
+      if (target && target !== this.scrolled && !this.list.contains(document.activeElement)) {
+        this.scrolled = target;
+        this.list.scrollTop = target.offsetTop - this.list.offsetTop - this.list.clientHeight + target.clientHeight + 6;
+      }
+    }
+
+    append({ t, look, symbol, what, why }) {
+      const li = element("li"), button = element("button"), text = element("span", "what", what);
+      li.dataset.look = look;
+      button.type = "button";
+      const mark = element("span", "symbol", symbol || LOOKS[look].symbol);
+      mark.setAttribute("aria-label", symbol ? "" : LOOKS[look].word);
+      if (why) text.append(" ", element("span", "why", why));
+      button.append(element("span", "t", t.toFixed(1)), mark, text);
+      button.addEventListener("click", () => this.onChoose(t));
+      li.append(button);
+      this.list.append(li);
+      this.rows.push({ t, li });
+      if (this.rows.length > MOST) this.rows.shift().li.remove();
+    }
+  }
+
+  window.errand.EventPanel = EventPanel;
+})();

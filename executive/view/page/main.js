@@ -1,0 +1,112 @@
+"use strict";
+// Puts the page together: messages come from the server while a run is under way, or stand in the page itself.
+(() => {
+  const { Store, TreePanel, MapPanel, Header, CameraPanel, ScenePanel, QuestionPanel, EventPanel, Timeline, ControlPanel, byId } = window.errand;
+  const recorded = byId("recorded") ? JSON.parse(byId("recorded").textContent) : null;
+  const token = new URLSearchParams(location.search).get("token") || "";
+  const store = new Store();
+
+  function addressOf(picture) {
+    if (recorded) return recorded.pictures[picture];
+    return `picture/${picture}?token=${encodeURIComponent(token)}`;
+  }
+
+  const control = new ControlPanel(token);
+  const header = new Header();
+  const tree = new TreePanel(byId("tree"), {
+    follow: byId("follow"),
+    onBreakpoint: (node, wanted) => control.do(wanted ? "break" : "unbreak", { node }),
+  });
+  const map = new MapPanel(byId("map"), byId("where"));
+  const camera = new CameraPanel(byId("camera"), byId("seen"), addressOf);
+  const scene = new ScenePanel(byId("scene"));
+  const questions = new QuestionPanel(byId("questions"), (id, text) => control.do("answer", { id, text }));
+  const timeline = new Timeline(store, () => schedule());
+  const events = new EventPanel(byId("events"), byId("events-shown"), store, (t) => { timeline.hold(); timeline.go(t); });
+
+  let planned = false;
+  function schedule() {
+    if (planned) return;
+    planned = true;
+    requestAnimationFrame(() => { planned = false; draw(); });
+  }
+
+  function draw() {
+    const replaying = !timeline.following;
+    const view = replaying ? store.at(timeline.t) : store.now;
+    const state = store.live.control || null;
+    tree.progress = replaying ? null : store.live.progress;
+    tree.breakpoints = state && state.mode !== "ended" && control.actions.has("break") ? new Set(state.breakpoints) : null;
+    tree.at = state ? state.at : null;
+    tree.draw(view);
+    header.draw(store, view, replaying);
+    camera.draw(view);
+    map.draw(view);
+    events.draw(timeline.t, timeline.following);
+    control.draw(state, store.now.outcomes.length > 0);
+    questions.draw(state ? state.questions : [], store.end);
+    scene.seek(timeline.t);
+  }
+
+  function take(messages) {
+    let logged = false;
+    for (const message of messages) {
+      logged = store.add(message) || logged;
+      if (message.topic === "map") map.setMap(message.data, addressOf(message.data.picture)).catch(() => {});
+      if (message.live === "hello") greet(message.data);
+      if (message.live === "recording" && message.data.address) scene.show(`${message.data.address}?token=${encodeURIComponent(token)}`, true);
+      if (message.live === "progress") store.end = Math.max(store.end, message.data.now_s);
+    }
+    if (logged) timeline.drawMarks();
+    timeline.grow();
+    schedule();
+  }
+
+  function greet({ actions, scene: address, recording }) {
+    control.allow(actions);
+    timeline.setLive(actions.length > 0);
+    if (recording) scene.show(`${recording}?token=${encodeURIComponent(token)}`, true);
+    else scene.show(address, false);
+  }
+
+  function connect() {
+    const socket = new WebSocket(`ws://${location.host}/feed?token=${encodeURIComponent(token)}`);
+    socket.addEventListener("message", (event) => take(JSON.parse(event.data)));
+    socket.addEventListener("close", () => {
+      store.live.control = store.live.control ? { ...store.live.control, mode: "ended", questions: [] } : null;
+      byId("announced").textContent = "errand has ended; the page shows what happened.";
+      schedule();
+    });
+  }
+
+  function setTheme(theme) {
+    document.documentElement.dataset.theme = theme;
+    map.recolour();
+    timeline.drawMarks();
+    schedule();
+  }
+
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  let chosen = null;
+  try { chosen = localStorage.getItem("errand-theme"); } catch { /* not kept, then */ }
+  setTheme(chosen || (dark.matches ? "dark" : "light"));
+  dark.addEventListener("change", () => { if (!chosen) setTheme(dark.matches ? "dark" : "light"); });
+  byId("theme").addEventListener("click", () => {
+    chosen = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+    try { localStorage.setItem("errand-theme", chosen); } catch { /* not kept, then */ }
+    setTheme(chosen);
+  });
+  document.addEventListener("keydown", (event) => {
+    if (event.key === " " && event.target === document.body) { timeline.toggle(); event.preventDefault(); }
+  });
+
+  if (recorded) {
+    take(recorded.messages);
+    if (recorded.scene) scene.show(URL.createObjectURL(new Blob([recorded.scene], { type: "text/html" })), true);
+    timeline.go(timeline.store.end);
+    setInterval(() => scene.seek(timeline.t), 500);
+  } else {
+    connect();
+  }
+  window.errand.page = { store, timeline };
+})();

@@ -1,0 +1,161 @@
+"use strict";
+// The header, the hand camera, the 3D scene, and questions.
+(() => {
+  const { LOOKS, element } = window.errand;
+  const SVG = "http://www.w3.org/2000/svg";
+  const byId = (id) => document.getElementById(id);
+
+  const MODES = {
+    ready: ["idle", "ready"], running: ["running", "running"], paused: ["cancelled", "paused"],
+    "lease lost": ["failure", "lease lost"], stopped: ["failure", "stop button"], ended: ["idle", "ended"],
+  };
+  const MODE_SYMBOLS = { paused: "‖", stopped: "■", "lease lost": "!" };
+  const OUTCOMES = { success: "success", failure: "failure", cancelled: "cancelled", error: "failure" };
+
+  // What the pill says: the outcome when there is one, else the mode of the control, else what the tree says.
+  function modeOf(store, view) {
+    const control = store.live.control, outcome = view.outcomes[view.outcomes.length - 1];
+    if (outcome) {
+      const look = OUTCOMES[outcome.outcome] || "failure";
+      return [look, LOOKS[look].symbol, outcome.outcome + (outcome.cause ? ` (${outcome.cause})` : ""), outcome.message];
+    }
+    const mode = control && control.mode;
+    if (mode && MODES[mode]) return [MODES[mode][0], MODE_SYMBOLS[mode] || LOOKS[MODES[mode][0]].symbol, MODES[mode][1], control.reason];
+    return view.trees.length ? ["running", "▶", "running", ""] : ["idle", "○", "waiting", ""];
+  }
+
+  class Header {
+    draw(store, view, replaying) {
+      const tree = view.trees[view.trees.length - 1];
+      const title = tree ? `${tree.robot}: ${tree.root.name}` : "Errand";
+      byId("title").textContent = title;
+      document.title = tree ? `${tree.root.name} – Errand` : "Errand";
+      byId("clock").textContent = `${(replaying ? view.t : store.end).toFixed(1)} s`;
+      byId("late").textContent = view.late;
+      if (store.run) {
+        byId("world").textContent = store.run.world;
+        byId("seed").textContent = store.run.seed;
+      }
+      const [look, symbol, text, why] = modeOf(store, view);
+      const pill = byId("mode");
+      pill.dataset.look = look;
+      pill.title = why || "";
+      pill.firstElementChild.textContent = symbol;
+      if (byId("mode-text").textContent !== text) {
+        byId("mode-text").textContent = text;
+        byId("announced").textContent = [text, why].filter(Boolean).join(": ");
+      }
+      const progress = store.live.progress;
+      byId("doing").textContent = replaying || !progress ? "" : progress.message;
+    }
+  }
+
+  // The latest picture with its boxes.
+  class CameraPanel {
+    constructor(box, seen, addressOf) { Object.assign(this, { box, seen, addressOf, shown: undefined }); }
+
+    draw(view) {
+      const picture = view.detections;
+      if (this.shown === picture || (picture && this.shown && picture.t === this.shown.t)) return;
+      this.shown = picture;
+      if (!picture) {
+        this.seen.textContent = "";
+        return this.box.replaceChildren(element("p", "nothing", "No picture yet."));
+      }
+      const width = picture.width || 640, height = picture.height || 480;
+      const svg = document.createElementNS(SVG, "svg");
+      svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+      svg.setAttribute("role", "img");
+      const image = this.shape("image", { width, height, href: this.addressOf(picture.picture) });
+      svg.append(image, ...picture.detections.flatMap((each) => this.boxed(each)));
+      const names = picture.detections.map((each) => `${each.class_name} ${Math.round(100 * each.score)} %`);
+      const said = names.length ? names.join(", ") : "nothing found";
+      svg.setAttribute("aria-label", `Picture of the hand camera at ${picture.t.toFixed(1)} s: ${said}`);
+      this.seen.textContent = `${picture.t.toFixed(1)} s: ${said}`;
+      this.box.replaceChildren(svg);
+    }
+
+    boxed({ box: [u0, v0, u1, v1], class_name: name }) {
+      const place = { x: u0, y: v0, width: u1 - u0, height: v1 - v0, rx: 3 };
+      const text = this.shape("text", { x: u0, y: Math.max(18, v0 - 7) });
+      text.textContent = name;
+      return [this.shape("rect", { ...place, class: "back" }), this.shape("rect", place), text];
+    }
+
+    shape(tag, attributes) {
+      const made = document.createElementNS(SVG, tag);
+      for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+      return made;
+    }
+  }
+
+  // The scene while it runs, or its recording, which follows the slider.
+  class ScenePanel {
+    constructor(box) { this.box = box; this.address = null; this.recorded = false; }
+
+    show(address, recorded) {
+      if (!address || address === this.address) return;
+      this.address = address;
+      this.recorded = recorded;
+      const frame = element("iframe");
+      frame.title = recorded ? "3D recording of the run" : "3D scene";
+      frame.src = address;
+      this.box.replaceChildren(frame);
+      this.frame = frame;
+    }
+
+    seek(t) {
+      if (!this.recorded || !this.frame) return;
+      try {
+        const viewer = this.frame.contentWindow.viewer;
+        const animator = viewer && viewer.animator;
+        if (!animator || !animator.duration) return;
+        animator.pause();
+        animator.seek(Math.min(t, animator.duration));
+      } catch { /* the recording is not there yet */ }
+    }
+  }
+
+  class QuestionPanel {
+    constructor(box, onAnswer) { Object.assign(this, { box, onAnswer, shown: "" }); }
+
+    draw(questions, now) {
+      const key = JSON.stringify(questions.map((each) => each.id));
+      if (key !== this.shown) {
+        this.shown = key;
+        this.box.replaceChildren(...questions.map((each) => this.card(each)));
+        if (questions.length) byId("announced").textContent = questions[0].text;
+      }
+      [...this.box.querySelectorAll(".limit")].forEach((limit, n) => {
+        const left = Math.max(0, Math.ceil(questions[n].until_s - now));
+        limit.textContent = `${left} s, then “${questions[n].default}”`;
+      });
+    }
+
+    card({ id, text, options, default: otherwise }) {
+      const card = element("form", "question"), said = element("p", "", text);
+      card.append(said);
+      card.setAttribute("aria-label", text);
+      if (options.length) {
+        for (const option of options) {
+          const button = element("button", "", option);
+          button.type = "button";
+          button.addEventListener("click", () => this.onAnswer(id, option));
+          card.append(button);
+        }
+      } else {
+        const input = element("input");
+        input.type = "text";
+        input.value = otherwise;
+        input.setAttribute("aria-label", text);
+        card.append(input, element("button", "", "Answer"));
+        card.addEventListener("submit", () => this.onAnswer(id, input.value));
+      }
+      card.addEventListener("submit", (event) => event.preventDefault());
+      card.append(element("span", "limit"));
+      return card;
+    }
+  }
+
+  Object.assign(window.errand, { Header, CameraPanel, ScenePanel, QuestionPanel, byId });
+})();

@@ -1,0 +1,98 @@
+"use strict";
+// What is known of the run: all messages in order, and what they amount to at any time.
+(() => {
+  const LOOKS = {
+    idle: { symbol: "○", word: "not run" },
+    running: { symbol: "▶", word: "running" },
+    success: { symbol: "✓", word: "success" },
+    failure: { symbol: "✗", word: "failure" },
+    cancelled: { symbol: "⊘", word: "cancelled" },
+  };
+  const BY_STATUS = { RUNNING: "running", SUCCESS: "success", FAILURE: "failure" };
+
+  function lookOf(state) {
+    if (!state) return "idle";
+    return BY_STATUS[state.status] || (state.cause === "CANCELLED" ? "cancelled" : "idle");
+  }
+
+  function emptyView() {
+    return { t: 0, trees: [], states: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [], particles: null };
+  }
+
+  function robotOf(view, name) {
+    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null });
+    return view.robots.get(name);
+  }
+
+  const APPLY = {
+    tree(view, data) {
+      view.trees = view.trees.filter((tree) => tree.root.id !== data.root.id).concat([data]);
+      const forget = (node) => { view.states.delete(node.id); node.children.forEach(forget); };
+      forget(data.root);
+    },
+    transitions(view, data, t) {
+      view.states.set(data.node, { status: data.to, cause: data.cause, message: data.message, t });
+    },
+    pose(view, data) {
+      const robot = robotOf(view, data.robot), { position, orientation } = data.pose;
+      robot.pose = { x: position.x, y: position.y, yaw: 2 * Math.atan2(orientation.z, orientation.w) };
+      robot.trail.push([position.x, position.y]);
+    },
+    path(view, data) {
+      robotOf(view, data.robot).path = data.poses.map((pose) => [pose.position.x, pose.position.y]);
+    },
+    detections(view, data, t) { view.detections = { ...data, t }; },
+    object_destination(view, data) { view.destinations.push({ name: data.class_name, x: data.goal_x, y: data.goal_y }); },
+    particles(view, data) { view.particles = data.particles; },
+    outcome(view, data) { view.outcomes.push(data); },
+    wall(view, data) { view.late = data.overruns; },
+  };
+
+  class Store {
+    constructor() {
+      this.messages = [];
+      this.end = 0;
+      this.run = null;
+      this.map = null;
+      this.live = {};
+      this.now = emptyView();
+      this.known = new Map();
+    }
+
+    // Take a message in; gives true when it is one of the log.
+    add(message) {
+      if (message.live) { this.live[message.live] = message.data; return false; }
+      this.messages.push(message);
+      this.end = Math.max(this.end, message.t);
+      if (message.topic === "run") this.run = message.data;
+      if (message.topic === "map") this.map = message.data;
+      if (message.topic === "tree") this.learn(message.data.root, 0);
+      this.apply(this.now, message);
+      return true;
+    }
+
+    learn(node, depth) {
+      this.known.set(node.id, { name: node.name, kind: node.type, leaf: node.children.length === 0, depth });
+      node.children.forEach((child) => this.learn(child, depth + 1));
+    }
+
+    apply(view, message) {
+      const apply = APPLY[message.topic];
+      if (apply) apply(view, message.data, message.t);
+      view.t = message.t;
+    }
+
+    // The view at a time; what was logged at that time is in it.
+    at(t) {
+      const view = emptyView();
+      for (const message of this.messages) {
+        if (message.t > t + 1e-6) break;
+        this.apply(view, message);
+      }
+      view.t = t;
+      return view;
+    }
+  }
+
+  window.errand = { LOOKS, lookOf, Store };
+})();

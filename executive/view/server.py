@@ -1,0 +1,226 @@
+"""Serves the page on 127.0.0.1 from a thread of its own.
+
+Every request for data, every action and the websocket need the token that is made anew for each server; requests that
+come from another origin, or that name another host, are refused, so that no other web page can reach the robot.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import secrets
+import socket
+import threading
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any, Final
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from executive.view.actions import Action, RefusedError
+from executive.view.feed import Feed
+
+HOST: Final = "127.0.0.1"
+PAGE_FOLDER: Final = Path(__file__).parent / "page"
+TOKEN_HEADER: Final = "x-errand-token"
+START_LIMIT_S: Final = 10.0
+_MAX_BODY: Final = 20_000
+_GOING_AWAY: Final = 1001
+_NOT_ALLOWED: Final = 4403
+
+
+@dataclass(frozen=True)
+class PageContent:
+    """What a server shows: the feed, what the buttons do, where the 3D scene is (a web address) or its recording."""
+
+    feed: Feed
+    actions: Mapping[str, Action] = field(default_factory=dict)
+    scene_url: str | None = None
+    recording: Path | None = None
+
+
+class PageServer:
+    """A page that is being served. Use it as a context manager, or call `close`."""
+
+    def __init__(self, content: PageContent, *, port: int = 0) -> None:
+        """Begin to serve; `port` 0 takes a free one. Raises OSError when the port is taken."""
+        self._content = content
+        self._token = secrets.token_urlsafe(24)
+        self._socket = socket.create_server((HOST, port))
+        self.port: int = self._socket.getsockname()[1]
+        self._ready = threading.Event()
+        self._closing = False
+        self._wakers: set[asyncio.Event] = set()
+        config = uvicorn.Config(
+            self._app(),
+            log_level="error",
+            access_log=False,
+            lifespan="off",
+            ws_max_size=_MAX_BODY,
+            ws="websockets-sansio",
+        )
+        self._server = uvicorn.Server(config)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread = threading.Thread(target=self._serve, name="errand-page", daemon=True)
+        self._thread.start()
+        self._ready.wait(START_LIMIT_S)
+        content.feed.listen(self._wake)
+
+    @property
+    def url(self) -> str:
+        """The page's address with its token."""
+        return f"http://{HOST}:{self.port}/?token={self._token}"
+
+    def close(self) -> None:
+        """Stop serving; idempotent."""
+        self._closing = True
+        self._server.should_exit = True
+        self._wake()
+        self._thread.join(START_LIMIT_S)
+
+    def __enter__(self) -> PageServer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _serve(self) -> None:
+        asyncio.run(self._serve_in_loop())
+
+    async def _serve_in_loop(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._ready.set()
+        await self._server.serve(sockets=[self._socket])
+
+    def _wake(self) -> None:
+        """Tell all websockets that there is news; from any thread."""
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._wake_all)
+
+    def _wake_all(self) -> None:
+        for waker in self._wakers:
+            waker.set()
+
+    def _app(self) -> Starlette:
+        guarded = self._guarded
+        return Starlette(
+            routes=[
+                Route("/", guarded(self._page)),
+                Route("/picture/{number:int}", guarded(self._picture)),
+                Route("/recording.html", guarded(self._recording)),
+                Route("/action/{name}", guarded(self._act), methods=["POST"]),
+                WebSocketRoute("/feed", self._tell),
+                Mount("/page", StaticFiles(directory=PAGE_FOLDER)),
+            ]
+        )
+
+    def _allowed(self, connection: HTTPConnection) -> bool:
+        """The host is ours, the origin ours or not told (which browsers always do for actions), the token right."""
+        here = {f"{HOST}:{self.port}", f"localhost:{self.port}"}
+        headers = connection.headers
+        origin = headers.get("origin")
+        given = headers.get(TOKEN_HEADER) or connection.query_params.get("token") or ""
+        own_origin = origin is None or origin in {f"http://{host}" for host in here}
+        own_host = headers.get("host", "") in here
+        return own_host and own_origin and secrets.compare_digest(given.encode(), self._token.encode())
+
+    def _guarded(self, handler: Callable[[Request], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
+        async def endpoint(request: Request) -> Response:
+            if not self._allowed(request):
+                said = "Open the page by the address that errand has printed: its token is missing or old."
+                return JSONResponse({"error": said}, HTTPStatus.FORBIDDEN)
+            response = await handler(request)
+            response.headers.update({"Referrer-Policy": "no-referrer", "Cache-Control": "no-store"})
+            return response
+
+        return endpoint
+
+    async def _page(self, request: Request) -> Response:
+        response = FileResponse(PAGE_FOLDER / "index.html")
+        response.headers["Content-Security-Policy"] = (
+            f"default-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws://{HOST}:{self.port} "
+            f"ws://localhost:{self.port}; frame-src 'self' http://{HOST}:* http://localhost:*; "
+            "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+        )
+        return response
+
+    async def _picture(self, request: Request) -> Response:
+        try:
+            form, data = self._content.feed.picture(request.path_params["number"])
+        except LookupError as error:
+            return JSONResponse({"error": str(error)}, HTTPStatus.NOT_FOUND)
+        return Response(data, media_type=f"image/{form}")
+
+    async def _recording(self, request: Request) -> Response:
+        recording = self._content.recording
+        if recording is None or not recording.is_file():
+            return JSONResponse({"error": "there is no recording"}, HTTPStatus.NOT_FOUND)
+        return FileResponse(recording, media_type="text/html")
+
+    async def _act(self, request: Request) -> Response:
+        name = request.path_params["name"]
+        action = self._content.actions.get(name)
+        if action is None:
+            return JSONResponse({"error": f"there is no action '{name}' here"}, HTTPStatus.NOT_FOUND)
+        try:
+            values = _values(await request.body())
+            said = await asyncio.to_thread(action, values)
+        except RefusedError as refusal:
+            return JSONResponse({"error": str(refusal)}, HTTPStatus.CONFLICT)
+        return JSONResponse({"said": said})
+
+    async def _tell(self, websocket: WebSocket) -> None:
+        """Send all there is, and then whatever is new."""
+        if not self._allowed(websocket):
+            await websocket.close(_NOT_ALLOWED)
+            return
+        await websocket.accept()
+        waker = asyncio.Event()
+        self._wakers.add(waker)
+        try:
+            await websocket.send_text(json.dumps([{"live": "hello", "data": self._hello()}]))
+            await self._stream(websocket, waker)
+        except (WebSocketDisconnect, RuntimeError, OSError):
+            pass  # the page went away
+        finally:
+            self._wakers.discard(waker)
+
+    async def _stream(self, websocket: WebSocket, waker: asyncio.Event) -> None:
+        feed = self._content.feed
+        cursor = (0, 0)
+        while not self._closing:
+            waker.clear()
+            cursor, texts = feed.since(cursor)
+            if texts:
+                await websocket.send_text(f"[{','.join(texts)}]")
+                feed.sent(cursor)
+            else:
+                await waker.wait()
+        await websocket.close(_GOING_AWAY)
+
+    def _hello(self) -> dict[str, Any]:
+        recorded = self._content.recording is not None and self._content.recording.is_file()
+        return {
+            "actions": sorted(self._content.actions),
+            "scene": self._content.scene_url,
+            "recording": "recording.html" if recorded else None,
+        }
+
+
+def _values(body: bytes) -> Mapping[str, Any]:
+    """An action's values. Raises RefusedError for what is no JSON object."""
+    try:
+        values = json.loads(body or b"{}") if len(body) <= _MAX_BODY else None
+    except ValueError:
+        values = None
+    if not isinstance(values, dict):
+        raise RefusedError("the action's values are no JSON object")
+    return values

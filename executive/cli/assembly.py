@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.cli.promises import promises
+from executive.cli.promises import promises_of
 from executive.compiler import CompiledTree
 from executive.errors import InputError
 from executive.knowledge import Knowledge, load_knowledge
@@ -60,7 +60,5 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree) -> RunEn
 
 def judge(simulation: Simulation, tree: CompiledTree, knowledge: Knowledge, result: RobotResult) -> Verdict:
     """What the referee says of the mission's promises."""
-    answers = [result.answers.get(node.path_id) for node in tree.root.walk() if node.kind == "answer"]
-    promised = promises(tree.commands, knowledge=knowledge, robot=tree.robot_name, answers=answers)
-    verdict: Verdict = simulation.referee.judge(promised)
+    verdict: Verdict = simulation.referee.judge(promises_of(tree, knowledge=knowledge, result=result))
     return verdict

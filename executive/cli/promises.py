@@ -6,15 +6,25 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
+from py_trees.common import Status
+
+from executive.behaviours.board import Constant
 from executive.command import Command, Task, Thing
+from executive.compiler import CompiledTree, StepPart
+from executive.compiling.plans import SkillPlan
 from executive.compiling.search import surfaces_to_search
 from executive.compiling.steps import START
 from executive.knowledge import Knowledge, Pose
+from executive.outcome import RobotResult
+from executive.snapshot import Snapshot
 from plant.referee import Promise, PromiseKind, Region
+from skills.robot import Pose2D
 
 BELOW_TOP_M: Final = 0.05
 ABOVE_TOP_M: Final = 0.30
 NEAR_M: Final = 0.75
+POSE_NEAR_M: Final = 0.25
+NAVIGATE: Final = "navigate"
 
 
 def promises(
@@ -23,6 +33,45 @@ def promises(
     """One promise for each command; `answers` are those of its status checks in order, None where none was given."""
     given = iter(answers)
     return tuple(_PROMISE[command.task](command, knowledge, robot, given) for command in commands)
+
+
+def promises_of(tree: CompiledTree, *, knowledge: Knowledge, result: RobotResult) -> tuple[Promise, ...]:
+    """The promises of a tree that has run: of all its parts but those that its own result tells were skipped.
+
+    A count is one promise, however many trips it takes; of skills on their own only a drive to a fixed pose promises
+    something.
+    """
+    promised: list[Promise] = []
+    for part in tree.parts:
+        if _was_skipped(part, result.states):
+            continue
+        if part.command is not None:
+            given = [answer for path_id, answer in result.answers.items() if _below(path_id, part.path_id)]
+            promised += promises((part.command,), knowledge=knowledge, robot=tree.robot_name, answers=given)
+        elif part.skill is not None:
+            promised += _driven(part.skill, tree.robot_name)
+    return tuple(promised)
+
+
+def _was_skipped(part: StepPart, states: Snapshot) -> bool:
+    """Whether a node above let its failure pass."""
+    statuses = {path_id: state.status for path_id, state in states.items()}
+    return any(
+        statuses.get(above) is Status.SUCCESS and statuses.get(below) is Status.FAILURE for above, below in part.excused
+    )
+
+
+def _below(path_id: str, base: str) -> bool:
+    return path_id == base or path_id.startswith(f"{base}/")
+
+
+def _driven(skill: SkillPlan, robot: str) -> Iterator[Promise]:
+    """The robot where a drive on its own was to lead."""
+    goal = dict(skill.inputs).get("goal")
+    if skill.name == NAVIGATE and isinstance(goal, Constant) and isinstance(goal.value, Pose2D):
+        pose = Pose(x=goal.value.x_m, y=goal.value.y_m, yaw=goal.value.yaw_rad)
+        name = f"({pose.x:.2f}, {pose.y:.2f})"
+        yield Promise(PromiseKind.WENT, goal=(_square(name, pose, POSE_NEAR_M),), robot=robot)
 
 
 def surface_region(knowledge: Knowledge, surface: str) -> Region:
@@ -89,8 +138,8 @@ def _place_region(knowledge: Knowledge, goal: str) -> Region:
     return _square(goal, knowledge.start if goal == START or place is None else knowledge.place_pose(place))
 
 
-def _square(name: str, pose: Pose) -> Region:
-    sides = ((-NEAR_M, -NEAR_M), (NEAR_M, -NEAR_M), (NEAR_M, NEAR_M), (-NEAR_M, NEAR_M))
+def _square(name: str, pose: Pose, near_m: float = NEAR_M) -> Region:
+    sides = ((-near_m, -near_m), (near_m, -near_m), (near_m, near_m), (-near_m, near_m))
     return Region(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
 
 

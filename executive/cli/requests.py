@@ -10,7 +10,15 @@ from executive.compiler import CompiledTree, compile_mission
 from executive.errors import InputError
 from executive.knowledge import Knowledge
 from executive.language import load_parser
-from executive.mission import DEFAULT_WORLD, Mission, load_mission, mission_from_file, mission_from_sentence
+from executive.mission import (
+    DEFAULT_WORLD,
+    Mission,
+    MissionFile,
+    load_mission,
+    mission_from_file,
+    mission_from_sentence,
+    overridden,
+)
 from executive.registry import installed_skills
 from plant.worlds.world import World
 
@@ -49,13 +57,13 @@ def filed(file: Path, *, world: str | None) -> Request:
         InputError: with file and line: the file is broken, its world unknown, or a step not understood.
     """
     loaded = load_mission(file)
-    opened = open_world(world) if world is not None else _own_world(loaded.world, file)
-    knowledge = knowledge_of(opened)
+    opened = open_world(world) if world is not None else _own_world(loaded)
+    knowledge = overridden(loaded, knowledge_of(opened))
     return Request(mission_from_file(loaded, parser=load_parser(), knowledge=knowledge), opened, knowledge)
 
 
-def _own_world(name: str, file: Path) -> World:
+def _own_world(loaded: MissionFile) -> World:
     try:
-        return open_world(name)
+        return open_world(loaded.world)
     except InputError as error:
-        raise load_mission(file).error(("world",), error.message, error.mend) from error
+        raise loaded.error(("world",), error.message, error.mend) from error

@@ -12,6 +12,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from plant.diagram import RENDERER, LooseModel, WorldDiagram, build_diagram
+from plant.live_scene import LiveScene
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.spot.model import SpotModel
@@ -154,12 +155,20 @@ class Simulation:
         plant = self.engine.world.plant
         plant.SetPositions(plant.GetMyMutableContextFromRoot(self._past), self.recorder.at(time_s).positions)
 
+    def show_live(self) -> LiveScene:
+        """Show the world in a browser from now on. Raises RuntimeError when no port is free."""
+        scene = LiveScene(self.engine.world, self.engine.context, self._overview())
+        self.engine.observe(scene)
+        return scene
+
     def save_recording(self, path: Path) -> None:
         """Write what was recorded as one HTML file. Raises LookupError when nothing was."""
         if self.recorder is None or not self.recorder.frames:
             raise LookupError("nothing was recorded: build the simulation with record=True and advance its clock")
-        corners = [corner for room in self.world.rooms.values() for corner in room]
-        save_html(self.engine.world, self.recorder.frames, path, View.over(corners))
+        save_html(self.engine.world, self.recorder.frames, path, self._overview())
+
+    def _overview(self) -> View:
+        return View.over([corner for room in self.world.rooms.values() for corner in room])
 
 
 def _loose(placement: Placement, *, fixed: bool = False) -> LooseModel:

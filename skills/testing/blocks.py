@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,10 @@ NOTHING_COLOUR: Colour = (20, 20, 20)
 
 @dataclass(frozen=True)
 class Block:
-    """An upright block from (x0, y0) to (x1, y1) in the world frame (m), from height z0 to z1, of one colour (RGB)."""
+    """An upright block from (x0, y0) to (x1, y1) in the world frame (m), from height z0 to z1, of one colour (RGB).
+
+    A loose one can be taken. Raises ValueError for a block without extent.
+    """
 
     x0: float
     y0: float
@@ -29,15 +32,26 @@ class Block:
     z0: float = 0.0
     z1: float = 2.5
     colour: Colour = (200, 195, 185)
+    loose: bool = False
 
     def __post_init__(self) -> None:
         if not (self.x0 < self.x1 and self.y0 < self.y1 and self.z0 < self.z1):
             raise ValueError(f"{self}: x0 < x1, y0 < y1 and z0 < z1 must hold")
 
+    def holds(self, point_W: FloatArray, margin_m: float = 0.0) -> bool:
+        """Whether a point (3,) lies in the block, or within a margin of it."""
+        low, high = np.array([self.x0, self.y0, self.z0]), np.array([self.x1, self.y1, self.z1])
+        return bool(np.all(point_W >= low - margin_m) and np.all(point_W <= high + margin_m))
+
+    def standing_at(self, x: float, y: float, z: float) -> Block:
+        """The same block with the middle of its base at (x, y, z)."""
+        dx, dy = 0.5 * (self.x1 - self.x0), 0.5 * (self.y1 - self.y0)
+        return replace(self, x0=x - dx, y0=y - dy, x1=x + dx, y1=y + dy, z0=z, z1=z + self.z1 - self.z0)
+
 
 def can_at(x: float, y: float, z: float, colour: Colour = (200, 20, 25)) -> Block:
     """A can, 66 mm across and 115 mm high, that stands at (x, y) on a top at height z; red unless said."""
-    return Block(x - 0.033, y - 0.033, x + 0.033, y + 0.033, z, z + 0.115, colour)
+    return Block(x - 0.033, y - 0.033, x + 0.033, y + 0.033, z, z + 0.115, colour, loose=True)
 
 
 ROOM: tuple[Block, ...] = (

@@ -30,7 +30,7 @@ from skills.robot import (
     Pose2D,
     Scan,
 )
-from skills.testing.blocks import Block
+from skills.testing.blocks import Block, can_at
 from skills.testing.clock import VirtualClock
 from skills.testing.commands import Commands
 from skills.testing.sensing import CAMERAS, picture, sweep
@@ -42,6 +42,8 @@ _JAW_RAD_S = 3.0
 _SCAN_PERIOD_S = 0.1
 _TRAJECTORY_START_RAD = 0.25
 _BATTERY_RUNTIME_S = 5400.0
+_HAND_TO_THING_M = 0.185
+_FINGER_M = 0.03
 
 BASE_ONLY = Capabilities(
     footprint_m=((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25)),
@@ -76,9 +78,9 @@ class Start:
 class ScriptedRobot:
     """Moves exactly as it is told, at once where a real robot would take care; `calls` remembers the verbs used.
 
-    It stands in a world of `blocks`, in which it sees but touches nothing. Odometry is the truth unless
-    `odometry_scale` and `yaw_drift_rad_per_m` say otherwise. Time passes by its clock. Implements
-    `skills.robot.Robot`.
+    It stands in a world of `blocks`; it drives through them, but takes loose ones between its fingers and puts them
+    down. Odometry is the truth unless `odometry_scale` and `yaw_drift_rad_per_m` say otherwise. Time passes by its
+    clock. Implements `skills.robot.Robot`.
     """
 
     def __init__(
@@ -103,6 +105,8 @@ class ScriptedRobot:
         self.opening_rad = (start.in_jaw_rad or 0.3) if start.holding else 0.0
         self.in_jaw_rad = self.opening_rad if start.holding else start.in_jaw_rad
         self.jaw_force_n = 20.0 if start.holding else 0.0
+        self.held: Block | None = can_at(0.0, 0.0, 0.0) if start.holding else None
+        self._hangs_down_m = 0.057  # of what is held, below the fingers' middle
         self.charge = start.charge
         self.present_faults: tuple[str, ...] = ()
         self.refuse_because: dict[str, str] = {}
@@ -340,8 +344,10 @@ class ScriptedRobot:
         times, positions = trajectory.times_s, trajectory.positions_rad
         if times[0] > 0.0:
             times, positions = np.concatenate([[0.0], times]), np.vstack([q_before, positions])
-        t = self._clock.now() - active.since_s
+        t, before = self._clock.now() - active.since_s, self.q_rad
         self.q_rad = np.array([np.interp(t, times, positions[:, j]) for j in range(positions.shape[1])])
+        if self.held is not None and self._below_fingers_m() < self._hangs_down_m:
+            self.q_rad = before  # what is held stands already
         if t >= times[-1]:
             self._commands.finish("move_arm", CommandState.DONE)
 
@@ -350,6 +356,10 @@ class ScriptedRobot:
         if active is None:
             return
         opening_rad, self.jaw_force_n = active.goal
+        if opening_rad < self.opening_rad and self.in_jaw_rad is None:
+            self._feel()
+        if self.held is not None and self.in_jaw_rad is not None and opening_rad > self.in_jaw_rad + 0.02:
+            self._let_go(self.held)
         before, least = self.opening_rad, self.in_jaw_rad
         most = _JAW_RAD_S * dt_s
         self.opening_rad += max(-most, min(most, opening_rad - self.opening_rad))
@@ -358,3 +368,31 @@ class ScriptedRobot:
             self.opening_rad = least
         if met or abs(self.opening_rad - opening_rad) < 1e-6:
             self._commands.finish("set_gripper", CommandState.DONE)
+
+    def _between_fingers_W(self) -> FloatArray:
+        X_WH = self._X_WB() @ self.arm.X_BH(self.q_rad)
+        return np.asarray(X_WH @ np.array([_HAND_TO_THING_M, 0.0, 0.0]))
+
+    def _feel(self) -> None:
+        """A closing jaw takes the loose block between its fingers, if there is one."""
+        gripper = self._capabilities.gripper
+        place_W = self._between_fingers_W()
+        taken = next((b for b in self.blocks if b.loose and b.holds(place_W, _FINGER_M)), None)
+        if taken is None or gripper is None:
+            return
+        width_m = min(taken.x1 - taken.x0, taken.y1 - taken.y0)
+        self.in_jaw_rad = gripper.open_rad * min(1.0, width_m / gripper.max_opening_m)
+        self.held, self._hangs_down_m = taken, float(place_W[2]) - taken.z0
+        self.blocks.remove(taken)
+
+    def _let_go(self, held: Block) -> None:
+        """An opening jaw lets what it held stand on whatever is below."""
+        x, y, z = (float(v) for v in self._between_fingers_W())
+        self.blocks.append(held.standing_at(x, y, z - self._below_fingers_m()))
+        self.held = self.in_jaw_rad = None
+
+    def _below_fingers_m(self) -> float:
+        """How high the fingers' middle is above the top, or the floor, below it."""
+        x, y, z = (float(v) for v in self._between_fingers_W())
+        tops = [b.z1 for b in self.blocks if b.x0 <= x <= b.x1 and b.y0 <= y <= b.y1 and b.z1 <= z]
+        return z - max(tops, default=0.0)

@@ -1,0 +1,138 @@
+"""The bench: one skill in its real leaf, with a robot, estimators and a clock, ticked as the runner ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from py_trees.common import Status
+
+from executive.behaviours.board import Board, Constant
+from executive.behaviours.context import RunContext
+from executive.behaviours.skill_leaf import SkillLeaf
+from executive.worker import LockStepWorker
+from skills.api import Cause, Costmap, Localiser, Skill, SkillContext
+from skills.robot import Clock, Robot
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
+from skills.testing.faults import Fault, parse_fault, with_faults
+
+TICK_S = 0.05
+HOLDER = "test"
+_PREFIX = "bench"
+
+
+@dataclass(frozen=True)
+class SkillRun:
+    """How a skill ended on the bench.
+
+    `outcome` is "success", "failure" or "cancelled"; `story` tells when (s) which message came up.
+    """
+
+    outcome: str
+    cause: Cause | None
+    message: str
+    time_s: float
+    ticks: int
+    outputs: Mapping[str, Any]
+    story: tuple[tuple[float, str], ...]
+
+
+class SkillBench:
+    """A robot with its lease, its estimators and a log, for one skill after the other."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        clock: Clock,
+        *,
+        localiser: Localiser | None = None,
+        costmap: Costmap | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Take the robot's lease; time passes by `clock`. Estimators that know all stand in for those left out."""
+        self.robot, self.clock = robot, clock
+        self.sensing = False
+        self.published: list[tuple[str, Mapping[str, Any]]] = []
+        self._context = RunContext(
+            robot=robot,
+            lease=robot.acquire_lease(HOLDER),
+            clock=clock,
+            worker=LockStepWorker(clock),
+            localiser=localiser or KnownPlace(),
+            costmap=costmap or BlockCostmap(),
+            publish=lambda topic, message: self.published.append((topic, message)),
+            seed=seed,
+            board=Board(_PREFIX),
+        )
+        self._sense(robot)
+
+    def context(self) -> SkillContext:
+        """What a skill is made with."""
+        return self._context.for_skill(f"{_PREFIX}/skill")
+
+    def inject(self, *words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> None:
+        """From now on these faults are at work. Raises ValueError for words that are no fault."""
+        self.add_faults(*(parse_fault(each, kinds) for each in words))
+
+    def add_faults(self, *faults: Fault) -> None:
+        """From now on these faults are at work."""
+        self.robot = with_faults(self.robot, self.clock, faults)
+        self._context = replace(self._context, robot=self.robot)
+
+    def leaf(self, skill: type[Skill[Any]], inputs: Any, *, limit_s: float | None = None) -> SkillLeaf:
+        """The skill's leaf, as a tree would have it, with these inputs."""
+        fields = {name: Constant(value) for name, value in vars(inputs).items()}
+        return SkillLeaf(
+            path_id=f"{_PREFIX}/skill",
+            name=skill.name,
+            skill=skill,
+            inputs=fields,
+            outputs={port: f"{_PREFIX}/{port}" for port in skill.outputs},
+            limit_s=limit_s or skill.default_timeout_s,
+            context=self._context,
+        )
+
+    def tick(self, leaf: SkillLeaf) -> None:
+        """One period: time passes, estimators see, the leaf is ticked."""
+        self.clock.advance(TICK_S)
+        self._sense(self.robot)
+        leaf.tick_once()
+
+    def run(self, skill: type[Skill[Any]], inputs: Any, *, limit_s: float | None = None) -> SkillRun:
+        """The skill from its beginning to its end, or to the time limit (s)."""
+        leaf = self.leaf(skill, inputs, limit_s=limit_s)
+        begun_s, ticks = self.clock.now(), 0
+        story: list[tuple[float, str]] = []
+        while leaf.status in (Status.INVALID, Status.RUNNING):
+            self.tick(leaf)
+            ticks += 1
+            if not story or story[-1][1] != leaf.message:
+                story.append((round(self.clock.now() - begun_s, 3), leaf.message))
+        outcome = "success" if leaf.status is Status.SUCCESS else "failure"
+        outputs = {port: self._context.board.get(f"{_PREFIX}/{port}") for port in skill.outputs if outcome == "success"}
+        time_s = round(self.clock.now() - begun_s, 3)
+        return SkillRun(outcome, leaf.cause, leaf.message, time_s, ticks, outputs, tuple(story))
+
+    def close(self) -> None:
+        """Stop the robot and give the lease back, as the runner does at the end; defects of the robot are let pass."""
+        for call in (lambda: self.robot.stop(lease=self._context.lease), self._give_back):
+            try:
+                call()
+            except Exception:
+                continue
+
+    def _give_back(self) -> None:
+        self.robot.return_lease(self._context.lease)
+
+    def _sense(self, robot: Robot) -> None:
+        """Bring the estimators up to date; those of a robot that cannot sense keep what they have."""
+        context, self.sensing = self._context, True
+        try:
+            context.localiser.update(robot)
+            context.costmap.update(robot, context.localiser.estimate())
+        except Exception as defect:
+            context.publish("errors", {"node": "estimators", "traceback": repr(defect)})
+        finally:
+            self.sensing = False

@@ -1,0 +1,204 @@
+"""The suite that every skill must pass: cancelled at any tick, an exception in any verb, stale sensors.
+
+Write a class in a test file and pytest runs all of it:
+
+    class TestWave(SkillSuite):
+        skill = Wave
+        inputs = WaveInputs(times=2)
+
+`bench` may be overridden to put the robot elsewhere. The case must end in success when nothing goes wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from py_trees.common import Status
+
+from executive.testing.bench import SkillBench, SkillRun
+from skills.api import Cause, Skill
+from skills.robot import Capabilities
+from skills.testing.blocks import ROOM, TABLE_CAN, Block
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.fault_kinds import SENSE_VERBS, VERBS, Call, Effect, InjectedFault
+from skills.testing.faults import Fault
+from skills.testing.robot import ScriptedRobot, Start
+
+STILL_WITHIN_S = 0.2
+_OWN_VERBS = ("acquire_lease", "take_lease", "return_lease", "lease_holder")
+
+
+@dataclass(frozen=True)
+class SuiteCase:
+    """A skill with inputs for which it succeeds, and what makes a new bench with its scripted robot."""
+
+    skill: type[Skill[Any]]
+    inputs: Any
+    bench: Callable[[], tuple[SkillBench, ScriptedRobot]]
+    samples: int = 8
+
+    def nominal(self) -> tuple[SkillRun, ScriptedRobot]:
+        """The run in which nothing goes wrong."""
+        bench, robot = self.bench()
+        robot.calls.clear()
+        return bench.run(self.skill, self.inputs), robot
+
+    def sampled(self, ticks: int) -> list[int]:
+        """Tick numbers spread over a run: all of a short one; first and last always."""
+        if ticks <= self.samples:
+            return list(range(1, ticks))
+        step = (ticks - 2) / (self.samples - 1)
+        return sorted({round(1 + n * step) for n in range(self.samples)})
+
+
+def scripted_bench(
+    capabilities: Capabilities, start: Start | None = None, blocks: Sequence[Block] = (*ROOM, TABLE_CAN)
+) -> Callable[[], tuple[SkillBench, ScriptedRobot]]:
+    """What makes benches with a scripted robot, in the room with a table and a can unless said."""
+    start = start or Start()
+
+    def make() -> tuple[SkillBench, ScriptedRobot]:
+        clock = VirtualClock()
+        robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
+        bench = SkillBench(robot, clock, localiser=KnownPlace(start.pose), costmap=BlockCostmap(blocks))
+        return bench, robot
+
+    return make
+
+
+def findings(case: SuiteCase) -> Iterator[str]:
+    """All that the suite finds wrong, one sentence each."""
+    yield from (finding for part in PARTS.values() for finding in part(case))
+
+
+def cancelled_at_every_tick(case: SuiteCase) -> Iterator[str]:
+    """Cancel it at sampled ticks: cause CANCELLED, the robot still within 0.2 s, `end` a second time does nothing."""
+    run, _ = case.nominal()
+    if run.outcome != "success":
+        yield f"the case does not succeed when nothing goes wrong: {run.cause} {run.message}"
+        return
+    for tick in case.sampled(run.ticks):
+        yield from (f"cancelled at tick {tick}: {what}" for what in _cancelled(case, tick))
+
+
+def _cancelled(case: SuiteCase, tick: int) -> Iterator[str]:
+    bench, robot = case.bench()
+    made: list[Skill[Any]] = []
+    leaf = bench.leaf(_recorded(case.skill, made), case.inputs)
+    for _ in range(tick):
+        bench.tick(leaf)
+    leaf.stop(Status.INVALID)
+    if leaf.cause is not Cause.CANCELLED:
+        yield f"the cause is {leaf.cause}, not CANCELLED: {leaf.message}"
+    before = list(robot.calls)
+    try:
+        for skill in made:
+            skill.end()
+    except Exception as defect:
+        yield f"a second end raises {type(defect).__name__}: {defect}"
+    moved = sorted({call for call in robot.calls[len(before) :] if call not in (*SENSE_VERBS, "command_status")})
+    if moved:
+        yield f"a second end calls {', '.join(moved)}"
+    bench.clock.advance(STILL_WITHIN_S)
+    if robot.moving_parts:
+        yield f"{', '.join(robot.moving_parts)} still under way {STILL_WITHIN_S} s later"
+
+
+def exception_in_every_verb(case: SuiteCase) -> Iterator[str]:
+    """Let each verb that it uses raise, at its first call and halfway: FAILURE with cause ERROR, robot still."""
+    run, robot = case.nominal()
+    used = [verb for verb in VERBS if verb in robot.calls and verb not in _OWN_VERBS]
+    for verb in used:
+        for calls in sorted({0, robot.calls.count(verb) // 2}):
+            yield from (f"{verb} raises after {calls} calls: {what}" for what in _raising(case, verb, calls, run))
+
+
+def _raising(case: SuiteCase, verb: str, calls: int, nominal: SkillRun) -> Iterator[str]:
+    bench, robot = case.bench()
+    met: list[str] = []
+
+    def act(call: Call) -> Any:
+        if not bench.sensing:
+            met.append(call.verb)
+        raise InjectedFault(f"{call.verb} does not answer")
+
+    bench.add_faults(Fault(f"{verb} raises", Effect(frozenset((verb,)), act), calls=calls))
+    run = bench.run(case.skill, case.inputs, limit_s=3.0 * nominal.time_s + 10.0)
+    if met and (run.outcome, run.cause) != ("failure", Cause.ERROR):
+        yield f"it ends with {run.outcome} {run.cause}: {run.message}"
+    bench.close()
+    bench.clock.advance(STILL_WITHIN_S)
+    if robot.moving_parts:
+        yield f"{', '.join(robot.moving_parts)} still under way {STILL_WITHIN_S} s after the end"
+
+
+def stale_sensors(case: SuiteCase) -> Iterator[str]:
+    """Freeze all sensors at sampled ticks: it must not succeed on data that is older than it declares."""
+    run, robot = case.nominal()
+    sensed = [verb for verb in SENSE_VERBS if verb in robot.calls]
+    declared = case.skill.max_data_age_s
+    if sensed and not declared:
+        yield f"it uses {', '.join(sensed)} and declares no max_data_age_s"
+        return
+    for tick in case.sampled(run.ticks):
+        frozen_s = tick * run.time_s / run.ticks
+        bench, _ = case.bench()
+        bench.inject(f"sensors freezes at {frozen_s:.3f} s")
+        ended = bench.run(case.skill, case.inputs, limit_s=3.0 * run.time_s + 10.0)
+        age_s = ended.time_s - frozen_s
+        if ended.outcome == "success" and age_s > min(declared.values(), default=age_s) + 0.1:
+            yield f"sensors frozen at {frozen_s:.2f} s, and it claims success {age_s:.2f} s later: {ended.message}"
+
+
+def _recorded(skill: type[Skill[Any]], made: list[Skill[Any]]) -> type[Skill[Any]]:
+    """The skill's class, which notes its instances."""
+
+    def init(self: Any, *arguments: Any, **options: Any) -> None:
+        skill.__init__(self, *arguments, **options)
+        made.append(self)
+
+    return type(skill.__name__, (skill,), {"__init__": init, "__doc__": skill.__doc__})
+
+
+PARTS: dict[str, Callable[[SuiteCase], Iterator[str]]] = {
+    "cancelled at every tick": cancelled_at_every_tick,
+    "exception in every verb": exception_in_every_verb,
+    "stale sensors": stale_sensors,
+}
+
+
+class SkillSuite:
+    """Base of a test class: set `skill` and `inputs`, and perhaps override `bench`."""
+
+    skill: ClassVar[type[Skill[Any]]]
+    inputs: ClassVar[Any]
+    samples: ClassVar[int] = 8
+
+    def bench(self, capabilities: Capabilities) -> tuple[SkillBench, ScriptedRobot]:
+        """A new bench; by default the scripted Spot stands at the origin of the room, before the table."""
+        return scripted_bench(capabilities)()
+
+    def test_it_can_be_cancelled_at_every_tick(self, robot_capabilities: Capabilities) -> None:
+        """Motion ends within 0.2 s and nothing raises."""
+        _demand(cancelled_at_every_tick(self._case(robot_capabilities)))
+
+    def test_an_exception_in_any_verb_is_a_failure_with_cause_error(self, robot_capabilities: Capabilities) -> None:
+        """And the robot is still afterwards."""
+        _demand(exception_in_every_verb(self._case(robot_capabilities)))
+
+    def test_no_success_is_claimed_on_stale_data(self, robot_capabilities: Capabilities) -> None:
+        """No success on data older than the skill declares."""
+        _demand(stale_sensors(self._case(robot_capabilities)))
+
+    def _case(self, capabilities: Capabilities) -> SuiteCase:
+        return SuiteCase(self.skill, self.inputs, lambda: self.bench(capabilities), self.samples)
+
+
+def _demand(found: Iterator[str]) -> None:
+    """Raises AssertionError with all that was found."""
+    sentences = list(found)
+    if sentences:
+        raise AssertionError("\n".join(sentences))

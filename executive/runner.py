@@ -23,7 +23,7 @@ from executive.record.ticks import TickMeter
 from executive.session import Session
 from executive.snapshot import Snapshot
 from executive.tree_run import Ending
-from executive.watchdog import VERB_LIMIT_S, VerbHung
+from executive.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, tick_watch
 from skills.api import Cause, Costmap, Localiser, Publish, Worker
 from skills.robot import Clock, LeaseError, Robot
 
@@ -43,12 +43,17 @@ class RunEntry:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """`time_limit_s` counts the robots' clock for the whole run; `verb_limit_s` the wall's clock for one verb."""
+    """`time_limit_s` counts the robots' clock for the whole run, without pauses.
+
+    The other limits are the watchdog's, on the wall's clock: for one verb, for taking a picture, for one robot's tick.
+    """
 
     seed: int = 0
     tick_period_s: float = 0.05
     time_limit_s: float = 1200.0
     verb_limit_s: float = VERB_LIMIT_S
+    image_limit_s: float = IMAGE_LIMIT_S
+    tick_limit_s: float = TICK_LIMIT_S
 
 
 @dataclass(frozen=True)
@@ -138,7 +143,8 @@ class _Run:
         return self._result(entries, ending)
 
     def _open(self, entry: RunEntry) -> Session:
-        robot = guarded(entry.robot, limit_s=self._settings.verb_limit_s)
+        settings = self._settings
+        robot = guarded(entry.robot, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s)
         keeper = LeaseKeeper(robot, HOLDER)
         show_lease_behind(robot, keeper.behind)
         context = RunContext(
@@ -194,7 +200,10 @@ class _Run:
     def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> None:
         """Tick the trees of robots that may move."""
         begun = time.perf_counter()
-        changes = [session.tick(breakpoints) for session in moving]
+        changes = []
+        for session in moving:
+            with tick_watch(session.name, self._settings.tick_limit_s):
+                changes.append(session.tick(breakpoints))
         self._ticks += 1
         self._meter(time.perf_counter() - begun)
         if moving:

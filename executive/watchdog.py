@@ -1,10 +1,11 @@
-"""A watchdog on the wall's clock around the verbs of a robot: a verb that hangs ends the run."""
+"""A watchdog on the wall's clock around the verbs of a robot, and around ticks: what hangs ends the run."""
 
 from __future__ import annotations
 
 import functools
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -16,10 +17,14 @@ from skills.robot import Robot
 
 VERB_LIMIT_S = 2.0
 IMAGE_LIMIT_S = 20.0  # `image` may block by contract
+TICK_LIMIT_S = 300.0  # in lock-step, planning and detection are part of a tick
 
 
 class VerbHung(BaseException):
-    """A verb of the Robot protocol did not come back in time. Like KeyboardInterrupt, no skill may swallow it."""
+    """A verb of the Robot protocol, or a tick, did not come back in time.
+
+    Like KeyboardInterrupt, no skill may swallow it.
+    """
 
 
 class _Watched:
@@ -57,24 +62,42 @@ def _watched_call(call: Callable[..., Any], verb: str, limit_s: float) -> Callab
     def guarded(*arguments: Any, **options: Any) -> Any:
         if threading.current_thread() is not threading.main_thread():
             return _helped(functools.partial(call, *arguments, **options), verb, limit_s)
-        with _alarm(verb, limit_s):
+        with _alarm(limit_s, lambda: _hung(verb, limit_s)):
             return call(*arguments, **options)
 
     return guarded
 
 
 @contextmanager
-def _alarm(verb: str, limit_s: float) -> Iterator[None]:
-    def ring(_signal: int, _frame: FrameType | None) -> None:
-        raise _hung(verb, limit_s)
+def tick_watch(robot_name: str, limit_s: float) -> Iterator[None]:
+    """Break off a tick that takes longer than its limit: a skill in an endless loop. Raises VerbHung.
 
+    This works in the main thread only; elsewhere nothing can break off Python code, and nothing is watched.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with _alarm(limit_s, lambda: VerbHung(f"a tick of {robot_name} took longer than {limit_s:g} s")):
+        yield
+
+
+@contextmanager
+def _alarm(limit_s: float, hung: Callable[[], VerbHung]) -> Iterator[None]:
+    """Raise `hung()` when the block takes longer; an alarm around this one goes on counting."""
+
+    def ring(_signal: int, _frame: FrameType | None) -> None:
+        raise hung()
+
+    begun_s = time.monotonic()
     before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, limit_s)
+    outer_s, _ = signal.setitimer(signal.ITIMER_REAL, limit_s)
     try:
         yield
     finally:
+        left_s = max(outer_s - (time.monotonic() - begun_s), 1e-4) if outer_s > 0.0 else 0.0
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_REAL, left_s)
 
 
 class _Helper:

@@ -48,9 +48,7 @@ def test_a_paused_robot_stands_still_and_everything_keeps_its_place(compiled, ru
 
     result = run_tree(compiled(*make.FETCH), control=control, observer=observe)
     assert result.outcome is Outcome.SUCCESS
-    assert {(driving, mode, reason) for driving, _, mode, reason in seen} == {
-        (False, Mode.PAUSED, "somebody walks by")
-    }
+    assert {(driving, mode, reason) for driving, _, mode, reason in seen} == {(False, Mode.PAUSED, "somebody walks by")}
     assert all(states == seen[0][1] for _, states, _, _ in seen)
     assert script.begun == ["navigate", "detect", "approach", "grasp", "grasp", "stow", "navigate", "hand_over"]
 
@@ -178,9 +176,7 @@ def test_a_breakpoint_nowhere_is_refused_with_what_was_meant(compiled, run_tree,
 
 def test_another_mission_first_and_the_old_one_after(compiled, run_tree, make, control, script, published, robot):
     other = compiled(GO, name="go aside")
-    result = run_tree(
-        compiled(*make.FETCH), control=control, observer=at_ticks({5: lambda: control.preempt(other)})
-    )
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({5: lambda: control.preempt(other)}))
     assert result.outcome is Outcome.SUCCESS
     first, aside = ["navigate", "detect", "approach"], ["navigate"]
     assert script.begun == [*first, *aside, "approach", "grasp", "stow", "navigate", "hand_over"]
@@ -286,7 +282,10 @@ def test_a_lost_lease_suspends_until_it_is_free_again(compiled, run_tree, make, 
 def test_verbs_are_shown_the_lease_that_counts_now(compiled, run_tree, make, control, robot):
     shown = []
     drive = robot.drive
-    robot.drive = lambda *v, until_s, lease: (shown.append((lease, robot.lease)), drive(*v, until_s=until_s, lease=lease))[1]
+    robot.drive = lambda *v, until_s, lease: (
+        shown.append((lease, robot.lease)),
+        drive(*v, until_s=until_s, lease=lease),
+    )[1]
     actions = {4: lambda: setattr(robot, "holder", "tablet"), 9: lambda: setattr(robot, "lease", None)}
     assert run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions)).outcome is Outcome.SUCCESS
     assert all(lease == counts for lease, counts in shown)

@@ -106,6 +106,11 @@ class InterruptsPlan(NodePlan):
         """The watches, then the mission."""
         return (*self.watches, self.mission)
 
+    @property
+    def expected(self) -> tuple[NodePlan, ...]:
+        """The mission."""
+        return (self.mission,)
+
     def build(self, context: RunContext) -> Behaviour:
         """An Interrupts composite."""
         watches = [watch.build(context) for watch in self.watches]

@@ -46,6 +46,11 @@ class NodePlan:
         """The nodes below."""
         return ()
 
+    @property
+    def expected(self) -> tuple[NodePlan, ...]:
+        """The nodes below that run, one after the other, when all goes well."""
+        return self.children
+
     def writes(self) -> Mapping[str, Any]:
         """The blackboard keys that it writes, and the type of each value."""
         return {}

@@ -88,6 +88,11 @@ class GoBackPlan(DecoratorPlan):
         """What is to be done, then the way back."""
         return (self.child, self.way_back)
 
+    @property
+    def expected(self) -> tuple[NodePlan, ...]:
+        """What is to be done."""
+        return (self.child,)
+
     def build(self, context: RunContext) -> Behaviour:
         """A GoBack composite."""
         children = [child.build(context) for child in self.children]

@@ -45,6 +45,11 @@ class RecoverPlan(NodePlan):
         """The attempt, then the remedies."""
         return (self.attempt, *(remedy.node for remedy in self.remedies))
 
+    @property
+    def expected(self) -> tuple[NodePlan, ...]:
+        """The attempt."""
+        return (self.attempt,)
+
     def build(self, context: RunContext) -> Behaviour:
         """A Recover composite."""
         remedies = [Remedy(each.node.build(context), each.triggers, each.uses) for each in self.remedies]
@@ -72,6 +77,11 @@ class AfterwardsPlan(NodePlan):
     def children(self) -> tuple[NodePlan, ...]:
         """What is to be done, then what tidies up."""
         return (self.first, self.then)
+
+    @property
+    def expected(self) -> tuple[NodePlan, ...]:
+        """What is to be done, and what tidies up unless that is only for failures."""
+        return (self.first,) if self.only_after_failure else (self.first, self.then)
 
     def build(self, context: RunContext) -> MemoryComposite:
         """An Afterwards composite."""

@@ -79,6 +79,14 @@ class LayeredCostmap:
         """Centres (x, y) of the cells that are blocked by something seen and not surveyed."""
         return self._layer.centres(np.argwhere(self._until_s > self._now_s))
 
+    def forget_seen(self) -> int:
+        """Forget all that was seen and not surveyed; the number of cells that were blocked by it."""
+        forgotten = len(self._active())
+        self._until_s.fill(-math.inf)
+        self._candidate_s.fill(-math.inf)
+        self._note_change()
+        return forgotten
+
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
         """Take in the newest scan, if it is new and the robot knows where it is."""
         odometry = robot.odometry()

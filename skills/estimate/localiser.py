@@ -94,10 +94,25 @@ class ScanMatchingLocaliser:
         Costs a few milliseconds for a small radius and some hundred for a whole flat: call it while standing.
         """
         scan = robot.scan()
-        if scan is None:
-            return False
-        self._X_OB = Pose2D.from_transform(scan.X_OB)
-        return self._search(self._points(scan), radius_m)
+        found = None if scan is None else self.search(scan, radius_m)
+        if found is not None:
+            self.accept(found)
+        return found is not None
+
+    def search(self, scan: Scan, radius_m: float | None) -> LocalisationEstimate | None:
+        """Where a scan fits the map, within radius_m of the present belief or anywhere (None); changes nothing."""
+        X_OB = Pose2D.from_transform(scan.X_OB)
+        found = self._best_match(self._points(scan), compose(self._X_WO, X_OB), radius_m)
+        if found is None:
+            return None
+        X_WO = compose(found.pose, inverse(X_OB))
+        return LocalisationEstimate(scan.stamp_s, X_WO.transform(), found.covariance, True)
+
+    def accept(self, estimate: LocalisationEstimate) -> None:
+        """Believe an estimate from now on; the next scans tell whether it holds."""
+        self._X_WO = Pose2D.from_transform(estimate.X_WO)
+        self._covariance = estimate.covariance.copy()
+        self._poor_scans, self._localised = 0, True
 
     def _points(self, scan: Scan) -> FloatArray:
         """At most max_points returns of a scan, evenly chosen, in the levelled body frame."""
@@ -142,24 +157,26 @@ class ScanMatchingLocaliser:
         self._X_WO = compose(found.pose, inverse(self._X_OB))
         self._covariance = found.covariance
 
-    def _search(self, points_F: FloatArray, radius_m: float | None) -> bool:
-        """Score many poses, refine the best few, believe the one that explains most."""
+    def _search(self, points_F: FloatArray, radius_m: float) -> None:
+        """Search around the belief, and believe what fits."""
         assert self._X_OB is not None
+        found = self._best_match(points_F, compose(self._X_WO, self._X_OB), radius_m)
+        if found is not None:
+            self._believe(found)
+            self._poor_scans, self._localised = 0, True
+
+    def _best_match(self, points_F: FloatArray, centre: Pose2D, radius_m: float | None) -> Match | None:
+        """Score many poses, refine the best few: the one that explains most, None when it explains too little."""
         options = self._options
         if len(points_F) < options.min_points:
-            return False
-        centre = compose(self._X_WO, self._X_OB)
+            return None
         poses = candidate_poses(self._grid, centre, radius_m)
         few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // 120)])
         best = poses[np.argsort(-score_poses(self._grid, few, poses), kind="stable")[:20]]
         spread = np.diag([0.2**2, 0.2**2, 0.15**2])
         matches = [match(self._grid, points_F, Pose2D(*pose), spread, options.matching) for pose in best.tolist()]
         found = max(matches, key=lambda m: m.inlier_share, default=None)
-        if found is None or found.inlier_share < options.found_share:
-            return False
-        self._believe(found)
-        self._poor_scans, self._localised = 0, True
-        return True
+        return found if found is not None and found.inlier_share >= options.found_share else None
 
 
 def candidate_poses(grid: GridMap, centre: Pose2D, radius_m: float | None) -> FloatArray:

@@ -1,0 +1,1 @@
+"""Getting a little away from what blocks the way."""

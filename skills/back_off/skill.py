@@ -1,0 +1,117 @@
+"""The skill that drives a short way to where there is more room."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from skills.api import Cause, Failed, Running, Skill, SkillContext, Step, Succeeded
+from skills.estimate.planar import compose, relative
+from skills.navigate.base import Base
+from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
+from skills.robot import Pose2D
+
+DIRECTIONS_RAD = tuple(math.radians(degrees) for degrees in (180, 150, -150, 90, -90, 30, -30, 0))
+"""Ways to go, in the body frame; backwards is tried first."""
+_STEP_M = 0.05
+_SLOW_M_S = 0.25
+_ARRIVED_M = 0.03
+_SETTLE_S = 0.4
+
+
+@dataclass(frozen=True)
+class BackOffInputs:
+    """How far (m) to go, and how far at least for it to count."""
+
+    distance_m: float = 0.4
+    least_m: float = 0.15
+
+
+class BackOff(Skill[BackOffInputs]):
+    """Goes straight, slowly, without turning, in the first direction with room; looks at the costmap all the way."""
+
+    name: ClassVar[str] = "back_off"
+    Inputs: ClassVar[type] = BackOffInputs
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PLANNING: "there is no room in any direction",
+        Cause.EXECUTION: "the robot refuses to drive or does not get on",
+    }
+    default_timeout_s: ClassVar[float] = 15.0
+
+    def __init__(self, context: SkillContext) -> None:
+        super().__init__(context)
+        self._base = Base(context)
+
+    def begin(self, inputs: BackOffInputs) -> None:
+        """Start anew."""
+        self._base.stop()
+        self._base = Base(self.context)
+        self._inputs = inputs
+        self._footprint = Footprint.of(self.context.robot.capabilities())
+        self._goal_O: Pose2D | None = None
+        self._least_left_m, self._best_s = math.inf, self.context.clock.now()
+        self._settled_s: float | None = None
+
+    def step(self) -> Step:
+        """Choose a direction at the first step, then go."""
+        refusal = self._base.refusal()
+        if refusal is not None:
+            return Failed(Cause.EXECUTION, f"The robot refused to drive: {refusal}.")
+        if self._goal_O is None:
+            chosen = self._choose()
+            if chosen is None:
+                return Failed(Cause.PLANNING, "There is no room to back off in any direction.")
+            self._goal_O = compose(self.context.robot.odometry().pose, chosen)
+        return self._settling() if self._settled_s is not None else self._going(self._goal_O)
+
+    def end(self) -> None:
+        """Stop what this skill set in motion."""
+        self._base.stop()
+
+    def _choose(self) -> Pose2D | None:
+        """Where to go, in the body frame: the first direction with room for the whole way, else the longest way."""
+        ways = [(self._free_m(direction), direction) for direction in DIRECTIONS_RAD]
+        longest = max(ways, key=lambda way: way[0])
+        length, direction = next((way for way in ways if way[0] >= self._inputs.distance_m - 1e-6), longest)
+        if length < self._inputs.least_m:
+            return None
+        return Pose2D(length * math.cos(direction), length * math.sin(direction), 0.0)
+
+    def _free_m(self, direction_rad: float) -> float:
+        """How far the body can go in a direction, at most `distance_m`; out of what it touches, but not further in."""
+        steps = np.arange(1, max(1, round(self._inputs.distance_m / _STEP_M)) + 1) * _STEP_M
+        here = self.context.pose()
+        poses = [compose(here, Pose2D(s * math.cos(direction_rad), s * math.sin(direction_rad), 0.0)) for s in steps]
+        rooms = footprint_clearance_m(self.context.costmap, self._footprint, pose_array([here, *poses]))
+        allowed = np.minimum(SAFE_MARGIN_M, np.maximum.accumulate(rooms)[:-1] + 1e-3)
+        blocked = np.flatnonzero(rooms[1:] < allowed)
+        return float(steps[-1] if len(blocked) == 0 else (steps[blocked[0] - 1] if blocked[0] > 0 else 0.0))
+
+    def _going(self, goal_O: Pose2D) -> Step:
+        """Drive on; stop before what the costmap shows."""
+        now_s = self.context.clock.now()
+        off = relative(self.context.robot.odometry().pose, goal_O)
+        left_m = math.hypot(off.x_m, off.y_m)
+        if left_m < self._least_left_m - 0.02:
+            self._least_left_m, self._best_s = left_m, now_s
+        if left_m < _ARRIVED_M:
+            self._settled_s = now_s + _SETTLE_S
+            return self._settling()
+        if now_s - self._best_s > 3.0:
+            return Failed(Cause.EXECUTION, f"The robot does not get on; {left_m:.2f} m are left of backing off.")
+        speed = min(_SLOW_M_S, max(0.08, 1.5 * left_m))
+        self._base.drive((speed * off.x_m / left_m, speed * off.y_m / left_m, 0.5 * off.yaw_rad))
+        return Running(f"backing off, {left_m:.2f} m to go")
+
+    def _settling(self) -> Step:
+        """Come to rest."""
+        assert self._settled_s is not None
+        self._base.drive((0.0, 0.0, 0.0))
+        if self.context.clock.now() < self._settled_s:
+            return Running("coming to rest")
+        self._base.stop()
+        return Succeeded("backed off a little")

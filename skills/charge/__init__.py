@@ -1,0 +1,1 @@
+"""Charging the battery at the dock."""

@@ -1,0 +1,1 @@
+"""Forgetting what was seen in the way, to see it anew."""

@@ -1,0 +1,45 @@
+"""The skill that clears the seen layer of the costmap and lets the sensors fill it anew."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from skills.api import Cause, Failed, ForgettingCostmap, Running, Skill, Step, Succeeded
+
+
+@dataclass(frozen=True)
+class ClearCostmapInputs:
+    """How long (s) to look anew before going on; two scans must agree on what they see."""
+
+    look_s: float = 1.0
+
+
+class ClearCostmap(Skill[ClearCostmapInputs]):
+    """What stands there still is seen again within `look_s`; what was only a passer-by, or noise, is gone."""
+
+    name: ClassVar[str] = "clear_costmap"
+    Inputs: ClassVar[type] = ClearCostmapInputs
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "this robot's costmap has no layer that can be cleared"
+    }
+    default_timeout_s: ClassVar[float] = 10.0
+
+    def begin(self, inputs: ClearCostmapInputs) -> None:
+        """Start anew."""
+        self._inputs = inputs
+        self._cleared: int | None = None
+        self._end_s = 0.0
+
+    def step(self) -> Step:
+        """Clear at the first step, then look."""
+        costmap, now_s = self.context.costmap, self.context.clock.now()
+        if self._cleared is None:
+            if not isinstance(costmap, ForgettingCostmap):
+                return Failed(Cause.PRECONDITION, "the costmap of this robot cannot forget what was seen")
+            self._cleared = costmap.forget_seen()
+            self._end_s = now_s + self._inputs.look_s
+        if now_s < self._end_s:
+            return Running("looking anew at what stands around")
+        return Succeeded(f"{self._cleared} blocked cells were forgotten, and what stands there was seen anew")

@@ -18,7 +18,7 @@ from executive.behaviours.composites import MemorySelector, MemorySequence
 from executive.behaviours.conditions import holding
 from executive.behaviours.context import RunContext
 from executive.behaviours.decorators import Guard, Retry, Timeout
-from executive.behaviours.leaves import Known, RememberPose
+from executive.behaviours.leaves import RememberPose
 from executive.behaviours.skill_leaf import SkillLeaf
 from skills.api import Cause, Skill
 from skills.robot import Pose2D
@@ -151,19 +151,6 @@ class RememberPosePlan(NodePlan):
     def build(self, context: RunContext) -> Behaviour:
         """A RememberPose leaf."""
         return RememberPose(path_id=self.path_id, name=self.name, key=self.key, context=context)
-
-
-@dataclass(frozen=True, kw_only=True)
-class KnownPlan(NodePlan):
-    """Looks whether a blackboard key has been written."""
-
-    kind: ClassVar[str] = "condition"
-    key: str
-    missing: str
-
-    def build(self, context: RunContext) -> Behaviour:
-        """A Known leaf."""
-        return Known(path_id=self.path_id, name=self.name, key=self.key, missing=self.missing, context=context)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from executive.behaviours.board import FromBoard
 from executive.command import Thing
-from executive.compiling.plans import KnownPlan, NodePlan, SelectorPlan, SequencePlan
+from executive.compiling.plans import NodePlan, SelectorPlan, SequencePlan
+from executive.compiling.recovery import OnlyIfKnownPlan
 from executive.compiling.workshop import Workshop, pose_2d
 from executive.knowledge import Knowledge
 from skills.api import Cause
@@ -47,16 +48,15 @@ def detect_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: st
     return shop.skill("detect", ports, {"observation": key})
 
 
-def find_again_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> SequencePlan:
-    """When it was seen before: look from here first."""
-    known = KnownPlan(
-        path_id=f"{shop.path_id}/seen-before",
-        name="seen before?",
+def find_again_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodePlan:
+    """When it was seen before: look from here first. Else passed over."""
+    return OnlyIfKnownPlan(
+        path_id=shop.path_id,
+        name="look from here, if seen before",
         source=shop.source,
+        child=detect_plan(shop, thing, surfaces, key),
         key=key,
-        missing="not seen before",
     )
-    return shop.sequence("look from here", known, detect_plan(shop, thing, surfaces, key))
 
 
 def search_plan(shop: Workshop, thing: Thing, place: str | None, key: str) -> SelectorPlan:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 import logging
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from executive.cli.assembly import knowledge_of, open_world
+from executive.cli.check_command import check
 from executive.cli.live import live_view
 from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.output import BAD_INPUT, NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.page_view import PageView
 from executive.cli.replay_command import replay
 from executive.cli.requests import Request, filed, said
 from executive.cli.sweep import rows, seed_range, sweep, totals
@@ -41,6 +44,7 @@ NoWake = Annotated[bool, typer.Option("--no-wake", help="The robot's name need n
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 
 
+app.command()(check)
 app.command()(tree)
 app.command()(log)
 app.command()(replay)
@@ -87,14 +91,22 @@ def run(
     as_json: AsJson = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
+    view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
+    view_port: Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0 takes a free one.")] = 0,
 ) -> None:
     """Run a sentence or a mission file in the simulated world."""
     with refusals():
         request = _request(file, say, world, require_wake=not no_wake)
         compiled = request.compile()
-        finished = _run_shown(request, compiled, seed, out, record=not no_record, as_json=as_json, quiet=quiet)
+        page = PageView(request, console_for(as_json), port=view_port) if view or view_for is not None else None
+        finished = _run_shown(
+            request, compiled, seed, out, record=not no_record, as_json=as_json, quiet=quiet, page=page
+        )
     if as_json:
         print_json(finished.report.to_json())
+    if page is not None:
+        page.stay(view_for)
     if not finished.report.achieved:
         raise typer.Exit(NOT_ACHIEVED)
 
@@ -150,17 +162,27 @@ def _request(file: Path | None, say: str | None, world: str | None, *, require_w
 
 
 def _run_shown(
-    request: Request, compiled: CompiledTree, seed: int, out: Path, *, record: bool, as_json: bool, quiet: bool
+    request: Request,
+    compiled: CompiledTree,
+    seed: int,
+    out: Path,
+    *,
+    record: bool,
+    as_json: bool,
+    quiet: bool,
+    page: PageView | None = None,
 ) -> Finished:
     """Run it with the commands before, the tree while it runs, and the verdicts after."""
     console = console_for(as_json)
     for command in request.mission.commands:
         console.print(str(command), markup=False)
+    seen: dict[str, Any] = {} if page is None else {"page": page, "control": page.control}
+    start = partial(run_request, request, compiled, seed=seed, out=out, record=record, **seen)
     if quiet:
-        finished = run_request(request, compiled, seed=seed, out=out, record=record)
+        finished = start()
     else:
         with live_view(compiled, console) as observer:
-            finished = run_request(request, compiled, seed=seed, out=out, record=record, observer=observer)
+            finished = start(observer=observer)
         console.print(to_rich(finished.tree, collapsed=False))
     for line in finished.report.lines():
         console.print(line)

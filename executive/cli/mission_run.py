@@ -11,6 +11,7 @@ from pathlib import Path
 from types import FrameType
 
 from executive.cli.assembly import judge, run_entry, simulate
+from executive.cli.page_view import PageView, log_map
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Request
 from executive.cli.souvenirs import Souvenirs, draw_souvenirs
@@ -19,7 +20,7 @@ from executive.control import Control
 from executive.outcome import RunResult
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
-from executive.runner import Observer, RunSettings, run
+from executive.runner import Observer, Progress, RunSettings, run
 from executive.view.model import NodeView, node_view
 from executive.view.svg import to_svg
 from executive.worker import LockStepWorker
@@ -42,10 +43,11 @@ def run_request(
     record: bool,
     observer: Observer | None = None,
     control: Control | None = None,
+    page: PageView | None = None,
 ) -> Finished:
     """Run a compiled request in the plant and write log, tree, recording and pictures into `out`.
 
-    The observer is told after each tick; through `control` the run is held, cancelled, and so on.
+    The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it.
 
     Raises:
         InputError: the world cannot be used.
@@ -56,6 +58,9 @@ def run_request(
     log = EventLog(out / "log.mcap", clock)
     souvenirs = Souvenirs(log)
     try:
+        if page is not None:
+            page.begin(log, simulation)
+        log_map(log, request)
         announce(log, clock, tree, request.knowledge, world=request.world.name, seed=seed)
         with cancelled_by_signals(control or Control(pace=None)) as heeded:
             result = run(
@@ -65,7 +70,7 @@ def run_request(
                 publish=souvenirs,
                 settings=RunSettings(seed=seed),
                 control=heeded,
-                observer=observer,
+                observer=both(observer, page),
             )
     finally:
         log.close()
@@ -75,8 +80,21 @@ def run_request(
     if record:
         simulation.save_recording(out / "recording.html")
         draw_souvenirs(souvenirs, simulation, request.mission.robot_name, out)
+    if page is not None:
+        page.end(out / "recording.html" if record else None)
     referee = RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops, simulation.referee.events)
     return Finished(_report(request, result, referee, seed=seed, log=log.path), view)
+
+
+def both(*observers: Observer | None) -> Observer:
+    """An observer that tells all that there are."""
+
+    def tell(progress: Progress) -> None:
+        for observer in observers:
+            if observer is not None:
+                observer(progress)
+
+    return tell
 
 
 def _report(request: Request, result: RunResult, referee: RefereeReport, *, seed: int, log: Path) -> RunReport:

@@ -27,7 +27,7 @@ class Feed:
         self._news: dict[str, tuple[int, str]] = {}
         self._told = 0
         self._listeners: tuple[Callable[[], None], ...] = ()
-        self._read = 0
+        self._read = self._readers = 0
 
     def __call__(self, topic: str, t: float, message: Mapping[str, Any]) -> None:
         """Add a logged message (`executive.record.event_log.Listener`): topic, time (s), plain values."""
@@ -70,6 +70,17 @@ class Feed:
                 raise LookupError(f"there is no picture {number}")
             return self._pictures[number]
 
+    def joined(self) -> None:
+        """A page begins to read."""
+        with self._lock:
+            self._readers += 1
+
+    def left(self) -> None:
+        """A page reads no more."""
+        with self._lock:
+            self._readers -= 1
+            self._lock.notify_all()
+
     def sent(self, cursor: tuple[int, int]) -> None:
         """A page has been sent all up to a cursor."""
         with self._lock:
@@ -77,9 +88,13 @@ class Feed:
             self._lock.notify_all()
 
     def wait_sent(self, timeout_s: float) -> bool:
-        """Block (on the wall's clock) until a page has been sent all messages, or time is over; True when sent."""
+        """Block (on the wall's clock) until a page has been sent all messages, or time is over; True when sent.
+
+        The run calls it after each tick, so that a busy run does not keep the server's thread from its turn. Nobody
+        waits where no page reads.
+        """
         with self._lock:
-            return self._lock.wait_for(lambda: self._read >= len(self._messages), timeout_s)
+            return self._lock.wait_for(lambda: self._readers == 0 or self._read >= len(self._messages), timeout_s)
 
     def _without_picture(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         if message.get("format") not in _PICTURES or "data" not in message:

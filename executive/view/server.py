@@ -12,7 +12,7 @@ import secrets
 import socket
 import threading
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final
@@ -30,6 +30,7 @@ from executive.view.feed import Feed
 
 HOST: Final = "127.0.0.1"
 PAGE_FOLDER: Final = Path(__file__).parent / "page"
+RECORDING_ADDRESS: Final = "recording.html"
 TOKEN_HEADER: Final = "x-errand-token"
 START_LIMIT_S: Final = 10.0
 _MAX_BODY: Final = 20_000
@@ -74,6 +75,11 @@ class PageServer:
         self._ready.wait(START_LIMIT_S)
         content.feed.listen(self._wake)
 
+    def offer_recording(self, recording: Path) -> None:
+        """Show the recording of the scene from now on; it follows the page's slider."""
+        self._content = replace(self._content, recording=recording)
+        self._content.feed.tell("recording", {"address": RECORDING_ADDRESS})
+
     @property
     def url(self) -> str:
         """The page's address with its token."""
@@ -115,7 +121,7 @@ class PageServer:
             routes=[
                 Route("/", guarded(self._page)),
                 Route("/picture/{number:int}", guarded(self._picture)),
-                Route("/recording.html", guarded(self._recording)),
+                Route(f"/{RECORDING_ADDRESS}", guarded(self._recording)),
                 Route("/action/{name}", guarded(self._act), methods=["POST"]),
                 WebSocketRoute("/feed", self._tell),
                 Mount("/page", StaticFiles(directory=PAGE_FOLDER)),
@@ -185,6 +191,7 @@ class PageServer:
         await websocket.accept()
         waker = asyncio.Event()
         self._wakers.add(waker)
+        self._content.feed.joined()
         try:
             await websocket.send_text(json.dumps([{"live": "hello", "data": self._hello()}]))
             await self._stream(websocket, waker)
@@ -192,6 +199,7 @@ class PageServer:
             pass  # the page went away
         finally:
             self._wakers.discard(waker)
+            self._content.feed.left()
 
     async def _stream(self, websocket: WebSocket, waker: asyncio.Event) -> None:
         feed = self._content.feed
@@ -211,7 +219,7 @@ class PageServer:
         return {
             "actions": sorted(self._content.actions),
             "scene": self._content.scene_url,
-            "recording": "recording.html" if recorded else None,
+            "recording": RECORDING_ADDRESS if recorded else None,
         }
 
 

@@ -51,7 +51,7 @@
       li.setAttribute("aria-level", level);
       li.tabIndex = -1;
       li.dataset.id = node.id;
-      const row = element("div", "row"), fold = element("span", "fold"), symbol = element("span", "symbol");
+      const row = element("div", node.children.length ? "row" : "row leaf"), fold = element("span", "fold"), symbol = element("span", "symbol");
       const name = element("span", "name"), note = element("span", "note"), bar = element("span", "bar");
       const dot = element("button", "dot");
       fold.setAttribute("aria-hidden", "true");

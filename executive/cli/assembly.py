@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+from executive.check import Abilities, PlannedWays
 from executive.cli.promises import promises_of
 from executive.compiler import CompiledTree
 from executive.errors import InputError
 from executive.knowledge import Knowledge, load_knowledge
 from executive.outcome import RobotResult
 from executive.runner import RunEntry
+from plant.models.catalogue import load_catalogue
 from plant.referee import Verdict
 from plant.simulation import Simulation
+from plant.spot.robot import spot_capabilities
 from plant.worlds.world import World, WorldError, load_world
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import MapError, load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
+from skills.navigate.footprint import Footprint
+
+LIFT_KG = 5.0
+"""What Spot's arm lifts continuously at half a metre, by its data sheet."""
 
 
 def open_world(name: str) -> World:
     """A world by its name or folder. Raises InputError."""
     try:
         return load_world(name)
-    except WorldError as error:
+    except (WorldError, OSError) as error:
         raise InputError(str(error)) from error
 
 
@@ -62,3 +73,24 @@ def judge(simulation: Simulation, tree: CompiledTree, knowledge: Knowledge, resu
     """What the referee says of the mission's promises."""
     verdict: Verdict = simulation.referee.judge(promises_of(tree, knowledge=knowledge, result=result))
     return verdict
+
+
+def itinerary_of(world: World) -> PlannedWays:
+    """Ways on a world's surveyed map, for the robot's footprint. Raises InputError when the map cannot be read."""
+    try:
+        keepout_map = load_grid_map(world.keepout_map_path)
+    except (MapError, OSError) as error:
+        raise InputError(str(error)) from error
+    return PlannedWays(LayeredCostmap(keepout_map), Footprint.of(spot_capabilities()))
+
+
+@cache
+def abilities_of() -> Abilities:
+    """What the robot can lift, and what the things weigh that there are models of."""
+    masses = {name: _mass_kg(one.path()) for name, one in load_catalogue().items() if one.file is not None}
+    return Abilities(masses, LIFT_KG)
+
+
+def _mass_kg(sdf: Path) -> float:
+    """The mass of a model, all its links together."""
+    return sum(float(mass.text or 0.0) for mass in ElementTree.parse(sdf).iter("mass"))

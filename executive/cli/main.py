@@ -14,6 +14,7 @@ from rich.table import Table
 
 from executive.cli.assembly import knowledge_of, open_world
 from executive.cli.check_command import check
+from executive.cli.check_command import check
 from executive.cli.live import live_view
 from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
@@ -44,6 +45,7 @@ NoWake = Annotated[bool, typer.Option("--no-wake", help="The robot's name need n
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 
 
+app.command()(check)
 app.command()(check)
 app.command()(tree)
 app.command()(log)

@@ -1,0 +1,167 @@
+"""`errand check`: mission files validated and planned without running them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from executive.check import PlannedWays, check_tree
+from executive.cli.assembly import abilities_of, itinerary_of, knowledge_of, open_world
+from executive.cli.output import BAD_INPUT, console_for, print_json
+from executive.compiler import CompiledTree, compile_mission
+from executive.errors import InputError
+from executive.estimate import Estimate, load_estimates
+from executive.knowledge import Knowledge
+from executive.language import DependencyParser, load_parser
+from executive.mission import MissionFile, load_mission, mission_from_file, overridden
+from executive.registry import installed_skills
+from executive.view.model import node_view
+from executive.view.text import to_rich
+from plant.worlds.world import World
+
+__all__ = ["CheckedFile", "Checker", "check"]
+
+
+@dataclass(frozen=True)
+class CheckedFile:
+    """One file: its errors, and what could be found out about it before them."""
+
+    file: Path
+    errors: tuple[InputError, ...] = ()
+    tree: CompiledTree | None = None
+    estimate: Estimate = field(default_factory=Estimate)
+
+    @property
+    def ok(self) -> bool:
+        """True without errors."""
+        return not self.errors
+
+
+@dataclass
+class Checker:
+    """Checks files; parser, worlds and planned ways are shared among them. `world` stands in for the files' own."""
+
+    world: str | None = None
+    _worlds: dict[str, _Opened] = field(default_factory=dict)
+
+    @cached_property
+    def parser(self) -> DependencyParser:
+        """The language's parser."""
+        return load_parser()
+
+    def check(self, file: Path) -> CheckedFile:
+        """Check one file; raises nothing for what stands in it."""
+        tree: CompiledTree | None = None
+        try:
+            loaded = load_mission(file)
+            opened = self._open(loaded)
+            knowledge = overridden(loaded, opened.knowledge)
+            mission = mission_from_file(loaded, parser=self.parser, knowledge=knowledge)
+            tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
+        except InputError as error:
+            return CheckedFile(file, _placed(file, (error, *error.others)))
+        checked = check_tree(
+            tree,
+            knowledge=knowledge,
+            start=opened.world.start,
+            abilities=abilities_of(),
+            itinerary=opened.ways,
+            estimates=load_estimates(),
+        )
+        return CheckedFile(file, _placed(file, checked.errors), tree, checked.estimate)
+
+    def _open(self, loaded: MissionFile) -> _Opened:
+        name = self.world or loaded.world
+        if name not in self._worlds:
+            try:
+                world = open_world(name)
+            except InputError as error:
+                if self.world is not None:
+                    raise
+                raise loaded.error(("world",), error.message, error.mend) from error
+            self._worlds[name] = _Opened(world, knowledge_of(world), itinerary_of(world))
+        return self._worlds[name]
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """A world with what is known of it."""
+
+    world: World
+    knowledge: Knowledge
+    ways: PlannedWays
+
+
+def check(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Mission files.", show_default=False)],
+    world: Annotated[str | None, typer.Option(help="World by name or folder, in place of the files' own.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No commands and no trees.")] = False,
+) -> None:
+    """Check mission files without running them: commands, tree, ways on the map, time and battery."""
+    checker = Checker(world)
+    checked = [checker.check(file) for file in files]
+    if as_json:
+        print_json(to_json(checked))
+    else:
+        console = console_for(as_json=False)
+        for one in checked:
+            _show(one, console, quiet=quiet)
+    if not all(one.ok for one in checked):
+        raise typer.Exit(BAD_INPUT)
+
+
+def to_json(checked: Sequence[CheckedFile]) -> dict[str, Any]:
+    """All files as one object: whether all are well, their errors, how many nodes, and the commands in order."""
+    trees = [one.tree for one in checked if one.tree is not None]
+    return {
+        "ok": all(one.ok for one in checked),
+        "errors": [_error_json(error) for one in checked for error in one.errors],
+        "nodes": sum(len(tree.path_ids) for tree in trees),
+        "commands": [str(command) for tree in trees for command in tree.commands],
+    }
+
+
+def _error_json(error: InputError) -> dict[str, Any]:
+    file = None if error.file is None else str(error.file)
+    return {"file": file, "line": error.line, "message": error.message, "hint": error.mend}
+
+
+def _placed(file: Path, errors: Sequence[InputError]) -> tuple[InputError, ...]:
+    """The errors, in the order of their lines; one that names no place stands at the head of the file."""
+    placed = [
+        error if error.file is not None else InputError(error.message, mend=error.mend, file=file, line=1)
+        for error in errors
+    ]
+    return tuple(sorted(placed, key=lambda error: (str(error.file) != str(file), str(error.file), error.line or 0)))
+
+
+def _show(one: CheckedFile, console: Console, *, quiet: bool) -> None:
+    """What was found, for people."""
+    mark = "[green]✓[/green]" if one.ok else "[red]✗[/red]"
+    console.print(f"{mark} [bold]{escape(str(one.file))}[/bold]")
+    for error in one.errors:
+        typer.echo(f"errand: {error}", err=True)
+    if one.tree is None:
+        return
+    if not quiet:
+        for command in one.tree.commands:
+            console.print(f"  {command}", markup=False)
+        console.print(to_rich(node_view(one.tree.root)))
+    if one.ok:
+        console.print(f"  {_in_words(one.tree, one.estimate)}")
+
+
+def _in_words(tree: CompiledTree, estimate: Estimate) -> str:
+    minutes, seconds = divmod(round(estimate.duration_s), 60)
+    return (
+        f"{len(tree.path_ids)} nodes; about {minutes} min {seconds:02d} s, {estimate.distance_m:.0f} m of way and "
+        f"{estimate.charge:.1%} of the battery when all goes well"
+    )

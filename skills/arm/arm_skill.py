@@ -74,9 +74,12 @@ class ArmSkill(RoutineSkill[InputsT]):
         return self._model
 
     def q_rad(self) -> FloatArray:
-        """Arm angles now."""
+        """Arm angles now. Raises SkillFailure with cause EXECUTION when the robot gives no numbers."""
         positions = self.context.robot.joints().position_rad
-        return np.array([positions[name] for name in self.model.names])
+        q = np.array([positions[name] for name in self.model.names])
+        if not np.all(np.isfinite(q)):
+            raise SkillFailure(Cause.EXECUTION, "the robot does not know its arm's angles")
+        return q
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""

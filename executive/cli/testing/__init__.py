@@ -1,0 +1,1 @@
+"""The pytest plug-in: fixtures, the small plant, and the collection of `*.skilltest.yaml` files."""

@@ -1,0 +1,110 @@
+"""Lets pytest collect `*.skilltest.yaml` files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from executive.errors import InputError
+from executive.testing.skill_test import RobotSetup, SkillTestFile, WorldSetup, load_skill_tests
+from executive.testing.suite import PARTS, SuiteCase
+from executive.testing.trial import BenchMakers, carry_out, scripted
+from skills.api import Skill
+from skills.robot import Capabilities
+from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
+
+
+class SkillTestSettings:
+    """What the tests of a session share; a conftest may add to `fault_kinds` or put other benches in `makers`."""
+
+    def __init__(self, skills: Mapping[str, type[Skill[Any]]], makers: BenchMakers, capabilities: Capabilities) -> None:
+        self.skills, self.makers, self.capabilities = dict(skills), dict(makers), capabilities
+        self.fault_kinds: list[FaultKind] = [*STANDARD_FAULTS]
+
+
+class SkillTestError(Exception):
+    """A skill test that did not go as expected."""
+
+
+class SkillTestModule(pytest.File):
+    """One file of skill tests."""
+
+    settings: SkillTestSettings
+
+    def collect(self) -> Iterable[pytest.Item]:
+        """Its tests, and the suite's parts where it asks for them. A broken file is one error with its line."""
+        try:
+            tests = load_skill_tests(self.path, self.settings.skills, self.settings.fault_kinds)
+        except InputError as error:
+            raise self.CollectError(str(error)) from error
+        for index, test in enumerate(tests.tests):
+            yield SkillTestItem.from_parent(self, name=test.name, tests=tests, index=index)
+            if tests.suite and test.expect.outcome == "success" and not test.faults:
+                yield from self._suite(tests, index)
+
+    def _suite(self, tests: SkillTestFile, index: int) -> Iterator[pytest.Item]:
+        for part in PARTS:
+            name = f"{tests.tests[index].name}: {part}"
+            yield SuiteItem.from_parent(self, name=name, tests=tests, index=index, part=part)
+
+
+class _Item(pytest.Item):
+    """What stands at one line of a file of skill tests."""
+
+    def __init__(self, *, tests: SkillTestFile, index: int, **options: Any) -> None:
+        super().__init__(**options)
+        self.tests, self.index = tests, index
+
+    @property
+    def settings(self) -> SkillTestSettings:
+        """The session's."""
+        assert isinstance(self.parent, SkillTestModule)
+        return self.parent.settings
+
+    @property
+    def skill(self) -> type[Skill[Any]]:
+        """The skill that is tested."""
+        return self.settings.skills[self.tests.skill]
+
+    def reportinfo(self) -> tuple[Path, int, str]:
+        """Where it stands: file, line (from 0), name."""
+        return self.path, self.tests.line(self.index) - 1, self.name
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """A plain report for a test that went otherwise; a traceback for a defect."""
+        if isinstance(excinfo.value, SkillTestError | InputError):
+            return f"{self.path}:{self.tests.line(self.index)}: skill '{self.tests.skill}'\n{excinfo.value}"
+        return super().repr_failure(excinfo, style)
+
+
+class SkillTestItem(_Item):
+    """One test."""
+
+    def runtest(self) -> None:
+        """Carry it out. Raises SkillTestError."""
+        settings = self.settings
+        trial = carry_out(self.tests, self.index, self.skill, settings.makers, settings.fault_kinds)
+        if trial.differences:
+            raise SkillTestError(trial.report())
+
+
+class SuiteItem(_Item):
+    """One part of the suite for every skill, with a test's ports, robot and world; the robot is a scripted one."""
+
+    def __init__(self, *, part: str, **options: Any) -> None:
+        super().__init__(**options)
+        self.part = part
+
+    def runtest(self) -> None:
+        """Run that part. Raises SkillTestError."""
+        test = self.tests.tests[self.index]
+        robot: RobotSetup = test.robot or self.tests.robot
+        world: WorldSetup = test.world or self.tests.world
+        inputs = self.tests.inputs(self.index, self.skill)
+        case = SuiteCase(self.skill, inputs, lambda: scripted(self.settings.capabilities, robot, world))
+        found = list(PARTS[self.part](case))
+        if found:
+            raise SkillTestError("\n".join(found))

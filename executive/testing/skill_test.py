@@ -1,0 +1,182 @@
+"""Skill tests as YAML: which skill, its ports, the robot and its world, what goes wrong, and how it must end.
+
+A file `*.skilltest.yaml` holds the tests of one skill. What stands above `tests` holds for each of them unless it says
+otherwise.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
+
+from executive.errors import InputError, did_you_mean, listing
+from executive.testing.port_values import PortValueError, inputs_of
+from executive.yaml_source import YamlSource, read_yaml, validate
+from skills.api import Cause, Skill
+from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
+from skills.testing.faults import parse_fault
+
+SUFFIX = ".skilltest.yaml"
+_Positive = Annotated[float, Field(gt=0.0)]
+_Triple = tuple[float, float, float]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class PoseSetup(_Strict):
+    """A planar pose in the world frame."""
+
+    x: float = Field(default=0.0, description="metres")
+    y: float = Field(default=0.0, description="metres")
+    yaw: float = Field(default=0.0, description="radians, counter-clockwise from x")
+
+
+class RobotSetup(_Strict):
+    """The robot and how it begins."""
+
+    kind: Literal["scripted", "plant"] = Field(
+        default="scripted",
+        description="scripted: exact and fast; plant: the simulated Spot in the small room, with physics",
+    )
+    pose: PoseSetup = Field(default=PoseSetup(), description="where it stands (scripted only)")
+    arm: tuple[float, ...] | None = Field(
+        default=None, description="arm angles, rad; stowed unless said (scripted only)"
+    )
+    holding: bool = Field(default=False, description="it begins with a can in its jaw (scripted only)")
+    in_jaw: float | None = Field(
+        default=None, description="opening (rad) at which a closing jaw holds something (scripted only)"
+    )
+    charge: float = Field(default=0.9, ge=0.0, le=1.0, description="battery, 0 to 1 (scripted only)")
+    lost: bool = Field(default=False, description="it does not know where it is (scripted only)")
+
+
+class BlockSetup(_Strict):
+    """An upright block in the scripted robot's world."""
+
+    at: _Triple = Field(description="middle of its base: x, y, z in metres")
+    size: _Triple = Field(description="extent along x, y and z in metres, each above 0")
+    colour: tuple[int, int, int] = Field(default=(200, 195, 185), description="red, green, blue from 0 to 255")
+    loose: bool = Field(default=False, description="it can be taken")
+
+
+class WorldSetup(_Strict):
+    """What stands around the robot."""
+
+    room: bool = Field(default=True, description="a room of 6 m by 5 m, with a table before the origin")
+    can: bool = Field(default=True, description="a red can near the edge of the table")
+    blocks: tuple[BlockSetup, ...] = Field(default=(), description="what else there is (scripted only)")
+
+
+class Expectation(_Strict):
+    """How the skill must end."""
+
+    outcome: Literal["success", "failure", "cancelled"] = Field(description="the end")
+    cause: Cause | None = Field(default=None, description="the cause of a failure")
+    message: str | None = Field(default=None, description="a regular expression that is found in the last message")
+    within_s: _Positive | None = Field(default=None, description="seconds on the robot's clock at most")
+
+    @field_validator("message")
+    @classmethod
+    def _is_a_pattern(cls, message: str | None) -> str | None:
+        try:
+            re.compile(message or "")
+        except re.error as error:
+            raise ValueError(f"is no regular expression ({error})") from error
+        return message
+
+    @model_validator(mode="after")
+    def _cause_fits(self) -> Expectation:
+        if self.outcome == "success" and self.cause is not None:
+            raise ValueError("a success has no cause")
+        return self
+
+
+class SkillTest(_Strict):
+    """One test."""
+
+    name: Annotated[str, Field(min_length=1, description="what it shows")]
+    with_: dict[str, Any] = Field(
+        default_factory=dict, alias="with", description="input ports; they stand in for those of the file"
+    )
+    robot: RobotSetup | None = Field(default=None, description="instead of the file's")
+    world: WorldSetup | None = Field(default=None, description="instead of the file's")
+    faults: tuple[str, ...] = Field(default=(), description='what goes wrong, as in "camera freezes at 3 s"')
+    cancel_at_s: Annotated[float, Field(ge=0.0)] | None = Field(default=None, description="cancel it at this time (s)")
+    expect: Expectation = Field(description="how it must end")
+
+
+class SkillTestFile(_Strict):
+    """The tests of one skill."""
+
+    skill: Annotated[str, Field(min_length=1, description="the registered name")]
+    with_: dict[str, Any] = Field(default_factory=dict, alias="with", description="input ports of all tests")
+    robot: RobotSetup = Field(default=RobotSetup(), description="the robot of all tests")
+    world: WorldSetup = Field(default=WorldSetup(), description="the world of all tests")
+    suite: bool = Field(
+        default=False,
+        description="with each test that expects success and has no faults, also run the suite for every skill",
+    )
+    tests: Annotated[tuple[SkillTest, ...], Field(min_length=1, description="the tests")]
+    _source: YamlSource | None = PrivateAttr(default=None)
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> SkillTestFile:
+        names = [test.name for test in self.tests]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"two tests are named {twice!r}")
+        return self
+
+    def line(self, index: int) -> int:
+        """The line at which a test stands, from 1."""
+        return 1 if self._source is None else self._source.line(("tests", index))
+
+    def error(self, path: tuple[str | int, ...], message: str, mend: str) -> InputError:
+        """An error in what stands at `path`."""
+        return InputError(message, mend=mend) if self._source is None else self._source.error(path, message, mend)
+
+    def ports(self, index: int) -> dict[str, Any]:
+        """The input ports of one test as they stand in the file."""
+        return {**self.with_, **self.tests[index].with_}
+
+    def inputs(self, index: int, skill: type[Skill[Any]]) -> Any:
+        """The skill's Inputs for one test. Raises InputError with file and line."""
+        try:
+            return inputs_of(skill.Inputs, self.ports(index))
+        except PortValueError as error:
+            own = bool(error.path) and error.path[0] in self.tests[index].with_
+            where = ("tests", index, "with") if own or not self.with_ else ("with",)
+            port = ".".join(map(str, error.path)) or "its ports"
+            raise self.error((*where, *error.path), f"{port}: {error.message}", error.mend) from error
+
+
+def load_skill_tests(
+    path: Path | str, skills: Mapping[str, type[Skill[Any]]], kinds: Sequence[FaultKind] = STANDARD_FAULTS
+) -> SkillTestFile:
+    """Read a file of skill tests and check it against the registered skills.
+
+    Raises:
+        InputError: with file, line and mend: broken YAML, unknown keys, no such skill, port or fault, wrong values.
+    """
+    source = read_yaml(path)
+    file = validate(SkillTestFile, source)
+    file._source = source
+    if file.skill not in skills:
+        near = did_you_mean(file.skill, skills)
+        mend = f"did you mean '{near}'?" if near else f"registered are {listing(skills)}"
+        raise file.error(("skill",), f"there is no skill '{file.skill}'", mend)
+    for index, test in enumerate(file.tests):
+        file.inputs(index, skills[file.skill])
+        for number, words in enumerate(test.faults):
+            try:
+                parse_fault(words, kinds)
+            except ValueError as error:
+                what, _, mend = str(error).partition("; ")
+                raise file.error(("tests", index, "faults", number), what, mend) from error
+    return file

@@ -1,0 +1,129 @@
+"""One skill test carried out: what happened, and how that differs from what was expected."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from py_trees.common import Status
+
+from executive.testing.bench import TICK_S, SkillBench, SkillRun
+from executive.testing.skill_test import BlockSetup, RobotSetup, SkillTest, SkillTestFile, WorldSetup
+from skills.api import Skill
+from skills.robot import Capabilities, Pose2D
+from skills.testing.blocks import ROOM, TABLE_CAN, Block
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
+from skills.testing.robot import ScriptedRobot, Start
+
+BenchMaker = Callable[[RobotSetup, WorldSetup], SkillBench]
+BenchMakers = Mapping[str, BenchMaker]
+"""What makes a bench for each kind of robot."""
+
+_LAST_MESSAGES = 12
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A test that was carried out; `differences` is empty when it went as expected."""
+
+    test: SkillTest
+    run: SkillRun
+    differences: tuple[str, ...]
+
+    def report(self) -> str:
+        """What was expected, what happened, and the messages on the way."""
+        run = self.run
+        lines = [*self.differences, ""]
+        lines.append(f"it ended with {_end(run.outcome, run.cause)} after {run.time_s:g} s: {run.message}")
+        lines += [f"fault: {words}" for words in self.test.faults]
+        lines += ["what it said on the way:"]
+        lines += [f"  {at_s:7.2f} s  {message}" for at_s, message in run.story[-_LAST_MESSAGES:]]
+        return "\n".join(lines)
+
+
+def scripted_maker(capabilities: Capabilities) -> Callable[[RobotSetup, WorldSetup], SkillBench]:
+    """What makes benches with a scripted robot of these capabilities."""
+
+    def make(robot_setup: RobotSetup, world: WorldSetup) -> SkillBench:
+        bench, _ = scripted(capabilities, robot_setup, world)
+        return bench
+
+    return make
+
+
+def scripted(capabilities: Capabilities, setup: RobotSetup, world: WorldSetup) -> tuple[SkillBench, ScriptedRobot]:
+    """A bench with a scripted robot, and that robot."""
+    clock, blocks = VirtualClock(), blocks_of(world)
+    pose = Pose2D(setup.pose.x, setup.pose.y, setup.pose.yaw)
+    start = Start(pose, setup.arm, setup.in_jaw, setup.holding, setup.charge)
+    robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
+    place = KnownPlace(pose)
+    place.localised = not setup.lost
+    return SkillBench(robot, clock, localiser=place, costmap=BlockCostmap(blocks)), robot
+
+
+def blocks_of(world: WorldSetup) -> tuple[Block, ...]:
+    """The blocks of a world."""
+    return (*(ROOM if world.room else ()), *((TABLE_CAN,) if world.can else ()), *map(_block, world.blocks))
+
+
+def _block(setup: BlockSetup) -> Block:
+    (x, y, z), (dx, dy, dz) = setup.at, setup.size
+    return Block(x - dx / 2, y - dy / 2, x + dx / 2, y + dy / 2, z, z + dz, setup.colour, setup.loose)
+
+
+def carry_out(
+    file: SkillTestFile,
+    index: int,
+    skill: type[Skill[Any]],
+    makers: BenchMakers,
+    kinds: Sequence[FaultKind] = STANDARD_FAULTS,
+) -> Trial:
+    """Run one test of a file. Raises InputError when its ports do not fit."""
+    test = file.tests[index]
+    setup = test.robot or file.robot
+    bench = makers[setup.kind](setup, test.world or file.world)
+    bench.inject(*test.faults, kinds=kinds)
+    inputs = file.inputs(index, skill)
+    if test.cancel_at_s is None:
+        run = bench.run(skill, inputs)
+    else:
+        run = _cancelled_run(bench, skill, inputs, test.cancel_at_s)
+    bench.close()
+    return Trial(test, run, tuple(_differences(test, run)))
+
+
+def _cancelled_run(bench: SkillBench, skill: type[Skill[Any]], inputs: Any, cancel_at_s: float) -> SkillRun:
+    """The run of a skill that is cancelled at a time, unless it has ended by itself before."""
+    leaf, begun_s, ticks = bench.leaf(skill, inputs), bench.clock.now(), 0
+    story: list[tuple[float, str]] = []
+    while bench.clock.now() - begun_s < cancel_at_s - TICK_S / 2 and leaf.status in (Status.INVALID, Status.RUNNING):
+        bench.tick(leaf)
+        ticks += 1
+        if not story or story[-1][1] != leaf.message:
+            story.append((round(bench.clock.now() - begun_s, 3), leaf.message))
+    outcome = {Status.SUCCESS: "success", Status.FAILURE: "failure"}.get(leaf.status, "cancelled")
+    if outcome == "cancelled":
+        leaf.stop(Status.INVALID)
+    time_s = round(bench.clock.now() - begun_s, 3)
+    return SkillRun(outcome, leaf.cause, leaf.message, time_s, ticks, {}, tuple(story))
+
+
+def _differences(test: SkillTest, run: SkillRun) -> list[str]:
+    expect, found = test.expect, []
+    if (expect.outcome, expect.cause or run.cause) != (run.outcome, run.cause):
+        wanted = _end(expect.outcome, expect.cause)
+        found.append(f"expected {wanted}, and it was {_end(run.outcome, run.cause)}")
+    if expect.message is not None and re.search(expect.message, run.message) is None:
+        found.append(f"expected a message like /{expect.message}/, and it was: {run.message}")
+    if expect.within_s is not None and run.time_s > expect.within_s:
+        found.append(f"expected an end within {expect.within_s:g} s, and it took {run.time_s:g} s")
+    return found
+
+
+def _end(outcome: str, cause: Any) -> str:
+    return outcome if cause is None else f"{outcome} {cause.value}"

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
@@ -15,6 +16,9 @@ from plant.diagram import RENDERER, LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
+from plant.snapshot.file import read_snapshot
+from plant.snapshot.keeper import SnapshotKeeper, restore
+from plant.snapshot.values import State
 from plant.spot.model import SpotModel
 from plant.spot.robot import SpotRobot
 from plant.spot.sensing import HAND_LINK, SpotSensors
@@ -23,8 +27,10 @@ from plant.worlds.placement import Placement, place_objects, place_people
 from plant.worlds.world import World
 from skills.robot import Pose2D, Robot
 
+FloatArray = NDArray[np.float64]
 CONTROL_PERIOD_S = 0.01
 REFEREE_PERIOD_STEPS = 2
+SETTLING_S = 1.5
 
 
 class Engine:
@@ -44,6 +50,7 @@ class Engine:
         }
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
+        self._after_advance: list[Callable[[], None]] = []
         self._command_robots()
         self._simulator.Initialize()
 
@@ -75,6 +82,38 @@ class Engine:
                     observer(self.now())
         for spot in self._spots.values():
             spot.sense(self.now())
+        for listener in self._after_advance:
+            listener()
+
+    def after_advance(self, listener: Callable[[], None]) -> None:
+        """Call `listener` whenever time has been advanced and all robots have sensed."""
+        self._after_advance.append(listener)
+
+    def state(self) -> State:
+        """Time, and what the robots keep."""
+        return {"steps": self._steps, "robots": {name: spot.state() for name, spot in self._spots.items()}}
+
+    def world_state(self) -> Mapping[str, FloatArray]:
+        """Positions and velocities of all that moves."""
+        groups = range(self.root_context.num_discrete_state_groups())
+        return {str(group): self.root_context.get_discrete_state(group).value() for group in groups}
+
+    def restore(self, state: State, world: Mapping[str, FloatArray]) -> None:
+        """Go on from such a state; the robots have powered up in it.
+
+        Raises:
+            ValueError: the state is that of another Diagram.
+        """
+        if set(world) != set(self.world_state()):
+            raise ValueError("the parts of the world are others")
+        self._steps = state["steps"]
+        self.root_context.SetTime(self.now())
+        for group, values in world.items():
+            self.root_context.get_mutable_discrete_state(int(group)).SetFromVector(values)
+        for name, spot in self._spots.items():
+            spot.restore(state["robots"][name], self.now())
+        self._command_robots()
+        self._simulator.Initialize()
 
     def _command_robots(self) -> None:
         for spot in self._spots.values():
@@ -133,6 +172,36 @@ class Simulation:
     def robots(self) -> Mapping[str, Robot]:
         """The robots by name."""
         return self.engine.robots
+
+    def keep_in(self, path: Path) -> None:
+        """Write the whole state to a file now and after every advance of the clock."""
+        keeper = SnapshotKeeper(path, self.engine, self.referee, self._facts(), sorted(self.robots))
+        keeper()
+        self.engine.after_advance(keeper)
+
+    def restore(self, path: Path, *, same_mission: bool = True) -> None:
+        """Take up the state in a file, as after a power failure: nobody commands the robots, which come to a stop.
+
+        For another mission than the one before the referee begins a new chapter.
+
+        Raises:
+            SnapshotError: the file cannot be read, is damaged, or is that of another simulation.
+        """
+        restore(read_snapshot(path), self.engine, self.referee, self._facts())
+        if not same_mission:
+            self.referee.forget_past()
+        self.engine.advance(SETTLING_S)
+
+    def _facts(self) -> State:
+        """What must be equal in the simulation that takes a state up."""
+        plant = self.engine.world.plant
+        return {
+            "world": self.world.name,
+            "seed": self.seed,
+            "robots": sorted(self.robots),
+            "positions": plant.num_positions(),
+            "velocities": plant.num_velocities(),
+        }
 
     def query_at(self, time_s: float) -> QueryObject:
         """The scene as it was recorded at a time, for pictures afterwards. Raises LookupError without a recording."""

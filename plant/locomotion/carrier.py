@@ -27,6 +27,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
+from plant.snapshot.values import State, array_of
 from skills.robot import Pose2D
 
 FloatArray = NDArray[np.float64]
@@ -161,6 +162,20 @@ class Carrier:
         desired = np.concatenate([self._target, rates, move / dt_s])
         self._plant.get_desired_state_input_port(self.instance).FixValue(context, desired)
         self._plant.get_actuation_input_port(self.instance).FixValue(context, np.zeros(5))
+
+    def state_kept(self) -> State:
+        """What it asks of its joints."""
+        v = self._velocity
+        return {
+            "velocity": [v.vx, v.vy, v.wz],
+            "target": self._target.tolist(),
+            "posture": np.asarray(self._posture).tolist(),
+        }
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        self._velocity = Velocity(*state["velocity"])
+        self._target, self._posture = array_of(state["target"]), array_of(state["posture"])
 
     def _ramp(self, wanted: Velocity, dt_s: float, *, stopping: bool) -> Velocity:
         limits, now = self._limits, self._velocity

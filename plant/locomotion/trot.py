@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.models.spot.description import LEGS
+from plant.snapshot.values import State, array_of
 
 FloatArray = NDArray[np.float64]
 _PAIRS = ((0, 3), (1, 2))  # indices into LEGS: fl with hr, fr with hl
@@ -79,6 +80,17 @@ class Trot:
         if self._swinging is not None:
             self._swing(motion, dt_s)
         return self._feet_W.copy()
+
+    def state(self) -> State:
+        """Where the feet are in their gait."""
+        gait = {"swinging": self._swinging, "next_pair": self._next_pair, "progress_s": self._progress_s}
+        return {"feet_W": self._feet_W.tolist(), "lift_W": self._lift_W.tolist(), **gait}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        self._feet_W, self._lift_W = array_of(state["feet_W"]), array_of(state["lift_W"])
+        self._swinging, self._next_pair = state["swinging"], state["next_pair"]
+        self._progress_s = state["progress_s"]
 
     def _maybe_lift(self, motion: BodyMotion) -> None:
         offsets = np.linalg.norm((self._feet_W - self._places(motion, 0.0, 0.0))[:, :2], axis=1)

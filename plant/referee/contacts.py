@@ -9,6 +9,7 @@ from pydrake.geometry import GeometryId
 from pydrake.multibody.plant import ContactResults
 
 from plant.referee.cast import ROBOT_KINDS, Actor, Kind
+from plant.snapshot.values import State
 
 Pair = tuple[int, int]
 
@@ -64,6 +65,18 @@ class CollisionCounter:
             if time_s - self._last_touched_s.get(pair, float("-inf")) > self._debounce_s:
                 self.collisions.append(self._collision(time_s, pair))
             self._last_touched_s[pair] = time_s
+
+    def state(self) -> State:
+        """The record so far."""
+        touched = None if self._last_touched_s is None else [[*pair, t] for pair, t in self._last_touched_s.items()]
+        bumps = [[bump.time_s, bump.robot, bump.part.value, bump.sentence] for bump in self.collisions]
+        return {"touched": touched, "bumps": bumps}
+
+    def restore(self, state: State) -> None:
+        """Go on with such a record."""
+        touched = state["touched"]
+        self._last_touched_s = None if touched is None else {(a, b): time_s for a, b, time_s in touched}
+        self.collisions = [Collision(time_s, robot, Kind(part), told) for time_s, robot, part, told in state["bumps"]]
 
     def _is_bump(self, pair: Pair, z: float) -> bool:
         """Whether a touch is a collision: not feet on the floor, not loose objects, not a robot with itself."""

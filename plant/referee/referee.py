@@ -15,6 +15,7 @@ from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair,
 from plant.referee.judge import Truth, judge, offered
 from plant.referee.promise import Promise, Verdict
 from plant.referee.story import Lift, Look, ObjectStory
+from plant.snapshot.values import State, array_of
 
 FloatArray = NDArray[np.float64]
 
@@ -98,6 +99,37 @@ class Referee:
             offers=frozenset(self._offers),
         )
         return judge(promises, truth, collisions=len(self._counter.collisions), drops=self.drops)
+
+    def state(self) -> State:
+        """The whole record; paths are arrays (N, 3)."""
+        return {
+            "bumps": self._counter.state(),
+            "stories": {name: story.state() for name, story in self._stories.items()},
+            "offers": [[*pair, time_s] for pair, time_s in self._offers.items()],
+            "bases": {name: p_W.tolist() for name, p_W in self._bases.items()},
+            "persons": {name: p_W.tolist() for name, p_W in self._persons.items()},
+        }
+
+    def restore(self, state: State, paths: Mapping[str, FloatArray]) -> None:
+        """Go on with such a record."""
+        self._counter.restore(state["bumps"])
+        for name, story in self._stories.items():
+            story.restore(state["stories"][name])
+        self._offers = {(thing, person): time_s for thing, person, time_s in state["offers"]}
+        self._bases = {name: array_of(p_W) for name, p_W in state["bases"].items()}
+        self._persons = {name: array_of(p_W) for name, p_W in state["persons"].items()}
+        self._paths = {name: list(path) for name, path in paths.items()}
+
+    def forget_past(self) -> None:
+        """Begin a new chapter: another mission is judged by what happens from now on."""
+        self._counter.collisions, self._offers = [], {}
+        self._paths = {name: [] for name in self._paths}
+        for story in self._stories.values():
+            story.forget_past()
+
+    def points(self, robot: str) -> Sequence[FloatArray]:
+        """The points of `path`, not to be changed; those that were there stay as more are added."""
+        return self._paths[robot]
 
     def _position(self, plant_context: Context, body: object) -> FloatArray:
         """The body origin's position in the world."""

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
+
+from plant.snapshot.values import State, array_of, transform_of, transform_state
 
 FloatArray = NDArray[np.float64]
 
@@ -16,6 +19,10 @@ STILL_M_S = 0.05
 WITH_HAND_M_S = 0.2
 REST_S = 0.2
 FLICKER_S = 0.15
+_PLAIN = (
+    *("events", "drops", "touches", "speed_m_s", "_grip_s", "_grip_robot", "_grip_z_m", "_supported_s"),
+    *("_still_since_s", "_carried", "_left_z_m", "_dropped"),
+)
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,17 @@ class Look:
     X_WH: RigidTransform | None
     supported: bool
     on_floor: bool
+
+    def state(self) -> list[Any]:
+        """The look as plain values."""
+        X_WH = transform_state(self.X_WH)
+        return [self.time_s, self.p_WO.tolist(), self.gripper, X_WH, self.supported, self.on_floor]
+
+    @staticmethod
+    def of(state: list[Any]) -> Look:
+        """The look of such values."""
+        time_s, p_WO, gripper, X_WH, supported, on_floor = state
+        return Look(time_s, array_of(p_WO), gripper, transform_of(X_WH), supported, on_floor)
 
 
 @dataclass(frozen=True)
@@ -108,6 +126,29 @@ class ObjectStory:
         self._note_leaving(look, with_hand)
         self._note_fall(look)
         self._note_rest(look)
+
+    def state(self) -> State:
+        """The story so far."""
+        return {
+            "lifts": [[lift.time_s, lift.robot, lift.from_W.tolist()] for lift in self.lifts],
+            "rests_W": [p_W.tolist() for p_W in self.rests_W],
+            "last": None if self._last is None else self._last.state(),
+            **{name: getattr(self, name) for name in _PLAIN},
+        }
+
+    def restore(self, state: State) -> None:
+        """Go on with such a story."""
+        self.lifts = [Lift(time_s, robot, array_of(from_W)) for time_s, robot, from_W in state["lifts"]]
+        self.rests_W = [array_of(p_W) for p_W in state["rests_W"]]
+        self._last = None if state["last"] is None else Look.of(state["last"])
+        for name in _PLAIN:
+            setattr(self, name, state[name])
+
+    def forget_past(self) -> None:
+        """Begin a new chapter: what is held keeps how it came there, all else counts from where it is."""
+        if self._last is not None and self.held_by is None:
+            self.lifts, self.rests_W = [], [self._last.p_WO]
+        self.events, self.drops, self.touches = [], 0, 0
 
     def _measure_speed(self, look: Look) -> None:
         if self._last is None or look.time_s <= self._last.time_s:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from plant.snapshot.values import State, restore_rng, rng_state
 from skills.robot import Battery
 
 
@@ -35,6 +36,15 @@ class BatteryModel:
         self._charge = discharged(self._charge, elapsed, load, self._spec)
         read = self._charge + float(self._rng.normal(0.0, self._spec.sigma))
         return Battery(stamp_s, float(np.clip(round(read, 3), 0.0, 1.0)))
+
+    def state(self) -> State:
+        """What changes from one reading to the next."""
+        return {"rng": rng_state(self._rng), "charge": self._charge, "stamp_s": self._stamp_s}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        restore_rng(self._rng, state["rng"])
+        self._charge, self._stamp_s = state["charge"], state["stamp_s"]
 
 
 def discharged(charge: float, elapsed_s: float, load: float, spec: BatterySpec) -> float:

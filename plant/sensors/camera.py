@@ -9,6 +9,7 @@ from pydrake.geometry import FrameId, QueryObject
 
 from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from plant.sensors.camera_spec import CameraSpec, colour_render_camera, depth_render_camera
+from plant.snapshot.values import State, restore_rng, rng_state
 from skills.robot import FrameTree, Image
 
 
@@ -31,6 +32,7 @@ class Camera:
         picture, depth = spec.intrinsics(), spec.depth_intrinsics()
         self._colour_camera = colour_render_camera(picture, renderer)
         self._depth_camera = depth_render_camera(depth, renderer, spec.depth_range_m)
+        self._rng = rng
         self._picture = PictureDegrader(
             rng, picture.height, picture.width, picture_noise or PictureNoise(), spec.picture_shrink
         )
@@ -53,6 +55,14 @@ class Camera:
             depth_m=self._depth.depth(self._render_depth(query_object), np.asarray(small_grey, dtype=np.uint8)),
             frames=frames,
         )
+
+    def state(self) -> State:
+        """What changes from one picture to the next."""
+        return {"rng": rng_state(self._rng)}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        restore_rng(self._rng, state["rng"])
 
     def _render_colour(self, query_object: QueryObject) -> NDArray[np.uint8]:
         """The clean picture (H, W, 3) RGB."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from plant.snapshot.values import State, restore_rng, rng_state
 from skills.robot import Gripper
 
 
@@ -45,6 +46,15 @@ class GripperModel:
         gripped = force >= self._noise.holding_force_n and opening > self._noise.closed_rad
         self._settle(stamp_s, gripped)
         return Gripper(stamp_s, max(0.0, opening), force, self._holding)
+
+    def state(self) -> State:
+        """What changes from one reading to the next."""
+        return {"rng": rng_state(self._rng), "holding": self._holding, "changing_since_s": self._changing_since_s}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        restore_rng(self._rng, state["rng"])
+        self._holding, self._changing_since_s = state["holding"], state["changing_since_s"]
 
     def _settle(self, stamp_s: float, gripped: bool) -> None:
         """Change the belief once the readings have said so for long enough."""

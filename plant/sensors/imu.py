@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
+from plant.snapshot.values import State, array_of, restore_rng, rng_state
 from skills.robot import Imu
 
 FloatArray = NDArray[np.float64]
@@ -46,6 +47,17 @@ class ImuModel:
             (float(rates[0]), float(rates[1]), float(rates[2])),
             (float(force[0]), float(force[1]), float(force[2])),
         )
+
+    def state(self) -> State:
+        """What changes from one reading to the next."""
+        last = None if self._last is None else [self._last[0], self._last[1].tolist()]
+        return {"rng": rng_state(self._rng), "last": last}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        restore_rng(self._rng, state["rng"])
+        last = state["last"]
+        self._last = None if last is None else (last[0], array_of(last[1]))
 
     def _acceleration(self, stamp_s: float, v_WB_W: FloatArray) -> FloatArray:
         """Mean acceleration since the last update, zero at the first."""

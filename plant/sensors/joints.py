@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.snapshot.values import State, restore_rng, rng_state
 from skills.robot import Joints
 
 FloatArray = NDArray[np.float64]
@@ -43,3 +44,11 @@ class JointModel:
         )
         position, velocity, effort = (dict(zip(self._names, row.tolist(), strict=True)) for row in read)
         return Joints(stamp_s, position, velocity, effort)
+
+    def state(self) -> State:
+        """What changes from one reading to the next."""
+        return {"rng": rng_state(self._rng)}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        restore_rng(self._rng, state["rng"])

@@ -15,6 +15,7 @@ from pydrake.systems.framework import Context
 
 from plant.sensors.ray_cast import NO_RETURN_M, cast_rays
 from plant.sensors.ray_shapes import RayScene
+from plant.snapshot.values import State, restore_rng, rng_state
 from skills.robot import Scan
 
 
@@ -77,6 +78,14 @@ class Lidar:
             X_BL=self._X_BL,
             X_OB=X_OB,
         )
+
+    def state(self) -> State:
+        """What changes from one scan to the next."""
+        return {"rng": rng_state(self._rng)}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        restore_rng(self._rng, state["rng"])
 
     def true_ranges(self, plant_context: Context, X_WL: RigidTransform) -> NDArray[np.float32]:
         """Ranges (rings, azimuths) without noise from a pose, `NO_RETURN_M` where nothing is hit."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from plant.snapshot.values import State, restore_rng, rng_state
 from skills.robot import Odometry, Pose2D
 
 FloatArray = NDArray[np.float64]
@@ -68,6 +69,17 @@ class OdometryModel:
         self._last = _Last(stamp_s, true, estimate)
         return Odometry(stamp_s, self._lifted(estimate, X_WB), self._velocity(true.yaw_rad, w_WB_W, v_WB_W))
 
+    def state(self) -> State:
+        """What changes from one reading to the next."""
+        last = self._last and [self._last.stamp_s, *_numbers(self._last.true), *_numbers(self._last.estimate)]
+        return {"rng": rng_state(self._rng), "last": last}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        restore_rng(self._rng, state["rng"])
+        last = state["last"]
+        self._last = last and _Last(last[0], Pose2D(*last[1:4]), Pose2D(*last[4:]))
+
     def _step(self, last: _Last, true: Pose2D, dt_s: float) -> Pose2D:
         """The next estimate: the true motion since the last, in the body's frame, with errors."""
         forward, left = _turned(true.x_m - last.true.x_m, true.y_m - last.true.y_m, -last.true.yaw_rad)
@@ -100,6 +112,10 @@ class OdometryModel:
             self._noise.turn_rate_rad_s,
         )
         return vx + float(noise[0]), vy + float(noise[1]), float(w_WB_W[2]) + float(noise[2])
+
+
+def _numbers(pose: Pose2D) -> tuple[float, float, float]:
+    return pose.x_m, pose.y_m, pose.yaw_rad
 
 
 def _turned(x: float, y: float, angle_rad: float) -> tuple[float, float]:

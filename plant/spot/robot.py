@@ -13,6 +13,7 @@ from pydrake.systems.framework import Context
 from plant.locomotion.carrier import Velocity
 from plant.locomotion.trot import BodyMotion, Trot
 from plant.models.spot.description import LEGS, spot_facts, spot_urdf
+from plant.snapshot.values import State, array_of
 from plant.spot.commands import CommandBook, Part
 from plant.spot.leases import LeaseDesk
 from plant.spot.model import JAW, SpotModel
@@ -225,6 +226,39 @@ class SpotRobot:
         """Take new sensor readings."""
         self._now_s = now_s
         self._sensors.update(now_s)
+
+    def state(self) -> State:
+        """What the robot itself keeps: servos, gait, sensors. Commands and leases do not outlive its computer."""
+        carrier = self._model.carrier
+        return {
+            "arm_hold": None if self._book.running(Part.ARM) is not None else self._arm_hold.tolist(),
+            "jaw": [self._jaw_goal.opening_rad, self._jaw_goal.force_n, self._jaw_still_s],
+            "posture": list(self._posture),
+            "legs": self._leg_servos.state(),
+            "trot": self._trot.state(),
+            "carrier": None if carrier is None else carrier.state_kept(),
+            "sensors": self._sensors.state(),
+        }
+
+    def restore(self, state: State, now_s: float) -> None:
+        """Power up in such a state: nobody has the lease, no command runs, the jaw keeps its clamp.
+
+        An arm that was moving holds where it is; a body that was moving slows down.
+        """
+        self._now_s = now_s
+        self._book, self._desk = CommandBook(), LeaseDesk(self._model.name)
+        joints = self._positions()[self._index.positions]
+        hold = state["arm_hold"]
+        self._arm_hold = joints[self._index.arm] if hold is None else array_of(hold)
+        self._arm_rate = np.zeros(len(self._arm_hold))
+        opening_rad, force_n, self._jaw_still_s = state["jaw"]
+        self._jaw_goal = JawGoal(opening_rad, force_n)
+        self._posture = (state["posture"][0], state["posture"][1])
+        self._leg_servos.restore(state["legs"])
+        self._trot.restore(state["trot"])
+        if self._model.carrier is not None:
+            self._model.carrier.restore(state["carrier"])
+        self._sensors.restore(state["sensors"], now_s)
 
     # -- inside ---------------------------------------------------------------------------------------------------
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from plant.sensors.imu import ImuModel
 from plant.sensors.joints import JointModel
 from plant.sensors.lidar import Lidar
 from plant.sensors.odometry import OdometryModel
+from plant.snapshot.values import State
 from plant.spot.model import SpotModel
 from skills.robot import Battery, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
 
@@ -30,6 +32,16 @@ HAND_LINK = "arm_wr1"
 _FRAME_OF_LINK = {"body": "body", HAND_LINK: "hand"}
 _LIDAR_PERIOD_S = 0.1
 _JAW_MOVES_RAD_S = 0.05
+
+
+class _Kept(Protocol):
+    """A sensor that can be restored."""
+
+    def state(self) -> State:
+        """What changes."""
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
 
 
 class SpotSensors:
@@ -94,6 +106,28 @@ class SpotSensors:
         self._battery = self._battery_model.update(now_s, load)
         if self._scan is None or now_s - self._scan.stamp_s >= _LIDAR_PERIOD_S - 1e-6:
             self._scan = self._lidar.scan(self._context, now_s, self._odometry.X_OB)
+
+    def state(self) -> State:
+        """What changes from one reading to the next; the readings themselves are taken anew."""
+        return {name: part.state() for name, part in self._parts().items()}
+
+    def restore(self, state: State, now_s: float) -> None:
+        """Go on from such a state, and take readings."""
+        for name, part in self._parts().items():
+            part.restore(state[name])
+        self._scan = None
+        self.update(now_s)
+
+    def _parts(self) -> Mapping[str, _Kept]:
+        return {
+            "odometry": self._odometry_model,
+            "imu": self._imu_model,
+            "joints": self._joint_model,
+            "gripper": self._gripper_model,
+            "battery": self._battery_model,
+            "lidar": self._lidar,
+            **{f"camera {name}": camera for name, camera in self._cameras.items()},
+        }
 
     def _clamp_force_n(self, rates: FloatArray, efforts: FloatArray) -> float:
         """Force at the jaw's tip from its motor's torque, 0 while the jaw moves."""

@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 
 from plant.locomotion.leg_kinematics import LegKinematics, UnreachableFootError
 from plant.models.spot.description import LEGS
+from plant.snapshot.values import State, array_of
 from plant.spot.model import JointIndex
 from skills.robot import ArmTrajectory
 
@@ -60,6 +61,14 @@ class LegServos:
         rates = np.clip((joints - self._last) / dt_s, -20.0, 20.0)
         self._last = joints
         return joints, rates
+
+    def state(self) -> State:
+        """The last set points."""
+        return {"last": self._last.tolist()}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        self._last = array_of(state["last"])
 
     def _solve(self, foot: int, p_BFoot: FloatArray) -> tuple[float, float, float]:
         try:

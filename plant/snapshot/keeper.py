@@ -1,0 +1,94 @@
+"""Writes the plant's state at every tick, and brings a plant of the same world back to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.snapshot.file import Snapshot, SnapshotError, SnapshotFile, encoded
+from plant.snapshot.values import State
+
+FloatArray = NDArray[np.float64]
+_WORLD: Final = "world: "
+_PATH: Final = "path: "
+
+
+class KeptEngine(Protocol):
+    """The part of the engine that a snapshot needs."""
+
+    def state(self) -> State:
+        """Time and robots."""
+
+    def world_state(self) -> Mapping[str, FloatArray]:
+        """Positions and velocities of all that moves."""
+
+    def restore(self, state: State, world: Mapping[str, FloatArray]) -> None:
+        """Go on from there."""
+
+
+class KeptReferee(Protocol):
+    """The part of the referee that a snapshot needs."""
+
+    def state(self) -> State:
+        """The record but the paths."""
+
+    def points(self, robot: str) -> Sequence[FloatArray]:
+        """A robot's path, which only grows."""
+
+    def restore(self, state: State, paths: Mapping[str, FloatArray]) -> None:
+        """Go on with a record."""
+
+
+class SnapshotKeeper:
+    """Writes a plant's whole state to a file whenever it is called. `facts` tell which world it is."""
+
+    def __init__(
+        self, path: Path, engine: KeptEngine, referee: KeptReferee, facts: Mapping[str, Any], robots: Sequence[str]
+    ) -> None:
+        self._file, self._engine, self._referee, self._facts = SnapshotFile(path), engine, referee, dict(facts)
+        self._paths = {robot: bytearray() for robot in robots}
+
+    def __call__(self) -> None:
+        """Write it."""
+        self._file.write(self.content())
+
+    def content(self) -> bytes:
+        """What is written."""
+        world = {_WORLD + name: (array.shape, array.tobytes()) for name, array in self._engine.world_state().items()}
+        paths = {_PATH + robot: self._grown(robot) for robot in self._paths}
+        values = {"facts": self._facts, "engine": self._engine.state(), "referee": self._referee.state()}
+        return encoded(self._file.next_number, values, {**world, **paths})
+
+    def _grown(self, robot: str) -> tuple[tuple[int, int], bytearray]:
+        """The path so far; only what was added since the last time is taken over."""
+        raw, points = self._paths[robot], self._referee.points(robot)
+        if len(points) * 24 < len(raw):
+            raw.clear()
+        for point in points[len(raw) // 24 :]:
+            raw.extend(point.tobytes())
+        return (len(points), 3), raw
+
+
+def restore(snapshot: Snapshot, engine: KeptEngine, referee: KeptReferee, facts: Mapping[str, Any]) -> None:
+    """Bring a plant to a snapshot's state.
+
+    Raises:
+        SnapshotError: the snapshot is one of another world, of other robots or of another version of the plant.
+    """
+    kept = snapshot.values["facts"]
+    if kept != dict(facts):
+        differing = ", ".join(key for key in facts if kept.get(key) != facts[key])
+        raise SnapshotError(f"the plant's state is that of another simulation ({differing}); run the mission again")
+    named = snapshot.arrays.items()
+    world = {name.removeprefix(_WORLD): array for name, array in named if name.startswith(_WORLD)}
+    paths = {name.removeprefix(_PATH): array for name, array in named if name.startswith(_PATH)}
+    try:
+        engine.restore(snapshot.values["engine"], world)
+        referee.restore(snapshot.values["referee"], paths)
+    except (KeyError, TypeError, ValueError) as error:
+        told = f"the plant's state was written by another version ({error!r})"
+        raise SnapshotError(f"{told}; run the mission again") from error

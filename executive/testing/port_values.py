@@ -64,13 +64,16 @@ def _record(value: Any, record: type, path: KeyPath) -> Any:
 
 
 def _either(value: Any, hint: Any, options: tuple[Any, ...], path: KeyPath) -> Any:
-    for option in options:
+    if value is None and type(None) in options:
+        return None
+    rest = [option for option in options if option is not type(None)]
+    if len(rest) == 1:
+        return port_value(value, rest[0], path)
+    for option in rest:
         try:
             return port_value(value, option, path)
-        except PortValueError as error:
-            last = error
-    if len([option for option in options if option is not type(None)]) == 1:
-        raise last
+        except PortValueError:
+            continue
     raise PortValueError(path, f"{value!r} does not fit", f"give it a {describe_type(hint)}")
 
 

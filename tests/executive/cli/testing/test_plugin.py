@@ -1,0 +1,116 @@
+"""The pytest plug-in as a user's tests meet it: fixtures, and skill tests collected from YAML."""
+
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+from skills.api import ObjectObservation, Surface
+from skills.detect.skill import Detect, DetectInputs
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.robot import Pose2D
+from skills.stow.skill import Stow, StowInputs
+
+
+@pytest.fixture
+def run_pytest(tmp_path):
+    """Run pytest on files of the given texts, in a process of its own."""
+
+    def run(**files):
+        for name, text in files.items():
+            file = tmp_path / name.replace("__", ".")
+            file.write_text(textwrap.dedent(text))
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "."]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+
+    return run
+
+
+def test_skill_tests_are_collected_by_name_and_fail_with_line_and_story(run_pytest):
+    done = run_pytest(
+        stow__skilltest__yaml="""\
+        skill: stow
+        tests:
+          - name: stowed already
+            expect: {outcome: success}
+          - name: hopeful
+            faults: [arm refuses]
+            robot: {arm: [0.4, -1.6, 1.6, 0.0, 0.4, 0.0]}
+            expect: {outcome: success}
+        """
+    )
+    assert "1 failed, 1 passed" in done.stdout
+    assert "stow.skilltest.yaml:5: skill 'stow'" in done.stdout
+    assert "expected success, and it was failure EXECUTION" in done.stdout
+    assert "Traceback" not in done.stdout
+
+
+def test_a_broken_file_is_one_error_with_its_line(run_pytest):
+    done = run_pytest(stow__skilltest__yaml="skill: stow\ntests:\n  - nam: x\n    expect: {outcome: success}\n")
+    assert "stow.skilltest.yaml:3: unknown key 'nam'" in done.stdout
+    assert done.returncode == 2
+
+
+def test_a_conftest_may_add_faults_of_its_own(run_pytest):
+    done = run_pytest(
+        conftest__py="""\
+        from skills.testing.fault_kinds import Effect, FaultKind
+
+        def pytest_errand_skill_tests(settings):
+            def effect(match):
+                def act(call):
+                    raise OSError("the moon is full")
+                return Effect(frozenset(("joints",)), act)
+            settings.fault_kinds.append(FaultKind("full moon", "full moon", "odd things happen", effect))
+        """,
+        stow__skilltest__yaml="""\
+        skill: stow
+        tests:
+          - {name: moon, faults: [full moon], expect: {outcome: failure, cause: ERROR, message: the moon is full}}
+        """,
+    )
+    assert "1 passed" in done.stdout
+
+
+def test_tests_that_use_nothing_of_it_load_nothing_heavy(run_pytest):
+    done = run_pytest(
+        test_light__py="""\
+        import sys
+
+        def test_light():
+            assert not {"pydrake", "numpy", "pydantic"} & set(sys.modules)
+        """
+    )
+    assert "1 passed" in done.stdout, done.stdout
+
+
+def test_the_bench_runs_a_skill_with_faults(skill_bench, scripted_robot, virtual_clock):
+    skill_bench.inject("lease taken at 1 s")
+    run = skill_bench.run(Navigate, NavigateInputs(Pose2D(-1.0, -1.0, 0.0)))
+    assert (run.outcome, run.cause.value) == ("failure", "EXECUTION")
+    assert virtual_clock.now() == pytest.approx(run.time_s)
+    assert scripted_robot.lease_holder().holder == "the tablet"
+
+
+def test_a_context_can_be_made_for_a_robot(skill_context, make_scripted_robot):
+    robot = make_scripted_robot(name="Bob")
+    context = skill_context(robot)
+    assert context.robot.name == "Bob"
+    assert context.pose() == Pose2D(0.0, 0.0, 0.0)
+    skill = Stow(context)
+    skill.begin(StowInputs())
+    assert skill.step() is not None
+
+
+def test_the_small_plant_has_a_robot_a_table_and_a_can(small_plant):
+    table = small_plant.world.surfaces["table"]
+    surface = Surface(table.name, table.polygon_W, table.height_m)
+    bench = small_plant.bench
+    there = bench.run(Navigate, NavigateInputs(Pose2D(0.35, 0.0, 0.0)))
+    assert there.outcome == "success", there.message
+    seen = bench.run(Detect, DetectInputs(("coke",), (surface,)))
+    assert seen.outcome == "success", seen.message
+    observation = seen.outputs["observation"]
+    assert isinstance(observation, ObjectObservation)
+    assert observation.position_W[2] == pytest.approx(0.81, abs=0.03)

@@ -1,0 +1,145 @@
+"""Files of skill tests: what is refused, with line and mend, and how a trial is judged."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import pytest
+
+from executive.errors import InputError
+from executive.testing.port_values import PortValueError, port_value
+from executive.testing.skill_test import load_skill_tests
+from executive.testing.trial import carry_out, scripted_maker
+from skills.api import Cause, Failed, Running, Skill, Succeeded, Surface
+from skills.robot import Pose2D
+from skills.testing.robot import BASE_ONLY
+
+
+@dataclass(frozen=True)
+class WaitInputs:
+    seconds: float
+    where: Pose2D | None = None
+
+
+class Wait(Skill[WaitInputs]):
+    """Waits; fails when the body moves."""
+
+    name = "wait"
+    Inputs = WaitInputs
+    outputs: ClassVar[Mapping[str, type]] = {"waited": float}
+    causes: ClassVar[Mapping[Cause, str]] = {Cause.EXECUTION: "the body moved"}
+
+    def begin(self, inputs):
+        self.inputs, self.begun_s = inputs, self.context.clock.now()
+
+    def step(self):
+        if abs(self.context.robot.odometry().pose.x_m) > 0.1:
+            return Failed(Cause.EXECUTION, "the body moved")
+        waited = self.context.clock.now() - self.begun_s
+        return Succeeded("waited", {"waited": waited}) if waited >= self.inputs.seconds else Running("waiting")
+
+
+GOOD = """\
+skill: wait
+with: {seconds: 1}
+tests:
+  - name: it waits
+    expect: {outcome: success, within_s: 2}
+  - name: pushed
+    with: {seconds: 5}
+    faults: [odometry jumps 0.5 m at 1 s]
+    expect: {outcome: failure, cause: EXECUTION, message: moved}
+  - name: cancelled
+    cancel_at_s: 0.5
+    expect: {outcome: cancelled, cause: CANCELLED}
+"""
+SKILLS = {"wait": Wait}
+MAKERS = {"scripted": scripted_maker(BASE_ONLY)}
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text):
+        path = tmp_path / "wait.skilltest.yaml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def differences(path, index):
+    return carry_out(load_skill_tests(path, SKILLS), index, Wait, MAKERS).differences
+
+
+def test_tests_that_go_as_expected_show_no_difference(written):
+    path = written(GOOD)
+    assert [differences(path, index) for index in range(3)] == [(), (), ()]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "index", "difference"),
+    [
+        ("outcome: success,", "outcome: failure,", 0, "expected failure, and it was success"),
+        ("within_s: 2", "within_s: 0.5", 0, "expected an end within 0.5 s, and it took 1.05 s"),
+        ("cause: EXECUTION", "cause: TIMEOUT", 1, "expected failure TIMEOUT, and it was failure EXECUTION"),
+        ("message: moved", "message: fell", 1, "expected a message like /fell/, and it was: the body moved"),
+        ("cancel_at_s: 0.5", "cancel_at_s: 5", 2, "expected cancelled CANCELLED, and it was success"),
+    ],
+)
+def test_a_difference_is_told_in_a_sentence(written, old, new, index, difference):
+    assert old in GOOD
+    assert differences(written(GOOD.replace(old, new)), index) == (difference,)
+
+
+def test_the_report_tells_faults_and_what_was_said_on_the_way(written):
+    file = load_skill_tests(written(GOOD.replace("message: moved", "message: fell")), SKILLS)
+    report = carry_out(file, 1, Wait, MAKERS).report()
+    assert "it ended with failure EXECUTION after 1" in report
+    assert "fault: odometry jumps 0.5 m at 1 s" in report
+    assert "0.05 s  waiting" in report
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message"),
+    [
+        ("skill: wait", "skill: weight", 1, "there is no skill 'weight'"),
+        ("skill: wait", "skil: wait", 1, "unknown key 'skil'"),
+        ("with: {seconds: 1}", "with: {secs: 1}", 2, "has no 'secs'"),
+        ("with: {seconds: 1}", "with: {seconds: long}", 2, "'long' does not fit; give it a float"),
+        ("with: {seconds: 5}", "with: {seconds: [5]}", 7, "[5] does not fit"),
+        ("with: {seconds: 5}", "with: {seconds: 5, where: {x_m: 1}}", 7, "'y_m' is missing"),
+        ("odometry jumps 0.5 m at 1 s", "odometry jumps at 1 s", 8, "there is no fault"),
+        ("cause: EXECUTION", "cause: BAD_LUCK", 9, "cause"),
+        ("message: moved", "message: '('", 9, "is no regular expression"),
+        ("outcome: success,", "outcome: success, cause: TIMEOUT,", 5, "a success has no cause"),
+        ("name: pushed", "name: it waits", 1, "two tests are named 'it waits'"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_its_line(written, old, new, line, message):
+    assert old in GOOD
+    path = written(GOOD.replace(old, new))
+    with pytest.raises(InputError) as refused:
+        load_skill_tests(path, SKILLS)
+    assert (refused.value.file, refused.value.line) == (path, line)
+    assert message in str(refused.value)
+
+
+def test_plain_values_become_records_and_tuples():
+    plain = {"name": "t", "polygon_W": [[0, 0], [1, 0], [1, 1]], "height_m": 1}
+    assert port_value(plain, Surface) == Surface("t", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "hint", "path"),
+    [
+        ([[0, 0, 0]], tuple[tuple[float, float], ...], (0,)),
+        ("x", tuple[float, ...], ()),
+        (True, float, ()),
+        ("GRASP", Cause, ()),
+        (3, str | None, ()),
+    ],
+)
+def test_values_that_do_not_fit_are_refused_with_their_path(value, hint, path):
+    with pytest.raises(PortValueError) as refused:
+        port_value(value, hint)
+    assert refused.value.path == path

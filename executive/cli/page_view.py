@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from executive.compiler import compile_mission
 from executive.control import Control
 from executive.errors import InputError
 from executive.language import load_parser
+from executive.language.parser import SpacyParser
 from executive.mission import mission_from_sentence
 from executive.record.event_log import EventLog
 from executive.record.schemas import MAP
@@ -35,13 +37,16 @@ class PageView:
         self._request, self._console, self._port = request, console, port
         self.control = Control(attended=True)
         self._feed = Feed()
+        self._threads = ThreadPoolExecutor(1, thread_name_prefix="errand-parser")
         self._progress = ProgressWatch(self._feed)
+        self._parser: Future[SpacyParser] | None = None
         self._server: PageServer | None = None
         self._watch: ControlWatch | None = None
 
     def begin(self, log: EventLog, simulation: Simulation) -> None:
         """Serve the page and print its address. Raises InputError when the port is taken."""
         log.listen(self._feed)
+        self._parser = self._threads.submit(load_parser)
         actions = {**control_actions(self.control), "say": self._say()}
         content = PageContent(self._feed, actions, scene_url=simulation.show_live().url)
         self._server = served(content, self._port)
@@ -70,6 +75,7 @@ class PageView:
 
     def close(self) -> None:
         """Serve no more; idempotent."""
+        self._threads.shutdown(wait=False)
         if self._watch is not None:
             self._watch.close()
         if self._server is not None:
@@ -91,7 +97,7 @@ class PageView:
         request = self._request
         mission = mission_from_sentence(
             sentence,
-            parser=load_parser(),
+            parser=(self._parser or self._threads.submit(load_parser)).result(),
             knowledge=request.knowledge,
             world=request.world.name,
             require_wake=False,

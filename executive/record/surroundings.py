@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -16,7 +16,7 @@ FREE, UNKNOWN, OCCUPIED = 255, 205, 0
 
 
 def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[str, Any]:
-    """The grid as a grey PNG (first row: largest y), its place in the world frame (m), and named places with poses."""
+    """The grid as a grey PNG (first row: largest y), its place in the world frame (m), and the middles of the rooms."""
     grey = np.full(grid.occupied.shape, FREE, np.uint8)
     if grid.unknown is not None:
         grey[grid.unknown] = UNKNOWN
@@ -31,8 +31,10 @@ def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[s
         "size_m": {"x": width_m, "y": height_m},
         "format": "png",
         "data": base64.b64encode(png).decode(),
-        "places": [
-            {"name": name, "x": pose.x, "y": pose.y}
-            for name, pose in ((place, knowledge.place_pose(place)) for place in knowledge.places)
-        ],
+        "places": [_label(name, place.polygon) for name, place in knowledge.places.items()],
     }
+
+
+def _label(name: str, polygon: Sequence[tuple[float, float]]) -> dict[str, Any]:
+    x, y = np.mean(polygon, axis=0)
+    return {"name": name, "x": round(float(x), 3), "y": round(float(y), 3)}

@@ -44,7 +44,7 @@
         byId("said").textContent = text;
         byId("said").classList.toggle("bad", bad);
         clearTimeout(this.clearing);
-        this.clearing = setTimeout(() => { byId("said").textContent = ""; }, bad ? 12000 : 5000);
+        this.clearing = setTimeout(() => { byId("said").textContent = ""; }, bad ? 12000 : 6000);
       }
     }
 
@@ -52,6 +52,7 @@
       const input = byId("sentence"), text = input.value.trim();
       if (!text) return;
       this.saying = true;
+      this.tell("…", false);
       if (await this.do("say", { text })) input.value = "";
       this.saying = false;
     }

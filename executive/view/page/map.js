@@ -29,9 +29,9 @@
       if (!this.image) return;
       const canvas = document.createElement("canvas"), { width, height } = this.image;
       Object.assign(canvas, { width, height });
-      const brush = canvas.getContext("2d");
+      const brush = canvas.getContext("2d", { willReadFrequently: true });
       brush.drawImage(this.image, 0, 0);
-      const pixels = brush.getImageData(0, 0, width, height), probe = document.createElement("canvas").getContext("2d");
+      const pixels = brush.getImageData(0, 0, width, height), probe = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
       const rgb = (name) => { probe.fillStyle = css(name); probe.fillRect(0, 0, 1, 1); return probe.getImageData(0, 0, 1, 1).data; };
       const [wall, unknown, floor] = ["--wall", "--unknown", "--floor"].map(rgb);
       for (let n = 0; n < pixels.data.length; n += 4) {
@@ -91,6 +91,9 @@
       brush.fillStyle = css("--dim");
       for (const place of this.map.places) {
         const [u, v] = at(place.x, place.y);
+        brush.lineWidth = 3;
+        brush.strokeStyle = css("--floor");
+        brush.strokeText(place.name, u, v + 4);
         brush.fillText(place.name, u, v + 4);
       }
     }

@@ -17,7 +17,7 @@
     const control = store.live.control, outcome = view.outcomes[view.outcomes.length - 1];
     if (outcome) {
       const look = OUTCOMES[outcome.outcome] || "failure";
-      return [look, LOOKS[look].symbol, outcome.outcome + (outcome.cause ? ` (${outcome.cause})` : ""), outcome.message];
+      return [look, LOOKS[look].symbol, outcome.outcome + (look === "failure" && outcome.cause ? ` (${outcome.cause})` : ""), outcome.message];
     }
     const mode = control && control.mode;
     if (mode && MODES[mode]) return [MODES[mode][0], MODE_SYMBOLS[mode] || LOOKS[MODES[mode][0]].symbol, MODES[mode][1], control.reason];
@@ -46,7 +46,8 @@
         byId("announced").textContent = [text, why].filter(Boolean).join(": ");
       }
       const progress = store.live.progress;
-      byId("doing").textContent = replaying || !progress ? "" : progress.message;
+      const over = view.outcomes.length > 0;
+      byId("doing").textContent = replaying || over || !progress ? "" : progress.message;
     }
   }
 

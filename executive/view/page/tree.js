@@ -25,7 +25,7 @@
 
     draw(view) {
       this.view = view;
-      const roots = view.trees.map((tree) => tree.root);
+      const roots = view.trees.map((tree) => tree.root).reverse(); // what was begun last is done first
       if (roots.length !== this.drawn.length || roots.some((root, n) => root !== this.drawn[n])) this.build(roots);
       this.redraw();
     }

@@ -16,7 +16,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.robot import FloatArray
 
-_ABOVE_SURFACE_M = 0.003
+_ABOVE_SURFACE_M = 0.006
 _LEAST_GRIP_M = 0.014
 _LEAST_BEYOND_M = 0.004
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from executive.behaviours.board import FromBoard
 from executive.command import Command
-from executive.compiling.plans import NodePlan, RememberPosePlan, SequencePlan, SkillPlan
+from executive.compiling.plans import NodePlan, RememberPosePlan, SequencePlan, SkillPlan, Source
 from executive.compiling.policies import AskPlan, PolicyFrame, SkipPlan, SummaryPlan, needs_way_back, under_policy
 from executive.compiling.skill_steps import skill_plan
 from executive.compiling.steps import START, step_plan
@@ -47,9 +47,10 @@ class Assembled:
 
 @dataclass(frozen=True)
 class _Item:
-    """One command, skill or used mission with its number on its level."""
+    """One command, skill or used mission: its number on its level, and its step with that step's place, from 1."""
 
     number: int
+    place: int
     step: MissionStep
     command: Command | None = None
 
@@ -63,9 +64,9 @@ class _Site:
     start_key: str
     names: dict[str, str] = field(default_factory=dict)
 
-    def navigate(self, path_id: str) -> NodePlan:
+    def navigate(self, path_id: str, source: Source | None) -> NodePlan:
         """The way back to where the mission began, below `path_id`."""
-        shop = Workshop(self.knowledge, self.registry, path_id, self.start_key, Command(goal=START), None)
+        shop = Workshop(self.knowledge, self.registry, path_id, self.start_key, Command(goal=START), source)
         return shop.navigate(FromBoard(self.start_key))
 
 
@@ -79,14 +80,15 @@ def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> A
     site = _Site(knowledge, registry, f"{base}/start-pose")
     plans, parts = _level(mission, base, site)
     remember = tuple(_remember(base, site.start_key, mission))
+    name, source = mission.name, mission.source
     if mission.policy == NO_POLICY and not _may_skip(plans):
-        return Assembled(SequencePlan(path_id=base, name=mission.name, steps=(*remember, *plans)), parts)
-    body: NodePlan = SequencePlan(path_id=f"{base}/steps", name="steps", steps=plans)
-    body, excuse = _under(body, mission.policy, PolicyFrame(f"{base}/whole", mission.name, None, site.navigate, False))
+        return Assembled(SequencePlan(path_id=base, name=name, source=source, steps=(*remember, *plans)), parts)
+    body: NodePlan = SequencePlan(path_id=f"{base}/steps", name="steps", source=source, steps=plans)
+    body, excuse = _under(body, mission.policy, PolicyFrame(f"{base}/whole", name, source, site.navigate, False))
     if _may_skip((body,)):
-        steps = tuple(plan.path_id for plan in plans)
-        body = SummaryPlan(path_id=f"{base}/summary", name="all but what was skipped", child=body, steps=steps)
-    root = SequencePlan(path_id=base, name=mission.name, steps=(*remember, body))
+        words, steps = "tell what was skipped", tuple(plan.path_id for plan in plans)
+        body = SummaryPlan(path_id=f"{base}/summary", name=words, source=source, child=body, steps=steps)
+    root = SequencePlan(path_id=base, name=name, source=source, steps=(*remember, body))
     return Assembled(root, tuple(_excused(parts, excuse)))
 
 
@@ -100,16 +102,15 @@ def _level(mission: Mission, base: str, site: _Site) -> tuple[tuple[NodePlan, ..
     plans: list[NodePlan] = []
     parts: list[StepPart] = []
     problems = Problems()
-    for index, (group, policy) in enumerate(_groups(mission.steps), start=1):
+    for group, policy in _groups(mission.steps):
         with problems:
             below, made = _group_plans(group, base, site)
             if policy == NO_POLICY:
                 plans, parts = [*plans, *below], [*parts, *made]
                 continue
-            place = f"{base}/step-{mission.steps.index(group[0].step) + 1}"
-            source = group[0].step.source
-            one = below[0] if len(below) == 1 else SequencePlan(path_id=place, name=place, source=source, steps=below)
-            words = f"step {index} ({_words(group[0])})"
+            number = group[0].place
+            place, source, words = f"{base}/step-{number}", group[0].step.source, f"step {number}: {_words(group)}"
+            one = below[0] if len(below) == 1 else SequencePlan(path_id=place, name=words, source=source, steps=below)
             plan, excuse = _under(one, policy, PolicyFrame(place, words, source, site.navigate))
             plans, parts = [*plans, plan], [*parts, *_excused(made, excuse)]
     problems.raise_any()
@@ -119,9 +120,9 @@ def _level(mission: Mission, base: str, site: _Site) -> tuple[tuple[NodePlan, ..
 def _groups(steps: Sequence[MissionStep]) -> Iterator[tuple[tuple[_Item, ...], StepPolicy]]:
     """Items that belong together: those of one step under a policy, or of steps in a row without any."""
     number, free = 1, []
-    for step in steps:
+    for place, step in enumerate(steps, start=1):
         commands: Sequence[Command | None] = step.commands or (None,)
-        items = [_Item(number + offset, step, command) for offset, command in enumerate(commands)]
+        items = [_Item(number + offset, place, step, command) for offset, command in enumerate(commands)]
         number += len(items)
         if step.policy == NO_POLICY:
             free += items
@@ -210,16 +211,26 @@ def _remember(base: str, key: str, mission: Mission) -> Iterator[NodePlan]:
     """A leaf that notes where the robot stands, when something leads back to it."""
     policies = (mission.policy, *(step.policy for step in mission.walk()), *_used_policies(mission))
     if any(map(needs_way_back, policies)) or any(command.goal == START for command in mission.commands):
-        yield RememberPosePlan(path_id=f"{base}/remember-start", name="where it starts", key=key)
+        path_id = f"{base}/remember-start"
+        yield RememberPosePlan(path_id=path_id, name="where it starts", source=mission.source, key=key)
 
 
 def _used_policies(mission: Mission) -> Iterator[StepPolicy]:
     yield from (step.used.policy for step in mission.walk() if step.used is not None)
 
 
-def _words(item: _Item) -> str:
+def _words(items: Sequence[_Item]) -> str:
     """What a step is called in sentences."""
-    step = item.step
+    step = items[0].step
     if step.used is not None:
         return step.used.name
-    return step.skill.skill if step.skill is not None else str(item.command)
+    commands = [item.command for item in items if item.command is not None]
+    return step.skill.skill if step.skill is not None else ", then ".join(map(_command_words, commands))
+
+
+def _command_words(command: Command) -> str:
+    """A command in a few words: "grasp coke at kitchen table"."""
+    thing = command.object or command.item
+    deed = command.task.value if command.task is not None else "take" if command.item is not None else "go"
+    goal = "" if command.goal is None else f"{'at' if command.task is not None else 'to'} {command.goal}"
+    return " ".join(filter(None, (deed, str(thing or ""), goal)))

@@ -118,7 +118,7 @@ class PolicyFrame:
     path_id: str
     words: str
     source: Source | None
-    way_back: Callable[[str], NodePlan]
+    way_back: Callable[[str, Source | None], NodePlan]
     may_skip: bool = True
 
 
@@ -184,7 +184,7 @@ def _go_back(plan: NodePlan, policy: StepPolicy, frame: PolicyFrame) -> NodePlan
         name="go back if it fails",
         source=frame.source,
         child=plan,
-        way_back=frame.way_back(f"{frame.path_id}/return"),
+        way_back=frame.way_back(f"{frame.path_id}/return", frame.source),
     )
 
 

@@ -109,13 +109,14 @@ class MissionStep:
 
 @dataclass(frozen=True)
 class Mission:
-    """What one robot is to do in one world."""
+    """What one robot is to do in one world. `source` is the line of its name; None when it was spoken."""
 
     name: str
     world: str
     robot_name: str
     steps: tuple[MissionStep, ...]
     policy: StepPolicy = StepPolicy()
+    source: SourceLine | None = None
 
     @property
     def commands(self) -> tuple[Command, ...]:

@@ -67,7 +67,8 @@ class _Resolver:
             with problems:
                 steps.append(self._step(file, index, chain))
         problems.raise_any()
-        return Mission(file.name, self.world, self.robot_name, tuple(steps), file.over(None))
+        source = file.source_line(("name",))
+        return Mission(file.name, self.world, self.robot_name, tuple(steps), file.over(None), source)
 
     def _step(self, file: MissionFile, index: int, chain: tuple[Path, ...]) -> MissionStep:
         step, path = file.steps[index], ("steps", index)

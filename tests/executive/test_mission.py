@@ -164,7 +164,7 @@ def test_the_missions_that_come_with_it_load_in_their_world(path, parser):
     worlds = Path(__file__).parents[2] / "plant" / "worlds"
     file = load_mission(path)
     mission = mission_from_file(file, parser=parser, knowledge=load_knowledge(worlds / file.world / "knowledge.yaml"))
-    assert mission.commands
+    assert mission.steps
 
 
 def test_the_fetch_drink_file_and_the_sentence_are_the_same_mission(parser):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
+from skills.api import ObjectObservation, Surface
 from skills.robot import Pose2D
 
 
@@ -62,8 +63,9 @@ class Constant:
 
 @dataclass(frozen=True)
 class FromBoard:
-    """A port bound to a blackboard key."""
+    """A port bound to a blackboard key. `gives` is the type of what is made of the value; None: it stays as it is."""
 
+    gives: ClassVar[Any] = None
     key: str
 
     def read(self, board: Board) -> Any:
@@ -86,12 +88,26 @@ class FromBoardOr(FromBoard):
 class BesideBoard(FromBoard):
     """A port bound to a pose a little beside the one under a blackboard key, in metres along that pose's axes."""
 
+    gives: ClassVar[Any] = Pose2D
     forward_m: float
     left_m: float
 
     def read(self, board: Board) -> Pose2D:
         """The shifted pose. Raises KeyError when nothing wrote it yet."""
         return beside(board.get(self.key), self.forward_m, self.left_m)
+
+
+@dataclass(frozen=True)
+class SurfaceOfSighting(FromBoard):
+    """A port bound to the surface on which the thing under a blackboard key was seen; to all, when that is unknown."""
+
+    gives: ClassVar[Any] = tuple[Surface, ...]
+    surfaces: tuple[Surface, ...]
+
+    def read(self, board: Board) -> tuple[Surface, ...]:
+        """The surfaces. Raises KeyError when nothing was seen yet."""
+        seen: ObjectObservation = board.get(self.key)
+        return tuple(surface for surface in self.surfaces if surface.name == seen.surface) or self.surfaces
 
 
 def beside(pose: Pose2D, forward_m: float, left_m: float) -> Pose2D:

@@ -16,6 +16,7 @@ from executive.behaviours.board import Board
 from executive.behaviours.composites import MemoryComposite
 from executive.behaviours.explained import Explained, cause_of, message_of
 from skills.api import Cause
+from skills.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -202,3 +203,17 @@ class OnlyIfKnown(MemoryComposite):
     def applies(self) -> bool:
         """Whether the key has been written."""
         return self._key in self._board
+
+
+class OnlyIfHolding(MemoryComposite):
+    """As its only child, for selectors that pass it over while the gripper holds nothing."""
+
+    goes_on_after = Status.SUCCESS
+
+    def __init__(self, *, path_id: str, name: str, child: Behaviour, robot: Robot) -> None:
+        super().__init__(path_id=path_id, name=name, children=[child])
+        self._robot = robot
+
+    def applies(self) -> bool:
+        """Whether something is held."""
+        return self._robot.gripper().holding

@@ -11,7 +11,7 @@ from py_trees.common import Status
 from executive.behaviours.composites import MemoryComposite
 from executive.behaviours.context import RunContext
 from executive.behaviours.leaves import Pause, SurfacesNear
-from executive.behaviours.recovery import Afterwards, OnlyIfKnown, Recover, Remedy, Trigger
+from executive.behaviours.recovery import Afterwards, OnlyIfHolding, OnlyIfKnown, Recover, Remedy, Trigger
 from executive.compiling.plans import NodePlan
 from skills.api import Cause, Surface
 
@@ -92,11 +92,16 @@ class AfterwardsPlan(NodePlan):
 
 @dataclass(frozen=True, kw_only=True)
 class OnlyIfKnownPlan(NodePlan):
-    """One way of a selector that is passed over while a blackboard key has not been written."""
+    """One way of a selector that is passed over while a blackboard key, of a value of some type, was not written."""
 
     kind: ClassVar[str] = "only if known"
     child: NodePlan
     key: str
+    holds: type
+
+    def writes(self) -> dict[str, object]:
+        """The key: for the nodes below it is there."""
+        return {self.key: self.holds}
 
     @property
     def children(self) -> tuple[NodePlan, ...]:
@@ -107,6 +112,28 @@ class OnlyIfKnownPlan(NodePlan):
         """An OnlyIfKnown composite."""
         child = self.child.build(context)
         return OnlyIfKnown(path_id=self.path_id, name=self.name, child=child, key=self.key, board=context.board)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnlyIfHoldingPlan(NodePlan):
+    """One way of a selector that is passed over while the gripper holds nothing."""
+
+    kind: ClassVar[str] = "only if holding"
+    child: NodePlan
+
+    @property
+    def children(self) -> tuple[NodePlan, ...]:
+        """The one node below."""
+        return (self.child,)
+
+    @property
+    def expected(self) -> tuple[NodePlan, ...]:
+        """Nothing."""
+        return ()
+
+    def build(self, context: RunContext) -> MemoryComposite:
+        """An OnlyIfHolding composite."""
+        return OnlyIfHolding(path_id=self.path_id, name=self.name, child=self.child.build(context), robot=context.robot)
 
 
 @dataclass(frozen=True, kw_only=True)

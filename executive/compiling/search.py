@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from executive.behaviours.board import FromBoard
+from collections.abc import Iterator
+from typing import Final
+
+from executive.behaviours.board import FromBoard, SurfaceOfSighting, beside
 from executive.command import Thing
+from executive.compiling.geometry import inside
 from executive.compiling.plans import NodePlan, SelectorPlan, SequencePlan
 from executive.compiling.recovery import OnlyIfKnownPlan
 from executive.compiling.workshop import Workshop, pose_2d
+from executive.errors import listing
 from executive.knowledge import Knowledge
-from skills.api import Cause
+from skills.api import Cause, ObjectObservation
+
+MOST_ELSEWHERE: Final = 3
+MOST_ASIDE: Final = 2
+ASIDE_M: Final = 0.45
 
 
 def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
@@ -19,6 +28,18 @@ def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> t
     inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
     usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
     return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
+
+
+def surfaces_elsewhere(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
+    """The surfaces to look at when the thing is not in its place: where it usually is, then others of the same room,
+    then any others; `MOST_ELSEWHERE` at most."""
+    if place is None:
+        return ()
+    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
+    near = knowledge.surfaces_in(knowledge.room(place))
+    inside = knowledge.surfaces_in(place)
+    others = dict.fromkeys(name for name in (*usual, *near, *knowledge.surfaces) if name not in inside)
+    return tuple(others)[:MOST_ELSEWHERE]
 
 
 def look_plans(
@@ -38,43 +59,69 @@ def _look_plan(shop: Workshop, thing: Thing, surface: str, number: int, key: str
     )
 
 
-def detect_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodePlan:
-    """Look for the thing on some surfaces from where the robot stands."""
-    ports = {
-        "classes": shop.classes(thing.name),
-        "attributes": thing.attributes,
-        "surfaces": tuple(map(shop.surface, surfaces)),
-    }
+def detect_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...] | FromBoard, key: str) -> NodePlan:
+    """Look for the thing on some surfaces, by name or from the blackboard, from where the robot stands."""
+    where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(shop.surface, surfaces))
+    ports = {"classes": shop.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
     return shop.skill("detect", ports, {"observation": key})
 
 
 def find_again_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodePlan:
-    """When it was seen before: look from here first. Else passed over."""
+    """When it was seen before: look from here first, where it was seen. Else passed over."""
+    seen_on = SurfaceOfSighting(key, tuple(map(shop.surface, surfaces)))
     return OnlyIfKnownPlan(
         path_id=shop.path_id,
         name="look from here, if seen before",
         source=shop.source,
-        child=detect_plan(shop, thing, surfaces, key),
+        child=detect_plan(shop, thing, seen_on, key),
         key=key,
+        holds=ObjectObservation,
     )
 
 
-def search_plan(shop: Workshop, thing: Thing, place: str | None, key: str) -> SelectorPlan:
+def search_plan(shop: Workshop, thing: Thing, place: str | None, key: str, *, anywhere: bool = True) -> SelectorPlan:
     """Look from here when it was seen before, else at each surface in turn; the first sighting ends the search.
+
+    When it is nowhere in its place, look at some of its surfaces from aside, then, with `anywhere`, at surfaces
+    elsewhere.
 
     Raises:
         InputError: the place has no surfaces.
     """
     surfaces = required_surfaces(shop, thing, place)
-    looks = tuple(look for _, look in look_plans(shop, thing, surfaces, key))
+    name = shop.knowledge.thing(thing.name) or thing.name
+    elsewhere = surfaces_elsewhere(shop.knowledge, name, place) if anywhere else ()
+    looks = look_plans(shop, thing, surfaces, key)
+    further = look_plans(shop.at("elsewhere"), thing, elsewhere, key)
+    looked = where(place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
     return SelectorPlan(
         path_id=shop.path_id,
         name=f"find {thing}",
         source=shop.source,
-        steps=(find_again_plan(shop.at("again"), thing, surfaces, key), *looks),
+        steps=(
+            find_again_plan(shop.at("again"), thing, (*surfaces, *elsewhere), key),
+            *(look for _, look in looks),
+            *_looks_from_aside(shop, thing, surfaces, key),
+            *(look for _, look in further),
+        ),
         exhausted_cause=Cause.PRECONDITION,
-        exhausted_message=f"found no {thing} {where(place)}",
+        exhausted_message=f"found no {thing} {looked}",
     )
+
+
+def _looks_from_aside(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> Iterator[SequencePlan]:
+    """Look again at surfaces that have only one viewpoint, from beside it."""
+    facts = shop.knowledge.surfaces
+    single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
+    for name in single[:MOST_ASIDE]:
+        room = shop.knowledge.places[facts[name].place].polygon
+        view = pose_2d(facts[name].viewpoints[0])
+        poses = (beside(view, 0.0, left_m) for left_m in (ASIDE_M, -ASIDE_M))
+        aside = next((pose for pose in poses if inside(room, (pose.x_m, pose.y_m))), None)
+        if aside is not None:
+            below = shop.at(f"{name}-aside")
+            look = detect_plan(below, thing, (name,), key)
+            yield below.sequence(f"look at {name} from aside", below.navigate(aside), look)
 
 
 def required_surfaces(shop: Workshop, thing: Thing, place: str | None) -> tuple[str, ...]:
@@ -89,7 +136,3 @@ def where(place: str | None) -> str:
     """The place as the end of a sentence."""
     return "anywhere" if place is None else f"in the {place}"
 
-
-def sighting(key: str) -> FromBoard:
-    """The port value that a search has written."""
-    return FromBoard(key)

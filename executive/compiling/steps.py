@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
 from executive.behaviours.board import FromBoard
 from executive.command import Task, Thing
-from executive.compiling.plans import AnswerPlan, HoldingPlan, NodePlan, RetryPlan, SelectorPlan
-from executive.compiling.search import look_plans, required_surfaces, search_plan, sighting, where
+from executive.compiling.geometry import inside
+from executive.compiling.handling import go_near_plan, pick_up_plan, tidied, tuck_plan, unless_dropped
+from executive.compiling.plans import AnswerPlan, HoldingPlan, NodePlan, SelectorPlan
+from executive.compiling.search import look_plans, required_surfaces, search_plan, surfaces_elsewhere, where
 from executive.compiling.workshop import Workshop, pose_2d
-from skills.api import Cause
 from skills.robot import Pose2D
 
 START: Final = "start"
-ATTEMPTS: Final = 3
-WORTH_RETRYING: Final = frozenset({Cause.EXECUTION, Cause.POSTCONDITION, Cause.PRECONDITION, Cause.PLANNING})
 
 
 def step_plan(shop: Workshop) -> NodePlan:
@@ -34,34 +33,27 @@ def needs_start(shop: Workshop) -> bool:
     return shop.command.goal == START
 
 
-def grasp_plan(shop: Workshop) -> NodePlan:
+def grasp_plan(shop: Workshop, *, anywhere: bool = True) -> NodePlan:
     """Find it, stand before it, take it, tuck the arm in.
 
-    When standing or taking fails the robot looks again and tries anew; when nothing is to be found that is final.
+    When standing or taking fails, what fits the failure is done and the robot looks again and tries anew; when nothing
+    is to be found that is final. With `anywhere`, it is looked for elsewhere, too, when it is not in its place.
     """
     thing = _required(shop, shop.command.object)
     if shop.command.item is not None:
         raise shop.error("the one gripper cannot take hold of a second thing", "put the first one down before")
     place = None if shop.command.goal is None else shop.place(shop.command.goal)
+    surfaces = set(required_surfaces(shop, thing, place))
+    if anywhere:
+        surfaces |= set(surfaces_elsewhere(shop.knowledge, shop.knowledge.thing(thing.name) or thing.name, place))
+    around = tuple(shop.surface(name) for name in shop.knowledge.surfaces if name in surfaces)
     key = f"{shop.path_id}/sighting"
-    near = f"{shop.path_id}/near-sighting"
-    surfaces = tuple(map(shop.surface, required_surfaces(shop, thing, place)))
-    attempt = shop.at("pick-up").sequence(
-        f"pick up {thing}",
-        search_plan(shop.at("find"), thing, place, key),
-        shop.skill("approach", {"observation": sighting(key), "surfaces": surfaces}, {"observation": near}),
-        shop.skill("grasp", {"observation": FromBoard(near)}),
+    search = search_plan(shop.at("find"), thing, place, key, anywhere=anywhere)
+    return shop.sequence(
+        f"get {thing} {where(place)}",
+        pick_up_plan(shop, thing, search, key, around),
+        tuck_plan(shop),
     )
-    attempts = RetryPlan(
-        path_id=f"{shop.path_id}/attempts",
-        name=f"up to {ATTEMPTS} attempts",
-        source=shop.source,
-        child=attempt,
-        attempts=ATTEMPTS,
-        causes=WORTH_RETRYING,
-        final=f"{shop.path_id}/find",
-    )
-    return shop.sequence(f"get {thing} {where(place)}", attempts, shop.skill("stow"))
 
 
 def find_plan(shop: Workshop) -> NodePlan:
@@ -75,7 +67,7 @@ def find_plan(shop: Workshop) -> NodePlan:
         path_id=below.path_id, name=f"look for {thing}", source=shop.source, steps=tuple(look for _, look in looks)
     )
     leaves = {s: tuple(f"{look.path_id}/detect" for name, look in looks if name == s) for s in surfaces}
-    return AnswerPlan(
+    answer = AnswerPlan(
         path_id=shop.path_id,
         name=f"is there {thing} {where(place)}?",
         source=shop.source,
@@ -84,6 +76,7 @@ def find_plan(shop: Workshop) -> NodePlan:
         looks=tuple(leaves.items()),
         key=f"{shop.path_id}/answer",
     )
+    return tidied(shop.at("tidy"), answer)
 
 
 def carry_plan(shop: Workshop) -> NodePlan:
@@ -108,7 +101,7 @@ def go_plan(shop: Workshop) -> NodePlan:
         return carry_plan(shop)
     if command.goal is None:
         raise shop.error("the command asks for nothing", "name a place to go to, or a thing")
-    return shop.sequence(f"go to {command.goal}", shop.navigate(_goal_pose(shop, command.goal)))
+    return shop.sequence(f"go to {command.goal}", go_near_plan(shop, _goal_pose(shop, command.goal)))
 
 
 def person_pose(shop: Workshop, person: str, at: str | None) -> Pose2D:
@@ -132,9 +125,10 @@ def _goal_pose(shop: Workshop, goal: str) -> Pose2D | FromBoard:
 
 def _hand_over_plan(shop: Workshop, item: Thing, pose: Pose2D | FromBoard, person: str) -> NodePlan:
     way = shop.at("bring").sequence(
-        f"bring it to {person}", shop.navigate(pose), shop.skill("hand_over", {"person": person})
+        f"bring it to {person}", go_near_plan(shop, pose), shop.skill("hand_over", {"person": person})
     )
-    return _holding(shop, item, way)
+    guard = _holding(shop, item, way)
+    return unless_dropped(shop.at("carry-on"), item, guard, (guard,))
 
 
 def _put_down_plan(shop: Workshop, item: Thing, place: str) -> NodePlan:
@@ -142,17 +136,22 @@ def _put_down_plan(shop: Workshop, item: Thing, place: str) -> NodePlan:
     surfaces = shop.knowledge.surfaces_in(place)
     if not surfaces:
         raise shop.error(f"'{place}' has no surface to put the {item} on", "add one under 'surfaces' in the knowledge")
-    ways = tuple(_put_on_plan(shop.at(name), item, name) for name in surfaces)
-    return SelectorPlan(path_id=shop.path_id, name=f"put {item} down {where(place)}", source=shop.source, steps=ways)
+    guards = tuple(_carry_to_plan(shop.at(name, "carry"), item, name) for name in surfaces)
+    ways = tuple(_put_on_plan(shop.at(name), name, guard) for name, guard in zip(surfaces, guards, strict=True))
+    put = SelectorPlan(path_id=shop.path_id, name=f"put {item} down {where(place)}", source=shop.source, steps=ways)
+    return unless_dropped(shop.at("carry-on"), item, put, guards)
 
 
-def _put_on_plan(shop: Workshop, item: Thing, surface: str) -> NodePlan:
+def _carry_to_plan(shop: Workshop, item: Thing, surface: str) -> HoldingPlan:
     view = pose_2d(shop.knowledge.surfaces[surface].viewpoints[0])
-    carry = _holding(shop.at("carry"), item, shop.at("carry").navigate(view))
+    return _holding(shop, item, shop.navigate(view))
+
+
+def _put_on_plan(shop: Workshop, surface: str, carry: HoldingPlan) -> NodePlan:
     return shop.sequence(f"put it on {surface}", carry, shop.skill("place", {"surface": shop.surface(surface)}))
 
 
-def _holding(shop: Workshop, item: Thing, below: NodePlan) -> NodePlan:
+def _holding(shop: Workshop, item: Thing, below: NodePlan) -> HoldingPlan:
     """A guard: what is carried stays in the gripper."""
     return HoldingPlan(path_id=shop.path_id, name=f"holding {item}", source=shop.source, child=below, thing=str(item))
 
@@ -164,16 +163,6 @@ def _person_at_start(shop: Workshop) -> str:
     rooms = [name for name, place in knowledge.places.items() if inside(place.polygon, start)]
     there = [name for name, facts in knowledge.people.items() if knowledge.room(shop.place(facts.at)) in rooms]
     return there[0] if len(there) == 1 else "person"
-
-
-def inside(polygon: Sequence[tuple[float, float]], point: tuple[float, float]) -> bool:
-    """True when (x, y) lies within the outline."""
-    x, y = point
-    crossings = 0
-    for (x1, y1), (x2, y2) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
-        if (y1 > y) != (y2 > y):
-            crossings += x < x1 + (y - y1) * (x2 - x1) / (y2 - y1)
-    return crossings % 2 == 1
 
 
 def _required(shop: Workshop, thing: Thing | None) -> Thing:

@@ -68,4 +68,4 @@ def _trip(shop: Workshop, bring: Command, number: int) -> NodePlan:
     trip = shop.at(f"trip-{number}")
     get_one = replace(trip.at("get"), command=replace(shop.command, object_count=1))
     bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))
-    return trip.sequence(f"trip {number}", grasp_plan(get_one), carry_plan(bring_one))
+    return trip.sequence(f"trip {number}", grasp_plan(get_one, anywhere=False), carry_plan(bring_one))

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from executive.behaviours.board import Binding, Constant, FromBoard
+from executive.behaviours.board import Binding, Constant, FromBoard, FromBoardOr
 from executive.compiling.plans import NodePlan, SkillPlan
 from executive.errors import InputError, did_you_mean
 from executive.types import assignable, conforms, describe_type, field_types
@@ -57,10 +57,16 @@ def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) 
     wanted = f"give it a {describe_type(kind)}"
     if isinstance(binding, Constant) and not conforms(binding.value, kind):
         yield f"input port '{port}' got {binding.value!r}", wanted
-    if isinstance(binding, FromBoard) and binding.key not in written:
+    if isinstance(binding, FromBoardOr) and not conforms(binding.default, kind):
+        yield f"input port '{port}' has the default {binding.default!r}", wanted
+    if not isinstance(binding, FromBoard) or (isinstance(binding, FromBoardOr) and binding.key not in written):
+        return
+    if binding.key not in written:
         yield f"input port '{port}' reads '{binding.key}', which nothing before it writes", wanted
-    elif isinstance(binding, FromBoard) and not assignable(written[binding.key], kind):
-        yield f"input port '{port}' reads '{binding.key}', a {describe_type(written[binding.key])}", wanted
+        return
+    given = binding.gives or written[binding.key]
+    if not assignable(given, kind):
+        yield f"input port '{port}' reads '{binding.key}', a {describe_type(given)}", wanted
 
 
 def _error(node: NodePlan, message: str, mend: str) -> InputError:

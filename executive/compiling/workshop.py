@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -10,9 +11,10 @@ from typing import Any
 from executive.behaviours.board import Binding, Constant, FromBoard
 from executive.command import Command
 from executive.compiling.plans import NodePlan, SequencePlan, SkillPlan, Source
+from executive.compiling.recovery import RecoverPlan, RemedyPlan, after
 from executive.errors import InputError, did_you_mean, listing
 from executive.knowledge import Knowledge, Pose
-from skills.api import Skill, Surface
+from skills.api import Cause, Skill, Surface
 from skills.robot import Pose2D
 
 Registry = Mapping[str, type[Skill[Any]]]
@@ -68,9 +70,32 @@ class Workshop:
         """A sequence at this workshop's path id."""
         return SequencePlan(path_id=self.path_id, name=name, source=self.source, steps=steps)
 
-    def navigate(self, pose: Pose2D | FromBoard) -> SkillPlan:
-        """Drive to a pose."""
-        return self.skill("navigate", {"goal": pose})
+    def navigate(self, pose: Pose2D | FromBoard, *, exactly: bool = False) -> NodePlan:
+        """Drive to a pose; where the way is blocked, see anew what stands there, then back off a little.
+
+        With `exactly`, within 8 cm.
+        """
+        ports = {"goal": pose, "position_tolerance_m": 0.08} if exactly else {"goal": pose}
+        drive, below = self.skill("navigate", ports), self.at("way")
+        return RecoverPlan(
+            path_id=below.path_id,
+            name="go there",
+            source=self.source,
+            attempt=drive,
+            remedies=(
+                RemedyPlan(below.skill("clear_costmap"), (after(Cause.PLANNING, Cause.EXECUTION, of=drive),)),
+                RemedyPlan(below.skill("back_off"), (after(Cause.PLANNING, Cause.EXECUTION, of=drive),)),
+            ),
+            attempts=3,
+        )
+
+    def has_ports(self, skill: str, inputs: tuple[str, ...] = (), outputs: tuple[str, ...] = ()) -> bool:
+        """Whether a registered skill has these ports; a skill of others may lack what is not essential."""
+        kind = self.registry.get(skill)
+        if kind is None:
+            return False
+        known = {field.name for field in dataclasses.fields(kind.Inputs)}
+        return known.issuperset(inputs) and set(kind.outputs).issuperset(outputs)
 
     def surface(self, name: str) -> Surface:
         """A surface of the knowledge file as the skills take it."""

@@ -31,6 +31,7 @@ from skills.api import (
 )
 from skills.api import Step as SkillStep
 from skills.robot import (
+    Battery,
     CommandId,
     CommandState,
     CommandStatus,
@@ -63,6 +64,7 @@ class ScriptedRobot:
         self.clock = clock
         self.holding = False
         self.driving = False
+        self.charge = 0.9
         self.lease: Lease | None = None
         self.leases = 0
         self.calls: list[str] = []
@@ -81,6 +83,9 @@ class ScriptedRobot:
 
     def gripper(self) -> Gripper:
         return Gripper(self.clock.now(), 0.3, 10.0 if self.holding else 0.0, self.holding)
+
+    def battery(self) -> Battery:
+        return Battery(self.clock.now(), self.charge)
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         command = self._called("drive")
@@ -126,12 +131,14 @@ class StillLocaliser:
     def __init__(self) -> None:
         self.localised = True
         self.updates = 0
+        self.stamp_s = 0.0
 
     def estimate(self) -> LocalisationEstimate:
-        return LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), self.localised)
+        return LocalisationEstimate(self.stamp_s, RigidTransform(), np.zeros((3, 3)), self.localised)
 
     def update(self, robot: Any) -> None:
         self.updates += 1
+        self.stamp_s = robot.odometry().stamp_s
 
 
 class EmptyCostmap:
@@ -197,7 +204,7 @@ def default_end(script: Script, name: str) -> Callable[[Any], SkillStep]:
 
     def grasp(skill: Any) -> SkillStep:
         skill.context.robot._robot.holding = True
-        return Succeeded("held")
+        return Succeeded("held", {"tried": (*skill.inputs.avoid, 1)})
 
     special = {"detect": detect, "grasp": grasp, "approach": lambda s: Succeeded("near", {"observation": COKE})}
     return special.get(name, lambda skill: Succeeded(f"{name} done"))
@@ -225,6 +232,7 @@ class ApproachInputs:
 @dataclass(frozen=True)
 class GraspInputs:
     observation: ObjectObservation
+    avoid: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -238,6 +246,11 @@ class HandOverInputs:
 
 
 @dataclass(frozen=True)
+class ChargeInputs:
+    level: float
+
+
+@dataclass(frozen=True)
 class NoInputs:
     pass
 
@@ -246,10 +259,14 @@ PORTS: dict[str, tuple[type, dict[str, type]]] = {
     "navigate": (NavigateInputs, {}),
     "detect": (DetectInputs, {"observation": ObjectObservation}),
     "approach": (ApproachInputs, {"observation": ObjectObservation}),
-    "grasp": (GraspInputs, {}),
+    "grasp": (GraspInputs, {"tried": tuple[int, ...]}),
     "place": (PlaceInputs, {}),
     "hand_over": (HandOverInputs, {}),
     "stow": (NoInputs, {}),
+    "clear_costmap": (NoInputs, {}),
+    "back_off": (NoInputs, {}),
+    "relocalise": (NoInputs, {}),
+    "charge": (ChargeInputs, {}),
 }
 
 KNOWLEDGE = {

@@ -176,15 +176,15 @@ def washbasin(m: Materials) -> Piece:
 
 
 def workbench(m: Materials, *, width: float) -> Piece:
-    """A workbench with a lower board, boxes on it and a vice at the right end."""
+    """A low workbench (an assembly bench) with a lower board, boxes on it and a vice at the right end."""
     piece, half = Piece(m), width / 2
-    piece.solid_box("bench_top", (-half, -0.65, 0.85), (half, 0, 0.90))
-    piece.legs("dark_steel", half - 0.03, (-0.62, -0.03), 0.07, 0.85)
+    piece.solid_box("bench_top", (-half, -0.65, 0.77), (half, 0, 0.82))
+    piece.legs("dark_steel", half - 0.03, (-0.62, -0.03), 0.07, 0.77)
     piece.solid_box("wood_grey", (-half + 0.05, -0.60, 0.20), (half - 0.05, -0.05, 0.23))
     for x, wide, tall, colour in ((-0.9, 0.5, 0.3, "carton"), (-0.2, 0.4, 0.26, "grey"), (0.4, 0.45, 0.36, "teal")):
         piece.solid_box(colour, (x, -0.5, 0.23), (x + wide, -0.12, 0.23 + tall))
-    piece.solid_box("dark_steel", (half - 0.22, -0.62, 0.90), (half - 0.06, -0.40, 1.06))
-    piece.look_box("steel", (half - 0.24, -0.66, 1.00), (half - 0.04, -0.62, 1.06))
+    piece.solid_box("dark_steel", (half - 0.22, -0.62, 0.82), (half - 0.06, -0.40, 0.98))
+    piece.look_box("steel", (half - 0.24, -0.66, 0.92), (half - 0.04, -0.62, 0.98))
     return piece
 
 

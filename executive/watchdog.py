@@ -18,6 +18,7 @@ from skills.robot import Robot
 VERB_LIMIT_S = 2.0
 IMAGE_LIMIT_S = 20.0  # `image` may block by contract
 TICK_LIMIT_S = 300.0  # in lock-step, planning and detection are part of a tick
+_ALARM_GRAIN_S = 1e-4
 
 
 class VerbHung(BaseException):
@@ -84,20 +85,26 @@ def tick_watch(robot_name: str, limit_s: float) -> Iterator[None]:
 @contextmanager
 def _alarm(limit_s: float, hung: Callable[[], VerbHung]) -> Iterator[None]:
     """Raise `hung()` when the block takes longer; an alarm around this one goes on counting."""
-
-    def ring(_signal: int, _frame: FrameType | None) -> None:
-        raise hung()
-
     begun_s = time.monotonic()
-    before = signal.signal(signal.SIGALRM, ring)
-    outer_s, _ = signal.setitimer(signal.ITIMER_REAL, limit_s)
+    before = signal.getsignal(signal.SIGALRM)
+
+    def ring(number: int, frame: FrameType | None) -> None:
+        if time.monotonic() - begun_s >= limit_s - _ALARM_GRAIN_S:
+            raise hung()
+        if callable(before):
+            before(number, frame)
+
+    outer_s, _ = signal.setitimer(signal.ITIMER_REAL, 0.0)
+    signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, min(limit_s, outer_s) if outer_s > 0.0 else limit_s)
     try:
         yield
     finally:
-        left_s = max(outer_s - (time.monotonic() - begun_s), 1e-4) if outer_s > 0.0 else 0.0
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-        signal.setitimer(signal.ITIMER_REAL, left_s)
+        if outer_s > 0.0:
+            left_s = outer_s - (time.monotonic() - begun_s)
+            signal.setitimer(signal.ITIMER_REAL, max(left_s, _ALARM_GRAIN_S))
 
 
 class _Helper:

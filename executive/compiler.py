@@ -10,9 +10,10 @@ from py_trees.behaviour import Behaviour
 from executive.behaviours.context import RunContext
 from executive.command import Command
 from executive.compiling.assembly import StepPart, assemble, step_name
+from executive.compiling.interrupts import InterruptsPlan, watched
 from executive.compiling.plans import NodePlan, Source
 from executive.compiling.wiring import check_wiring
-from executive.compiling.workshop import Registry
+from executive.compiling.workshop import Registry, Workshop
 from executive.errors import InputError
 from executive.knowledge import Knowledge
 from executive.missionfile.model import DEFAULT_WORLD, Mission, MissionStep
@@ -30,13 +31,21 @@ class Step:
 
 @dataclass(frozen=True)
 class CompiledTree:
-    """A mission's tree for one robot, as data; `parts` are what it is to bring about, in order."""
+    """A mission's tree for one robot, as data; `parts` are what it is to bring about, in order.
+
+    Its root watches over the mission itself: see `executive.compiling.interrupts`.
+    """
 
     robot_name: str
     mission_name: str
     commands: tuple[Command, ...]
     root: NodePlan
     parts: tuple[StepPart, ...] = ()
+
+    @property
+    def mission(self) -> NodePlan:
+        """The mission below its watches."""
+        return self.root.mission if isinstance(self.root, InterruptsPlan) else self.root
 
     def build(self, context: RunContext) -> Behaviour:
         """The py_trees tree for one run."""
@@ -63,8 +72,10 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
     if not mission.steps:
         raise InputError(f"the mission '{mission.name}' has no commands", mend="add at least one step")
     made = assemble(mission, knowledge=knowledge, registry=registry)
-    check_wiring(made.root)
-    return CompiledTree(mission.robot_name, mission.name, mission.commands, made.root, made.parts)
+    base = made.root.path_id
+    root = watched(Workshop(knowledge, registry, base, f"{base}/start-pose", Command(), mission.source), made.root)
+    check_wiring(root)
+    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, made.parts)
 
 
 def compile_commands(

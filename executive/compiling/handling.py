@@ -71,8 +71,12 @@ def pick_up_plan(
     approach = shop.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     grasp, tries = _grasp_plan(shop, near, tried)
     attempt = shop.at("pick-up").sequence(f"pick up {thing}", search, approach, tries)
-    look = PausePlan(path_id=f"{shop.path_id}/look-again", name="look again", duration_s=LOOK_AGAIN_S)
-    once_more = PausePlan(path_id=f"{shop.path_id}/plan-again", name="look and plan again", duration_s=LOOK_AGAIN_S)
+    look = PausePlan(
+        path_id=f"{shop.path_id}/look-again", name="look again", source=shop.source, duration_s=LOOK_AGAIN_S
+    )
+    once_more = PausePlan(
+        path_id=f"{shop.path_id}/plan-again", name="look and plan again", source=shop.source, duration_s=LOOK_AGAIN_S
+    )
     remedies = (
         RemedyPlan(look, (after(*_NOT_PLANNING, of=grasp), after(*_NOT_PLANNING, of=approach)), uses=2),
         RemedyPlan(once_more, (after(Cause.PLANNING, of=grasp),)),
@@ -118,7 +122,9 @@ def tuck_plan(shop: Workshop) -> NodePlan:
         causes=frozenset({Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION}),
     )
     below = shop.at("carry-as-it-is")
-    settle = PausePlan(path_id=f"{below.path_id}/settle", name="hold it still", duration_s=LOOK_AGAIN_S)
+    settle = PausePlan(
+        path_id=f"{below.path_id}/settle", name="hold it still", source=shop.source, duration_s=LOOK_AGAIN_S
+    )
     as_it_is = OnlyIfHoldingPlan(path_id=below.path_id, name="carry it as it is held", source=shop.source, child=settle)
     return SelectorPlan(
         path_id=f"{shop.path_id}/tucked-in", name="tuck the arm in", source=shop.source, steps=(twice, as_it_is)
@@ -129,7 +135,7 @@ def tidied(shop: Workshop, work: NodePlan, *, only_after_failure: bool = False) 
     """Work after which the arm is stowed, whatever came of it."""
     return AfterwardsPlan(
         path_id=shop.path_id,
-        name=f"{work.name}, then stow the arm" + (" if it failed" if only_after_failure else ""),
+        name="stow the arm if it fails" if only_after_failure else "stow the arm in the end",
         source=shop.source,
         first=work,
         then=shop.skill("stow"),

@@ -15,7 +15,7 @@ from executive.behaviours.board import FromBoard
 from executive.behaviours.conditions import Condition, LeaseHeld, StopReleased, battery_reserve, localised
 from executive.behaviours.context import RunContext
 from executive.behaviours.interrupts import Call, Interrupt, Interrupts, Monitor
-from executive.compiling.plans import NodePlan, RememberPosePlan, SequencePlan
+from executive.compiling.plans import NodePlan, RememberPosePlan
 from executive.compiling.recovery import PausePlan, RecoverPlan, RemedyPlan, after
 from executive.compiling.workshop import Workshop, pose_2d
 from skills.api import Cause
@@ -127,10 +127,11 @@ def watched(shop: Workshop, mission: NodePlan) -> InterruptsPlan:
     below = shop.at("watch")
     return InterruptsPlan(
         path_id=below.path_id,
+        source=shop.source,
         name=f"{mission.name}, watched",
         watches=(
-            MonitorPlan(path_id=below.at("stop-button").path_id, name="stop button released", condition=StopReleased),
-            MonitorPlan(path_id=below.at("lease").path_id, name="lease held", condition=LeaseHeld),
+            _monitor(below.at("stop-button"), "stop button released", StopReleased),
+            _monitor(below.at("lease"), "lease held", LeaseHeld),
             _battery_plan(below.at("battery")),
             _lost_plan(below.at("lost")),
         ),
@@ -138,11 +139,15 @@ def watched(shop: Workshop, mission: NodePlan) -> InterruptsPlan:
     )
 
 
+def _monitor(shop: Workshop, name: str, condition: Callable[[], Condition]) -> MonitorPlan:
+    return MonitorPlan(path_id=shop.path_id, name=name, source=shop.source, condition=condition)
+
+
 def _battery_plan(shop: Workshop) -> BatteryPlan:
     """To the dock, charge, and back to where it was."""
     facts, dock = shop.knowledge.battery, pose_2d(shop.knowledge.dock)
     key = f"{shop.path_id}/where"
-    remember = RememberPosePlan(path_id=f"{shop.path_id}/remember", name="where it was", key=key)
+    remember = RememberPosePlan(path_id=f"{shop.path_id}/remember", name="where it was", source=shop.source, key=key)
     work = shop.at("charge").sequence(
         f"charge to {facts.charged:.0%}",
         remember,
@@ -152,6 +157,7 @@ def _battery_plan(shop: Workshop) -> BatteryPlan:
     )
     return BatteryPlan(
         path_id=shop.path_id,
+        source=shop.source,
         name="battery low: charge",
         child=relocalising(shop.at("lost"), work),
         spares=HANDLING,
@@ -164,10 +170,11 @@ def _battery_plan(shop: Workshop) -> BatteryPlan:
 def _dock_plan(shop: Workshop, dock: Pose2D, level: float) -> RecoverPlan:
     """Stand on the dock and charge; where it does not charge, back off and dock again."""
     charge = shop.skill("charge", {"level": level})
-    attempt = shop.at("charge").sequence("dock and charge", shop.navigate(dock, exactly=True), charge)
+    attempt = shop.at("attempt").sequence("dock and charge", shop.navigate(dock, exactly=True), charge)
     back_off = shop.at("again").skill("back_off")
     return RecoverPlan(
         path_id=shop.path_id,
+        source=shop.source,
         name="charge at the dock",
         attempt=attempt,
         remedies=(RemedyPlan(back_off, (after(Cause.POSTCONDITION, of=charge),), uses=2),),
@@ -181,7 +188,8 @@ def relocalising(shop: Workshop, work: NodePlan) -> RecoverPlan:
     causes = (Cause.PRECONDITION, Cause.EXECUTION)
     return RecoverPlan(
         path_id=shop.path_id,
-        name=f"{work.name}, knowing where it is",
+        source=shop.source,
+        name="know where it is",
         attempt=work,
         remedies=(RemedyPlan(find_out, (after(*causes),)),),
         attempts=2,
@@ -189,13 +197,13 @@ def relocalising(shop: Workshop, work: NodePlan) -> RecoverPlan:
 
 
 def _lost_plan(shop: Workshop) -> LostPlan:
-    settle = PausePlan(path_id=f"{shop.path_id}/settle", name="stand still", duration_s=0.5)
+    settle = PausePlan(path_id=f"{shop.path_id}/settle", name="stand still", source=shop.source, duration_s=0.5)
+    find_out = shop.at("find-out").sequence("find out where it is", settle, shop.skill("relocalise"))
     return LostPlan(
         path_id=shop.path_id,
+        source=shop.source,
         name="place lost: find out where it is",
-        child=SequencePlan(
-            path_id=shop.at("find-out").path_id, name="find out where it is", steps=(settle, shop.skill("relocalise"))
-        ),
+        child=find_out,
         spares=HANDLING,
         uses=MOST_RELOCALISATIONS,
         patience_s=2.0,

@@ -36,10 +36,10 @@ demo: env
 	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
 
 test: env
-	$(BIN)/pytest -n $(JOBS) --dist worksteal
+	$(BIN)/pytest -n $(JOBS) --dist worksteal --ignore=tests/benchmarks
 
 fast: env
-	$(BIN)/pytest -n $(JOBS) -m "not mission"
+	$(BIN)/pytest -n $(JOBS) --ignore=tests/benchmarks -m "not mission"
 
 check: env
 	$(BIN)/ruff check .

@@ -6,6 +6,7 @@ otherwise.
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,7 +15,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
 from executive.errors import InputError, did_you_mean, listing
-from executive.testing.port_values import PortValueError, inputs_of
+from executive.port_values import PortValueError, gathered, port_value
+from executive.testing.small_room import room_knowledge
+from executive.types import describe_type, field_types
 from executive.yaml_source import YamlSource, read_yaml, validate
 from skills.api import Cause, Skill
 from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
@@ -52,6 +55,7 @@ class RobotSetup(_Strict):
     in_jaw: float | None = Field(
         default=None, description="opening (rad) at which a closing jaw holds something (scripted only)"
     )
+    docked: bool = Field(default=False, description="it stands on a dock and charges (scripted only)")
     charge: float = Field(default=0.9, ge=0.0, le=1.0, description="battery, 0 to 1 (scripted only)")
     lost: bool = Field(default=False, description="it does not know where it is (scripted only)")
 
@@ -146,14 +150,28 @@ class SkillTestFile(_Strict):
         return {**self.with_, **self.tests[index].with_}
 
     def inputs(self, index: int, skill: type[Skill[Any]]) -> Any:
-        """The skill's Inputs for one test. Raises InputError with file and line."""
+        """The skill's Inputs for one test; names are those of the room. Raises InputError with file and line."""
+        hints, knowledge, values = field_types(skill.Inputs), room_knowledge(), self.ports(index)
         try:
-            return inputs_of(skill.Inputs, self.ports(index))
+            found = gathered(values, skill.Inputs)
+            missing = [field.name for field in dataclasses.fields(skill.Inputs) if _needed(field, found)]
+            if missing:
+                mend = f"give it a {describe_type(hints[missing[0]])}"
+                raise PortValueError((), f"input port '{missing[0]}' has no value", mend)
+            given = {port: port_value(value, hints[port], knowledge, at) for port, (at, value) in found.items()}
         except PortValueError as error:
-            own = bool(error.path) and error.path[0] in self.tests[index].with_
-            where = ("tests", index, "with") if own or not self.with_ else ("with",)
-            port = ".".join(map(str, error.path)) or "its ports"
-            raise self.error((*where, *error.path), f"{port}: {error.message}", error.mend) from error
+            own = not self.with_ or (bool(error.path) and error.path[0] in self.tests[index].with_)
+            where = ("tests", index, "with") if own else ("with",)
+            port = ".".join(map(str, error.path))
+            what = f"{port}: {error.message}" if port else error.message
+            raise self.error((*where, *error.path), what, error.mend) from error
+        return skill.Inputs(**given)
+
+
+def _needed(field: dataclasses.Field[Any], found: Mapping[str, Any]) -> bool:
+    """Whether a port has neither a value nor a default."""
+    missing = dataclasses.MISSING
+    return field.name not in found and field.default is missing and field.default_factory is missing
 
 
 def load_skill_tests(

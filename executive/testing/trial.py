@@ -59,7 +59,7 @@ def scripted(capabilities: Capabilities, setup: RobotSetup, world: WorldSetup) -
     """A bench with a scripted robot, and that robot."""
     clock, blocks = VirtualClock(), blocks_of(world)
     pose = Pose2D(setup.pose.x, setup.pose.y, setup.pose.yaw)
-    start = Start(pose, setup.arm, setup.in_jaw, setup.holding, setup.charge)
+    start = Start(pose, setup.arm, setup.in_jaw, setup.holding, setup.charge, setup.docked)
     robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
     place = KnownPlace(pose)
     place.localised = not setup.lost

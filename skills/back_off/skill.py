@@ -41,6 +41,7 @@ class BackOff(Skill[BackOffInputs]):
         Cause.EXECUTION: "the robot refuses to drive or does not get on",
     }
     default_timeout_s: ClassVar[float] = 15.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
 
     def __init__(self, context: SkillContext) -> None:
         super().__init__(context)

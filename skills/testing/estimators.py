@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
-from skills.robot import Pose2D, Robot
+from skills.robot import Pose2D, Robot, Scan
 from skills.testing.blocks import Block
 
 OPEN_M = 9.0
 
 
 class KnownPlace:
-    """A localiser that was told where odometry begins and trusts it. Implements `skills.api.Localiser`.
+    """A localiser that was told where odometry begins and trusts it. Implements `skills.api.SearchingLocaliser` too.
 
     Set `localised` to False to be lost. Its stamp is that of the odometry it last took in.
     """
@@ -31,6 +31,14 @@ class KnownPlace:
     def update(self, robot: Robot) -> None:
         """Take in the odometry's stamp."""
         self._stamp_s = robot.odometry().stamp_s
+
+    def search(self, scan: Scan, radius_m: float | None) -> LocalisationEstimate | None:
+        """Where the robot is; what a search of the map would find."""
+        return LocalisationEstimate(scan.stamp_s, self._X_WO, np.eye(3) * 1e-4, True)
+
+    def accept(self, estimate: LocalisationEstimate) -> None:
+        """No longer lost."""
+        self._X_WO, self.localised = estimate.X_WO, True
 
 
 class BlockCostmap:
@@ -58,3 +66,7 @@ class BlockCostmap:
 
     def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
         """Nothing changes."""
+
+    def forget_seen(self) -> int:
+        """Nothing was seen that is not there."""
+        return 0

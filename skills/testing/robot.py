@@ -42,6 +42,7 @@ _JAW_RAD_S = 3.0
 _SCAN_PERIOD_S = 0.1
 _TRAJECTORY_START_RAD = 0.25
 _BATTERY_RUNTIME_S = 5400.0
+_CHARGING_S = 600.0
 _HAND_TO_THING_M = 0.185
 _FINGER_M = 0.03
 
@@ -65,7 +66,7 @@ class Start:
     """How the robot begins: its true pose in the world, arm angles (stowed unless said), jaw, charge.
 
     `in_jaw_rad` is the jaw's opening about what lies between its fingers: closing stops there and holds it. None means
-    that there is nothing. `holding` begins with the jaw closed about it.
+    that there is nothing. `holding` begins with the jaw closed about it. A `docked` robot charges.
     """
 
     pose: Pose2D = field(default_factory=lambda: Pose2D(0.0, 0.0, 0.0))
@@ -73,6 +74,7 @@ class Start:
     in_jaw_rad: float | None = None
     holding: bool = False
     charge: float = 0.9
+    docked: bool = False
 
 
 class ScriptedRobot:
@@ -107,7 +109,7 @@ class ScriptedRobot:
         self.jaw_force_n = 20.0 if start.holding else 0.0
         self.held: Block | None = can_at(0.0, 0.0, 0.0) if start.holding else None
         self._hangs_down_m = 0.057  # of what is held, below the fingers' middle
-        self.charge = start.charge
+        self.charge, self.docked = start.charge, start.docked
         self.present_faults: tuple[str, ...] = ()
         self.refuse_because: dict[str, str] = {}
         self.calls: list[str] = []
@@ -310,7 +312,8 @@ class ScriptedRobot:
         self._move_body(dt_s)
         self._move_arm()
         self._move_jaw(dt_s)
-        self.charge = max(0.0, self.charge - dt_s / _BATTERY_RUNTIME_S)
+        used = -dt_s / _CHARGING_S if self.docked else dt_s / _BATTERY_RUNTIME_S
+        self.charge = min(1.0, max(0.0, self.charge - used))
 
     def _move_base(self, dt_s: float) -> None:
         """Towards the commanded velocity within the acceleration; without a command it brakes harder."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.cli.testing.small_room import write_small_room
 from executive.testing.bench import SkillBench
 from executive.testing.skill_test import RobotSetup, WorldSetup
+from executive.testing.small_room import write_small_room
 from executive.testing.trial import BenchMaker
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world

@@ -7,10 +7,9 @@ from typing import ClassVar
 import pytest
 
 from executive.errors import InputError
-from executive.testing.port_values import PortValueError, port_value
 from executive.testing.skill_test import load_skill_tests
 from executive.testing.trial import carry_out, scripted_maker
-from skills.api import Cause, Failed, Running, Skill, Succeeded, Surface
+from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.robot import Pose2D
 from skills.testing.robot import BASE_ONLY
 
@@ -104,10 +103,11 @@ def test_the_report_tells_faults_and_what_was_said_on_the_way(written):
     [
         ("skill: wait", "skill: weight", 1, "there is no skill 'weight'"),
         ("skill: wait", "skil: wait", 1, "unknown key 'skil'"),
-        ("with: {seconds: 1}", "with: {secs: 1}", 2, "has no 'secs'"),
-        ("with: {seconds: 1}", "with: {seconds: long}", 2, "'long' does not fit; give it a float"),
-        ("with: {seconds: 5}", "with: {seconds: [5]}", 7, "[5] does not fit"),
-        ("with: {seconds: 5}", "with: {seconds: 5, where: {x_m: 1}}", 7, "'y_m' is missing"),
+        ("with: {seconds: 1}", "with: {secs: 1}", 2, "there is no input port 'secs'"),
+        ("with: {seconds: 1}", "with: {seconds: long}", 2, "'long' does not fit; give a number"),
+        ("with: {seconds: 5}", "with: {seconds: [5]}", 7, "does not fit; give a number"),
+        ("with: {seconds: 5}", "with: {seconds: 5, where: {x_m: 1}}", 7, "where: 'y' is missing"),
+        ("with: {seconds: 1}", "with: {}", 4, "input port 'seconds' has no value; give it a float"),
         ("odometry jumps 0.5 m at 1 s", "odometry jumps at 1 s", 8, "there is no fault"),
         ("cause: EXECUTION", "cause: BAD_LUCK", 9, "cause"),
         ("message: moved", "message: '('", 9, "is no regular expression"),
@@ -122,24 +122,3 @@ def test_a_wrong_file_is_refused_with_its_line(written, old, new, line, message)
         load_skill_tests(path, SKILLS)
     assert (refused.value.file, refused.value.line) == (path, line)
     assert message in str(refused.value)
-
-
-def test_plain_values_become_records_and_tuples():
-    plain = {"name": "t", "polygon_W": [[0, 0], [1, 0], [1, 1]], "height_m": 1}
-    assert port_value(plain, Surface) == Surface("t", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 1.0)
-
-
-@pytest.mark.parametrize(
-    ("value", "hint", "path"),
-    [
-        ([[0, 0, 0]], tuple[tuple[float, float], ...], (0,)),
-        ("x", tuple[float, ...], ()),
-        (True, float, ()),
-        ("GRASP", Cause, ()),
-        (3, str | None, ()),
-    ],
-)
-def test_values_that_do_not_fit_are_refused_with_their_path(value, hint, path):
-    with pytest.raises(PortValueError) as refused:
-        port_value(value, hint)
-    assert refused.value.path == path

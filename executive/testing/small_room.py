@@ -1,4 +1,4 @@
-"""A small world for the plant, written as a world folder: the room, the table and the can of the scripted robot."""
+"""The small room as a world: what is known of it, and a folder from which a plant builds it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import yaml
 
+from executive.knowledge import Knowledge
 from skills.testing.blocks import ROOM, Block, grid_of
 
 TABLE = "table"
@@ -32,6 +33,11 @@ def write_small_room(folder: Path, *, can: bool = True) -> Path:
     for name, band_m in _BANDS.items():
         _write_map(folder / "map", name, band_m)
     return folder
+
+
+def room_knowledge() -> Knowledge:
+    """What the robot is told of the room."""
+    return Knowledge.model_validate(_knowledge())
 
 
 def _write_yaml(path: Path, data: Mapping[str, Any]) -> None:

@@ -1,0 +1,19 @@
+"""Every skill of ours has skill tests, and with them the suite for every skill."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from executive.registry import built_in_skills
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.mark.parametrize("name", sorted(built_in_skills()))
+def test_every_skill_has_skill_tests_with_the_suite(name):
+    file = yaml.safe_load((ROOT / f"tests/skills/{name}/{name}.skilltest.yaml").read_text())
+    assert file["skill"] == name
+    assert file["suite"]
+    assert any(test["expect"]["outcome"] == "success" and not test.get("faults") for test in file["tests"])
+    assert any(test["expect"]["outcome"] == "failure" for test in file["tests"]) or name == "clear_costmap"

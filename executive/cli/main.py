@@ -18,6 +18,7 @@ from executive.cli.check_command import check
 from executive.cli.live import live_view
 from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
+from executive.cli.new_skill_command import new_skill
 from executive.cli.output import BAD_INPUT, NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.page_view import PageView
 from executive.cli.replay_command import replay
@@ -50,6 +51,7 @@ app.command()(check)
 app.command()(tree)
 app.command()(log)
 app.command()(replay)
+app.command()(new_skill)
 
 
 @app.command()

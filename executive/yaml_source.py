@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -138,7 +139,9 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
 def _telling(errors: list[ErrorDetails], source: YamlSource) -> list[ErrorDetails]:
     """The errors that tell most, one for each place; what an unknown key has brought about is left out."""
     misspelled = {_path(error)[:-1] for error in errors if error["type"] == "extra_forbidden"}
-    causes = (e for e in errors if e["type"] == "extra_forbidden" or _parent(e) not in misspelled)
+    above = {_path(error)[:n] for error in errors for n in range(len(_path(error)))}
+    own = [error for error in errors if not (error["type"] == "too_short" and _path(error) in above)]
+    causes = (e for e in own if e["type"] == "extra_forbidden" or _parent(e) not in misspelled)
     ordered = sorted(causes, key=lambda e: (e["type"] != "extra_forbidden", source.line(_path(e))))
     return list({_path(error): error for error in reversed(ordered)}.values())[::-1]
 
@@ -165,9 +168,15 @@ def _input_error(model: type[BaseModel], source: YamlSource, error: ErrorDetails
         parent = ".".join(str(part) for part in path[:-1]) or "the file"
         return source.error(path[:-1], f"key {path[-1]!r} is missing in {parent}", f"add {path[-1]!r}")
     what = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
-    return source.error(
-        path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", f"it reads {error['input']!r} now"[:120]
-    )
+    mend = _nearest_word(error) or f"it reads {error['input']!r} now"[:120]
+    return source.error(path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", mend)
+
+
+def _nearest_word(error: ErrorDetails) -> str | None:
+    """A guess at which of the words that are allowed was meant."""
+    allowed = re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", "")))
+    near = did_you_mean(str(error["input"]), allowed)
+    return None if near is None else f"did you mean {near!r}?"
 
 
 _PLAINER: Final[Mapping[str, str]] = MappingProxyType(
@@ -181,13 +190,17 @@ _PLAINER: Final[Mapping[str, str]] = MappingProxyType(
         "int_type": "should be a whole number",
         "bool_type": "should be true or false",
         "string_too_short": "should not be empty",
+        "too_short": "should not be empty",
         "finite_number": "should be a finite number",
     }
 )
 
 
 def _field_names(model: type[BaseModel] | None) -> list[str]:
-    return [] if model is None else [field.alias or name for name, field in model.model_fields.items()]
+    """The keys of a model, those that are required first."""
+    fields = [] if model is None else list(model.model_fields.items())
+    ordered = sorted(fields, key=lambda item: not item[1].is_required())
+    return [field.alias or name for name, field in ordered]
 
 
 def _model_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from executive.check import Abilities, PlannedWays
 from executive.cli.promises import promises_of
 from executive.compiler import CompiledTree
-from executive.errors import InputError
+from executive.errors import InputError, did_you_mean
 from executive.knowledge import Knowledge, load_knowledge
 from executive.outcome import RobotResult
 from executive.runner import RunEntry
@@ -17,7 +17,7 @@ from plant.models.catalogue import load_catalogue
 from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.spot.robot import spot_capabilities
-from plant.worlds.world import World, WorldError, load_world
+from plant.worlds.world import World, WorldError, known_worlds, load_world
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import MapError, load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
@@ -32,7 +32,16 @@ def open_world(name: str) -> World:
     try:
         return load_world(name)
     except (WorldError, OSError) as error:
-        raise InputError(str(error)) from error
+        raise _world_error(name, error) from error
+
+
+def _world_error(name: str, error: Exception) -> InputError:
+    """Of a world that is not there its name and what there is; else what its files say."""
+    if not isinstance(error, OSError) and not str(error).startswith("unknown world"):
+        return InputError(str(error))
+    near = did_you_mean(name, known_worlds())
+    known = f"known are {', '.join(known_worlds())}, and folders with a world.dmd.yaml"
+    return InputError(f"unknown world '{name[:60]}'", mend=f"did you mean '{near}'?" if near else known)
 
 
 def knowledge_of(world: World) -> Knowledge:

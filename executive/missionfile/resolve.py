@@ -22,6 +22,7 @@ from executive.yaml_source import read_yaml, validate
 __all__ = ["load_mission", "mission_from_file"]
 
 MAX_STEPS: Final = 5000
+REASON_LETTERS: Final = 500
 _NOT_UNDERSTOOD: Final = "the sentence was not understood"
 _NONE_GIVEN: Final[Given] = MappingProxyType({})
 _ONLY_AT_THE_TOP: Final = ("knowledge", "robot", "world")
@@ -87,7 +88,7 @@ class _Resolver:
         )
         if answer.status is not Status.OK:
             mend = "say it in other words, or write take, to, do and object"
-            raise file.error((*path, "say"), answer.reason or _NOT_UNDERSTOOD, mend)
+            raise file.error((*path, "say"), (answer.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], mend)
         return MissionStep(answer.commands, source, policy)
 
     def _used(self, file: MissionFile, index: int, chain: tuple[Path, ...]) -> Mission:
@@ -113,12 +114,20 @@ def _found(file: MissionFile, index: int) -> Path:
     assert step.use is not None
     folder = Path() if file.source is None else file.source.path.parent
     path = folder / step.use
-    if path.is_file():
+    if _is_file(path):
         return path
     beside = sorted(one.name for one in folder.glob("*.yaml"))
     near = difflib.get_close_matches(step.use, beside, n=1)
     mend = f"did you mean '{near[0]}'?" if near else "give its path from this file's folder"
     raise file.error(("steps", index, "use"), f"there is no mission file '{step.use}'", mend)
+
+
+def _is_file(path: Path) -> bool:
+    """Whether a path leads to a file; no when the system cannot even look there."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def _refuse_top_keys(used: MissionFile, user: MissionFile) -> None:

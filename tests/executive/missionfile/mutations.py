@@ -1,0 +1,230 @@
+"""Ways to break a good mission file, each of which makes it a wrong one for certain. Chosen by a seeded generator."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+Path_ = tuple[str | int, ...]
+FREE = ("parameters", "knowledge", "with", "gives")  # below these any key may be right
+NAMES = ("to", "take", "object", "skill", "use", "world")
+
+
+def broken_files(good: list[Path], count: int, seed: int) -> Iterator[tuple[str, bytes]]:
+    """`count` broken files as the name of the mutation and the bytes."""
+    rng = np.random.default_rng(seed)
+    names = sorted(MUTATIONS)
+    made = 0
+    while made < count:
+        file, name = good[rng.integers(len(good))], names[made % len(names)]
+        broken = MUTATIONS[name](file.read_text(encoding="utf-8"), rng)
+        if broken is None:
+            file = good[made % len(good)]
+            broken = delete_required(file.read_text(encoding="utf-8"), rng)
+            name = "delete_required"
+        yield f"{name}-{file.stem}-{made}", broken
+        made += 1
+
+
+def positions(data: Any, path: Path_ = ()) -> Iterator[Path_]:
+    """The paths of all keys and items, but those where anything may stand."""
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, value in items:
+        yield (*path, key)
+        if key not in FREE:
+            yield from positions(value, (*path, key))
+
+
+def parent(data: Any, path: Path_) -> Any:
+    for part in path[:-1]:
+        data = data[part]
+    return data
+
+
+def chosen(rng: np.random.Generator, options: list[Any]) -> Any:
+    return options[int(rng.integers(len(options)))] if options else None
+
+
+def changed(text: str, rng: np.random.Generator, where: Callable[[Path_, Any], bool], change: Any) -> bytes | None:
+    """The document with one place changed that fits; None when none does."""
+    data = yaml.safe_load(text)
+    path = chosen(rng, [p for p in positions(data) if where(p, parent(data, p)[p[-1]])])
+    if path is None:
+        return None
+    broken = copy.deepcopy(data)
+    change(parent(broken, path), path[-1], rng)
+    return yaml.safe_dump(broken, sort_keys=False, allow_unicode=True).encode()
+
+
+def rename_key(text, rng):
+    def rename(node, key, rng):
+        value = node.pop(key)
+        node[key[:-1] + key[-1] * 2 if rng.random() < 0.5 else "x" + key] = value
+
+    return changed(text, rng, lambda p, v: isinstance(p[-1], str), rename)
+
+
+def delete_required(text, rng):
+    return changed(text, rng, lambda p, v: p in (("name",), ("steps",)), lambda node, key, rng: node.pop(key))
+
+
+def delete_half_of_a_pair(text, rng):
+    return changed(text, rng, lambda p, v: p[-1] in ("do",), lambda node, key, rng: node.pop(key))
+
+
+def wrong_type(text, rng):
+    wrong = [[1, 2], {"a": 1}, 3.5, True, None, [], float("nan"), "\x00".join("ab")]
+
+    def replace(node, key, rng):
+        fits = [w for w in wrong[:6] if type(w) is not type(node[key]) and not (key == "name" and w is None)]
+        node[key] = fits[int(rng.integers(len(fits)))] if key in ("name", "steps", "say", "do") else [[{"a": [1]}]]
+
+    return changed(
+        text, rng, lambda p, v: isinstance(p[-1], str) and p[-1] not in FREE and v is not None, _not_none(replace)
+    )
+
+
+def _not_none(replace):
+    def change(node, key, rng):
+        replace(node, key, rng)
+        if node[key] is None:
+            node[key] = [1]
+
+    return change
+
+
+def wrong_number(text, rng):
+    values = [-1, 0, -0.5, float("inf"), float("nan"), "soon", [60], True]
+
+    def replace(node, key, rng):
+        node[key] = chosen(rng, values)
+
+    return changed(text, rng, lambda p, v: p[-1] in ("timeout", "time", "limit"), replace)
+
+
+def unknown_name(text, rng):
+    def replace(node, key, rng):
+        node[key] = chosen(rng, ["moon base", "kitchn", "unicorn", "..", "a" * 300, "navigat", "flatt", "🙂"])
+
+    return changed(text, rng, lambda p, v: p[-1] in NAMES and isinstance(v, str), replace)
+
+
+def unknown_sentence(text, rng):
+    def replace(node, key, rng):
+        node[key] = chosen(rng, ["sing me a song", "", "bring", "fetch the unicorn from the kitchen", "x" * 5000, "?!"])
+
+    return changed(text, rng, lambda p, v: p[-1] == "say", replace)
+
+
+def unknown_port(text, rng):
+    def replace(node, key, rng):
+        node[key] = {"nonsense": 1, **(node[key] or {})}
+
+    return changed(text, rng, lambda p, v: p[-1] == "with", replace)
+
+
+def mistyped_port(text, rng):
+    def replace(node, key, rng):
+        name = chosen(rng, sorted(node[key]))
+        node[key][name] = chosen(rng, [[[]], {"b": {}}, [None]])
+
+    return changed(text, rng, lambda p, v: p[-1] == "with" and isinstance(v, dict) and v, replace)
+
+
+def unknown_parameter(text, rng):
+    def replace(node, key, rng):
+        node[key] = "the ${nowhere} room"
+
+    return changed(text, rng, lambda p, v: isinstance(v, str), replace)
+
+
+def empty_step(text, rng):
+    data = yaml.safe_load(text)
+    data["steps"].insert(int(rng.integers(len(data["steps"]) + 1)), chosen(rng, [{}, None, "go", 3, [], {"with": {}}]))
+    return yaml.safe_dump(data, sort_keys=False).encode()
+
+
+def uses_itself(text, rng):
+    data = yaml.safe_load(text)
+    data["steps"].append({"use": "mission.yaml"})
+    data.pop("parameters", None)
+    return yaml.safe_dump(data, sort_keys=False).encode()
+
+
+def bad_override(text, rng):
+    data = yaml.safe_load(text)
+    wrong = [{"places": {"kitchen": 3}}, {"thngs": {}}, {"people": {"Robin": {"at": "mars"}}}, {"surfaces": {"x": {}}}]
+    data["knowledge"] = chosen(rng, [*wrong, [1], "all"])
+    return yaml.safe_dump(data, sort_keys=False).encode()
+
+
+def with_a_tab(text, rng):
+    lines = text.splitlines()
+    at = chosen(rng, [n for n, line in enumerate(lines) if line.startswith("  ")])
+    lines[at] = "\t" + lines[at]
+    return "\n".join(lines).encode()
+
+
+def unbalanced(text, rng):
+    lines = text.splitlines()
+    at = chosen(rng, [n for n, line in enumerate(lines) if ":" in line and not line.startswith("#")])
+    lines[at] = lines[at].split(":")[0] + ": " + chosen(rng, ["{", "[", '"', "'", "}", "*x", "!!python/object:x y", "@"])
+    return "\n".join(lines).encode()
+
+
+def doubled_key(text, rng):
+    return (text + "name: again\n").encode()
+
+
+def not_utf8(text, rng):
+    raw = bytearray(text.encode())
+    raw[int(rng.integers(len(raw)))] = 0xFF
+    return bytes(raw)
+
+
+def binary(text, rng):
+    return rng.integers(0, 256, int(rng.integers(1, 2000)), dtype=np.uint8).tobytes()
+
+
+def control_character(text, rng):
+    at = int(rng.integers(len(text)))
+    return (text[:at] + chosen(rng, ["\x00", "\x07", "\x1b"]) + text[at:]).encode()
+
+
+def empty(text, rng):
+    return chosen(rng, [b"", b"\n\n", b"# nothing\n", b"---\n", b"null\n", b"[]\n", b"3\n", b"text\n"])
+
+
+def huge(text, rng):
+    steps = {"name": "huge", "steps": [{"say": "go to the kitchen"}]}
+    kind = int(rng.integers(3))
+    if kind == 0:
+        return (yaml.safe_dump(steps) + "# " + "x" * 2_000_000).encode()
+    if kind == 1:
+        return ("name: deep\nsteps: " + "[" * 5000 + "]" * 5000).encode()
+    return b"name: x\nsteps: &a [{say: go to the kitchen}, *a]\n"
+
+
+def cut_off(text, rng):
+    lines = [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
+    at = next(n for n, line in enumerate(lines) if line.startswith("steps:"))
+    return "".join(lines[: int(rng.integers(at + 1))]).encode()
+
+
+def two_documents(text, rng):
+    return f"{text}\n---\n{text}".encode()
+
+
+MUTATIONS: dict[str, Callable[[str, np.random.Generator], bytes | None]] = {
+    make.__name__: make
+    for make in (
+        rename_key, delete_required, delete_half_of_a_pair, wrong_type, wrong_number, unknown_name, unknown_sentence,
+        unknown_port, mistyped_port, unknown_parameter, empty_step, uses_itself, bad_override, with_a_tab, unbalanced,
+        doubled_key, not_utf8, binary, control_character, empty, huge, cut_off, two_documents,
+    )
+}  # fmt: skip

@@ -36,9 +36,20 @@ SETTLING_S = 1.5
 class Engine:
     """A Diagram in motion with the robots in it; implements the Clock protocol."""
 
-    def __init__(self, world: WorldDiagram, starts: Mapping[str, Pose2D], *, seed: int = 0) -> None:
-        """`starts`: where each robot stands at time 0, in the world frame; `seed` gives the sensors' noise."""
-        self.world = world
+    def __init__(
+        self,
+        world: WorldDiagram,
+        starts: Mapping[str, Pose2D],
+        *,
+        seed: int = 0,
+        dock: Pose2D | None = None,
+        charge: float = 1.0,
+    ) -> None:
+        """`starts`: where each robot stands at time 0, in the world frame; `seed` gives the sensors' noise.
+
+        Batteries begin at `charge` (0 to 1) and charge at `dock`.
+        """
+        self.world, self._dock, self._charge = world, dock, charge
         self._simulator = Simulator(world.diagram)
         self.root_context: Context = self._simulator.get_mutable_context()
         self.context: Context = world.plant.GetMyMutableContextFromRoot(self.root_context)
@@ -55,8 +66,16 @@ class Engine:
         self._simulator.Initialize()
 
     def _sensors(self, model: SpotModel, seed: int) -> SpotSensors:
-        scene_graph = self.world.scene_graph
-        return SpotSensors(model, scene_graph, self.root_context, self.context, seed=seed, renderer=RENDERER)
+        return SpotSensors(
+            model,
+            self.world.scene_graph,
+            self.root_context,
+            self.context,
+            seed=seed,
+            renderer=RENDERER,
+            dock=self._dock,
+            charge=self._charge,
+        )
 
     @property
     def robots(self) -> Mapping[str, Robot]:
@@ -131,22 +150,29 @@ class Simulation:
         robot_names: Sequence[str] = ("Alice",),
         record: bool = False,
         looks: bool = True,
+        charge: float = 1.0,
+        extra_models: Sequence[LooseModel] = (),
     ) -> None:
         """Build the plant of `world`; things and people stand where the seed puts them.
 
-        The first robot stands at the world's start pose, others a robot's length behind one another. Raises WorldError
-        when the things do not fit into the world.
+        The first robot stands at the world's start pose, others a robot's length behind one another. Batteries begin at
+        `charge` (0 to 1). `extra_models` stand in the world though no map knows them. Raises WorldError when the things
+        do not fit into the world.
         """
         self.seed, self.world = seed, world
         things, people = place_objects(world, seed), place_people(world, seed)
         built = build_diagram(
             directives=world.directives_path,
-            models=[*(_loose(each) for each in things), *(_loose(each, fixed=True) for each in people)],
+            models=[
+                *(_loose(each) for each in things),
+                *(_loose(each, fixed=True) for each in people),
+                *extra_models,
+            ],
             robot_names=robot_names,
             looks=looks,
             renderer_parameters=render_parameters(),
         )
-        self.engine = Engine(built, _starts(world.start, robot_names), seed=seed)
+        self.engine = Engine(built, _starts(world.start, robot_names), seed=seed, dock=world.dock, charge=charge)
         self.referee = Referee(
             built.plant, [*things, *people], robots=sorted(robot_names), persons=[each.name for each in people]
         )
@@ -173,22 +199,23 @@ class Simulation:
         """The robots by name."""
         return self.engine.robots
 
-    def keep_in(self, path: Path) -> None:
-        """Write the whole state to a file now and after every advance of the clock."""
-        keeper = SnapshotKeeper(path, self.engine, self.referee, self._facts(), sorted(self.robots))
+    def keep_in(self, path: Path, *, label: str = "") -> None:
+        """Write the whole state to a file now and after every advance of the clock; `label` says what it is for."""
+        keeper = SnapshotKeeper(path, self.engine, self.referee, {**self._facts(), "label": label}, sorted(self.robots))
         keeper()
         self.engine.after_advance(keeper)
 
-    def restore(self, path: Path, *, same_mission: bool = True) -> None:
+    def restore(self, path: Path, *, label: str | None = "") -> None:
         """Take up the state in a file, as after a power failure: nobody commands the robots, which come to a stop.
 
-        For another mission than the one before the referee begins a new chapter.
+        With `label` None it may have been written for anything, and the referee begins a new chapter.
 
         Raises:
             SnapshotError: the file cannot be read, is damaged, or is that of another simulation.
         """
-        restore(read_snapshot(path), self.engine, self.referee, self._facts())
-        if not same_mission:
+        facts = self._facts() if label is None else {**self._facts(), "label": label}
+        restore(read_snapshot(path), self.engine, self.referee, facts)
+        if label is None:
             self.referee.forget_past()
         self.engine.advance(SETTLING_S)
 

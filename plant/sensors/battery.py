@@ -1,4 +1,4 @@
-"""A battery that runs down: by its full load in `runtime_s`, slower when the robot rests."""
+"""A battery that runs down: by its full load in `runtime_s`, slower when the robot rests; on a dock it charges."""
 
 from __future__ import annotations
 
@@ -12,11 +12,15 @@ from skills.robot import Battery
 
 @dataclass(frozen=True)
 class BatterySpec:
-    """`runtime_s` from full to empty at load 1; at load 0 it draws `idle_share` of that; the gauge errs by `sigma`."""
+    """`runtime_s` from full to empty at load 1; at load 0 it draws `idle_share` of that; the gauge errs by `sigma`.
+
+    On a dock it goes from empty to full in `charge_s`: a quick dock, so that missions need not wait for an hour.
+    """
 
     runtime_s: float = 5400.0
     idle_share: float = 0.4
     sigma: float = 0.001
+    charge_s: float = 300.0
 
 
 class BatteryModel:
@@ -29,11 +33,14 @@ class BatteryModel:
         self._rng, self._spec, self._charge = rng, spec or BatterySpec(), charge
         self._stamp_s: float | None = None
 
-    def update(self, stamp_s: float, load: float) -> Battery:
-        """Reading at stamp_s after a load from 0 (standing) to 1 (walking) since the last update."""
+    def update(self, stamp_s: float, load: float, *, docked: bool = False) -> Battery:
+        """Reading at stamp_s after a load from 0 (standing) to 1 (walking), or on a dock, since the last update."""
         elapsed = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
-        self._charge = discharged(self._charge, elapsed, load, self._spec)
+        if docked:
+            self._charge = min(1.0, self._charge + elapsed / self._spec.charge_s)
+        else:
+            self._charge = discharged(self._charge, elapsed, load, self._spec)
         read = self._charge + float(self._rng.normal(0.0, self._spec.sigma))
         return Battery(stamp_s, float(np.clip(round(read, 3), 0.0, 1.0)))
 

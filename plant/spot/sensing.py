@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -24,7 +25,7 @@ from plant.sensors.lidar import Lidar
 from plant.sensors.odometry import OdometryModel
 from plant.snapshot.values import State
 from plant.spot.model import SpotModel
-from skills.robot import Battery, FrameTree, Gripper, Image, Imu, Joints, Odometry, Scan
+from skills.robot import Battery, FrameTree, Gripper, Image, Imu, Joints, Odometry, Pose2D, Scan
 
 FloatArray = NDArray[np.float64]
 CAMERAS = Path(__file__).parents[1] / "models" / "spot" / "cameras.yaml"
@@ -32,6 +33,8 @@ HAND_LINK = "arm_wr1"
 _FRAME_OF_LINK = {"body": "body", HAND_LINK: "hand"}
 _LIDAR_PERIOD_S = 0.1
 _JAW_MOVES_RAD_S = 0.05
+_DOCKED_WITHIN_M = 0.2
+_STILL_M_S = 0.02
 
 
 class _Kept(Protocol):
@@ -56,9 +59,14 @@ class SpotSensors:
         *,
         seed: int,
         renderer: str,
+        dock: Pose2D | None = None,
+        charge: float = 1.0,
     ) -> None:
-        """`context` is the plant's part of `root_context`. The seed and the robot's name give the noise."""
-        self._model, self._scene_graph = model, scene_graph
+        """`context` is the plant's part of `root_context`. The seed and the robot's name give the noise.
+
+        The battery begins at `charge` (0 to 1) and charges while the body stands still at `dock`.
+        """
+        self._model, self._scene_graph, self._dock = model, scene_graph, dock
         self._root_context, self._context = root_context, context
         self._index = model.index()
         self._kinematics = model.plant.CreateDefaultContext()
@@ -68,7 +76,7 @@ class SpotSensors:
         self._imu_model = ImuModel(next(rngs))
         self._joint_model = JointModel(next(rngs), self._index.names)
         self._gripper_model = GripperModel(next(rngs))
-        self._battery_model = BatteryModel(next(rngs), spec=BatterySpec(runtime_s=body["runtime"]))
+        self._battery_model = BatteryModel(next(rngs), charge, BatterySpec(runtime_s=body["runtime"]))
         self._lidar = self._make_lidar(next(rngs))
         self._cameras = {
             name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=renderer)
@@ -103,9 +111,17 @@ class SpotSensors:
             now_s, -float(positions[index.jaw]), self._clamp_force_n(rates, efforts)
         )
         load = min(1.0, float(np.linalg.norm(v_WB)) + float(np.abs(rates[index.arm]).sum()) / 4.0)
-        self._battery = self._battery_model.update(now_s, load)
+        self._battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
         if self._scan is None or now_s - self._scan.stamp_s >= _LIDAR_PERIOD_S - 1e-6:
             self._scan = self._lidar.scan(self._context, now_s, self._odometry.X_OB)
+
+    def _docked(self, X_WB: RigidTransform, v_WB: FloatArray) -> bool:
+        """Whether the body stands still at the dock."""
+        if self._dock is None:
+            return False
+        p_WB = X_WB.translation()
+        off_m = math.hypot(p_WB[0] - self._dock.x_m, p_WB[1] - self._dock.y_m)
+        return off_m < _DOCKED_WITHIN_M and float(np.linalg.norm(v_WB[:2])) < _STILL_M_S
 
     def state(self) -> State:
         """What changes from one reading to the next; the readings themselves are taken anew."""

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 
 from py_trees.common import Status
 from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
+from executive.cli.keys import HELP, Keys, keys_pressed, prompt_lines
 from executive.compiler import CompiledTree
+from executive.control import Control
 from executive.runner import Observer, Progress
 from executive.snapshot import NodeState, Snapshot
 from executive.view.model import node_view
@@ -19,23 +21,30 @@ from executive.view.text import to_rich
 
 REFRESH_S = 0.2
 BAR_CELLS = 20
+PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 
 
 @contextmanager
-def live_view(tree: CompiledTree, console: Console) -> Iterator[Observer]:
-    """Show the tree while the mission runs; without a terminal, one line for each skill that ends."""
-    if not console.is_terminal:
-        yield _Lines(tree, console)
-        return
-    with Live(console=console, auto_refresh=False, transient=True, vertical_overflow="crop") as live:
-        yield _Picture(tree, live)
+def live_view(tree: CompiledTree, console: Console, control: Control | None = None) -> Iterator[Observer]:
+    """Show the tree while the mission runs; without a terminal, one line for each skill that ends.
+
+    Where somebody sits at a terminal, keys control the run.
+    """
+    hands = control or Control(pace=None)
+    keys = Keys(hands)
+    with keys_pressed(keys) if control is not None else nullcontext(False) as heard:
+        if not console.is_terminal:
+            yield _Lines(tree, console)
+            return
+        with Live(console=console, auto_refresh=False, transient=True, vertical_overflow="crop") as live:
+            yield _Picture(live, lambda now_s: prompt_lines(hands.state, now_s, keys.typed) if heard else [])
 
 
 class _Picture:
-    """Redraws the tree a few times a second."""
+    """Redraws the tree of the mission under way a few times a second, with `prompt(now_s)` below."""
 
-    def __init__(self, tree: CompiledTree, live: Live) -> None:
-        self._tree, self._live, self._drawn_s = tree, live, 0.0
+    def __init__(self, live: Live, prompt: Callable[[float], Sequence[str]]) -> None:
+        self._live, self._prompt, self._drawn_s = live, prompt, 0.0
 
     def __call__(self, progress: Progress) -> None:
         """Draw when it is time again."""
@@ -43,9 +52,19 @@ class _Picture:
         if now - self._drawn_s < REFRESH_S:
             return
         self._drawn_s = now
-        states = progress.states[self._tree.robot_name]
-        line = progress_line(states, progress.now_s)
-        self._live.update(Group(to_rich(node_view(self._tree.root, states)), line), refresh=True)
+        trees = [(tree, progress.states[name]) for name, tree in progress.trees.items()]
+        pictures = [to_rich(node_view(tree.root, states)) for tree, states in trees]
+        lines = [progress_line(_of_tree(tree, states), progress.now_s) for tree, states in trees]
+        prompt = [
+            Text(line, style=HELP_STYLE if line == HELP else PROMPT_STYLE, overflow="fold")
+            for line in self._prompt(progress.now_s)
+        ]
+        self._live.update(Group(*pictures, *lines, *prompt), refresh=True)
+
+
+def _of_tree(tree: CompiledTree, states: Snapshot) -> Snapshot:
+    """The states of one mission's nodes, without those that wait below it."""
+    return {path_id: states[path_id] for path_id in tree.path_ids}
 
 
 class _Lines:

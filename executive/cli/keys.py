@@ -1,0 +1,139 @@
+"""Keys that control a run from the terminal: space, s, x, c and answers to questions."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import termios
+import threading
+import tty
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from types import MappingProxyType
+from typing import Final
+
+from executive.control import Control, ControlState, Mode
+from executive.questions import OpenQuestion
+
+HELP: Final = "space pause/go on · s step · x stop button · c cancel"
+_ENTER: Final = frozenset("\r\n")
+_ERASE: Final = frozenset("\x7f\b")
+
+
+class Keys:
+    """What each key does to a run. While a question waits that any text answers, keys write that text."""
+
+    def __init__(self, control: Control) -> None:
+        self._control = control
+        self.typed = ""
+        self._actions: Mapping[str, Callable[[], None]] = MappingProxyType(
+            {
+                " ": control.toggle_pause,
+                "s": control.step,
+                "x": self._toggle_stop_button,
+                "c": lambda: control.cancel("cancelled at the terminal"),
+                "q": lambda: control.cancel("cancelled at the terminal"),
+            }
+        )
+
+    def press(self, key: str) -> None:
+        """Do what the key stands for; others do nothing."""
+        question = next(iter(self._control.state.questions), None)
+        if question is not None and not question.options:
+            self._write(key, question)
+        elif question is not None and key.isdecimal() and 1 <= int(key) <= len(question.options):
+            self._answer(question, question.options[int(key) - 1])
+        else:
+            self._actions.get(key, _nothing)()
+
+    def _write(self, key: str, question: OpenQuestion) -> None:
+        if key in _ENTER:
+            text, self.typed = self.typed, ""
+            self._answer(question, text)
+        elif key in _ERASE:
+            self.typed = self.typed[:-1]
+        elif key.isprintable():
+            self.typed += key
+
+    def _answer(self, question: OpenQuestion, text: str) -> None:
+        """Answer, unless the time of the question was over just now."""
+        try:
+            self._control.answer(question.id, text)
+        except ValueError:
+            return
+
+    def _toggle_stop_button(self) -> None:
+        if self._control.state.mode is Mode.STOPPED:
+            self._control.release_stop_button()
+        else:
+            self._control.stop_button("the stop button is pressed at the terminal")
+
+
+def prompt_lines(state: ControlState, now_s: float, typed: str = "") -> list[str]:
+    """What to say below the tree: why the run is held, what is asked, which keys there are."""
+    lines = [f"{state.mode.value.upper()}: {state.reason}"] if state.mode not in _NOTHING_TO_SAY else []
+    for waiting in state.questions:
+        question, left_s = waiting.question, max(0.0, waiting.until_s - now_s)
+        choices = "  ".join(f"[{number}] {option}" for number, option in enumerate(question.options, start=1))
+        lines.append(f"? {question.text}  {choices or typed + '_'}  ('{question.default}' in {left_s:.0f} s)")
+    return [*lines, HELP]
+
+
+@contextmanager
+def keys_pressed(keys: Keys, descriptor: int | None = None) -> Iterator[bool]:
+    """Read keys while the block runs, in a thread that sleeps until one comes; False where there is no terminal.
+
+    The terminal is put back as it was. `descriptor` is standard input unless given.
+    """
+    source = _stdin() if descriptor is None else descriptor
+    if source is None or not os.isatty(source):
+        yield False
+        return
+    before = termios.tcgetattr(source)
+    wake, waker = os.pipe()
+    reader = threading.Thread(target=_read, args=(source, wake, keys), name="errand-keys", daemon=True)
+    try:
+        tty.setcbreak(source, termios.TCSADRAIN)
+        reader.start()
+        yield True
+    finally:
+        os.write(waker, b"x")
+        if reader.ident is not None:
+            reader.join()
+        for end in (wake, waker):
+            os.close(end)
+        termios.tcsetattr(source, termios.TCSADRAIN, before)
+
+
+def keys_available() -> bool:
+    """Whether somebody sits at a terminal."""
+    source = _stdin()
+    return source is not None and os.isatty(source)
+
+
+def _read(source: int, wake: int, keys: Keys) -> None:
+    while True:
+        ready, _, _ = select.select([source, wake], [], [])
+        if wake in ready:
+            return
+        data = os.read(source, 64)
+        if not data:
+            return
+        for key in data.decode(errors="ignore"):
+            keys.press(key)
+
+
+def _stdin() -> int | None:
+    """The descriptor of standard input; None where it is closed or replaced."""
+    try:
+        return sys.stdin.fileno()
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
+def _nothing() -> None:
+    """Keys without a meaning."""
+
+
+_NOTHING_TO_SAY: Final = frozenset({Mode.READY, Mode.RUNNING, Mode.ENDED})

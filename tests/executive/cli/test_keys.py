@@ -1,0 +1,128 @@
+"""Keys at the terminal: what they do to a run, what is said below the tree, and that the terminal is put back."""
+
+import os
+import pty
+import termios
+import time
+
+import pytest
+
+from executive.cli.keys import HELP, Keys, keys_available, keys_pressed, prompt_lines
+from executive.control import Control, Mode
+from skills.api import Question
+from skills.testing.clock import VirtualClock
+
+QUESTION = Question("alice/ask", "Nothing found. What now?", ("retry", "skip"), "skip", 30.0)
+
+
+@pytest.fixture
+def control(compiled, make):
+    hands = Control()
+    hands.begin({"Alice": compiled(*make.FETCH)})
+    return hands
+
+
+@pytest.fixture
+def terminal():
+    """Both ends of a terminal: what a person types into, what a program reads."""
+    person, program = pty.openpty()
+    yield person, program
+    os.close(person)
+    os.close(program)
+
+
+def pressed(control, keys):
+    board = Keys(control)
+    for key in keys:
+        board.press(key)
+    return control.state
+
+
+def test_space_pauses_and_goes_on(control):
+    assert pressed(control, " ").mode is Mode.PAUSED
+    assert pressed(control, " ").mode is Mode.RUNNING
+
+
+def test_s_steps_from_a_running_mission(control):
+    assert pressed(control, "s").mode is Mode.PAUSED
+    assert control.heed().hold is None
+    control.ticked(changed=True)
+    assert control.heed().hold == "stepping"
+
+
+def test_x_is_the_stop_button(control):
+    assert pressed(control, "x").mode is Mode.STOPPED
+    assert pressed(control, "x").mode is Mode.RUNNING
+
+
+@pytest.mark.parametrize("key", ["c", "q"])
+def test_c_and_q_cancel(control, key):
+    pressed(control, key)
+    assert control.heed().cancel == "cancelled at the terminal"
+
+
+def test_other_keys_do_nothing(control):
+    version = control.state.version
+    assert pressed(control, "zZ5\x1b[A\n").version == version
+
+
+def test_a_digit_answers_the_question(control):
+    asked = control.ask(QUESTION, VirtualClock())
+    assert pressed(control, "3").questions != ()
+    pressed(control, "1")
+    assert asked.result() == "retry"
+
+
+def test_keys_still_work_while_a_question_with_options_waits(control):
+    control.ask(QUESTION, VirtualClock())
+    assert pressed(control, " ").mode is Mode.PAUSED
+
+
+def test_free_text_is_typed_and_sent_with_enter(control):
+    asked = control.ask(Question("alice/name", "Which shelf?", (), "any", 30.0), VirtualClock())
+    pressed(control, "the loo\x7fw one\n")
+    assert asked.result() == "the low one"
+
+
+def test_below_the_tree_stand_reason_question_and_keys(control):
+    clock = VirtualClock()
+    control.ask(QUESTION, clock)
+    control.pause("somebody walks by")
+    assert prompt_lines(control.state, 4.6) == [
+        "PAUSED: somebody walks by",
+        "? Nothing found. What now?  [1] retry  [2] skip  ('skip' in 25 s)",
+        HELP,
+    ]
+
+
+def test_keys_typed_at_a_terminal_reach_the_run_and_it_is_put_back(control, terminal):
+    person, program = terminal
+    before = termios.tcgetattr(program)
+    version = control.state.version
+    with keys_pressed(Keys(control), program) as heard:
+        assert heard
+        assert termios.tcgetattr(program) != before
+        os.write(person, b" ")
+        assert control.wait(version, timeout_s=5.0).mode is Mode.PAUSED
+    assert termios.tcgetattr(program) == before
+
+
+def test_the_terminal_is_put_back_after_an_exception(control, terminal):
+    _, program = terminal
+    before = termios.tcgetattr(program)
+    with pytest.raises(ZeroDivisionError), keys_pressed(Keys(control), program):
+        raise ZeroDivisionError
+    assert termios.tcgetattr(program) == before
+
+
+def test_nothing_is_read_where_there_is_no_terminal(control, tmp_path):
+    with (tmp_path / "in").open("w+") as file, keys_pressed(Keys(control), file.fileno()) as heard:
+        assert not heard
+    assert not keys_available()
+
+
+def test_waiting_for_keys_takes_no_time_of_the_processor(control, terminal):
+    with keys_pressed(Keys(control), terminal[1]):
+        before = time.process_time()
+        control.wait(control.state.version, timeout_s=0.3)
+        assert time.process_time() - before < 0.1

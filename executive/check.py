@@ -23,11 +23,14 @@ __all__ = ["Abilities", "Checked", "PlannedWays", "check_tree"]
 class Abilities:
     """What is known of robot and things: masses (kg) of the classes that can be handled, and what the arm lifts (kg).
 
-    A class that is not in `masses_kg` has no model: there is no such thing in any world.
+    A class that is not in `masses_kg` has no model: there is no such thing in any world. `classes` and `attributes` are
+    those that the robot knows by sight; one that it does not know spoils a search for several.
     """
 
     masses_kg: Mapping[str, float]
     lift_kg: float
+    classes: frozenset[str]
+    attributes: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -78,20 +81,25 @@ def check_tree(
 
 
 def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[InputError]:
-    """What makes a command to take hold of something impossible: nothing that it may mean can be lifted."""
+    """What makes a command impossible: its thing is not known by sight, or nothing that it means can be lifted."""
     command = part.command
-    if command is None or command.task is not Task.GRASP or command.object is None:
+    if command is None or command.task not in (Task.GRASP, Task.FIND) or command.object is None:
         return
-    name = command.object.name
-    classes = knowledge.classes(knowledge.thing(name) or name)
-    there = {one: abilities.masses_kg[one] for one in classes if one in abilities.masses_kg}
-    if not there:
+    thing = command.object
+    classes = knowledge.classes(knowledge.thing(thing.name) or thing.name)
+    masses = [abilities.masses_kg[one] for one in classes if one in abilities.masses_kg]
+    unseen = [one for one in classes if one not in abilities.classes]
+    unseen += [word for word in thing.attributes if word not in abilities.attributes]
+    if command.task is Task.GRASP and not masses:
         known = [one for one in knowledge.things if one in abilities.masses_kg]
-        yield _at(part, tree, f"there is no '{name}' that could be picked up", f"known are {listing(known)}")
-    elif min(there.values()) > abilities.lift_kg:
-        least = min(there.values())
-        message = f"'{name}' is too heavy: {least:g} kg, and the arm lifts {abilities.lift_kg:g} kg"
+        yield _at(part, tree, f"there is no '{thing.name}' that could be picked up", f"known are {listing(known)}")
+    elif command.task is Task.GRASP and min(masses) > abilities.lift_kg:
+        message = f"'{thing.name}' is too heavy: {min(masses):g} kg, and the arm lifts {abilities.lift_kg:g} kg"
         yield _at(part, tree, message, "ask for something lighter")
+    elif unseen:
+        known = [one for one in knowledge.things if one in abilities.classes]
+        message = f"the robot does not know what {listing(unseen)} looks like"
+        yield _at(part, tree, message, f"it knows {listing(known)} by sight")
 
 
 def _at(part: StepPart, tree: CompiledTree, message: str, mend: str) -> InputError:

@@ -18,6 +18,7 @@ from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.spot.robot import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
+from skills.detect.appearance import load_appearance
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import MapError, load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
@@ -97,7 +98,8 @@ def itinerary_of(world: World) -> PlannedWays:
 def abilities_of() -> Abilities:
     """What the robot can lift, and what the things weigh that there are models of."""
     masses = {name: _mass_kg(one.path()) for name, one in load_catalogue().items() if one.file is not None}
-    return Abilities(masses, LIFT_KG)
+    seen = load_appearance()
+    return Abilities(masses, LIFT_KG, frozenset(seen.classes), frozenset(seen.attributes))
 
 
 def _mass_kg(sdf: Path) -> float:

@@ -22,7 +22,9 @@ def render_skill(name: str, folder: Path, *, taken: frozenset[str] = frozenset()
         InputError: the name is no lower-case word, or is taken; the folder exists and is not empty, or cannot be made.
     """
     if not _NAME.fullmatch(name) or keyword.iskeyword(name):
-        raise InputError(f"'{name}' cannot be the name of a skill", mend="use lower-case words joined by _, as in wave_arm")
+        raise InputError(
+            f"'{name}' cannot be the name of a skill", mend="use lower-case words joined by _, as in wave_arm"
+        )
     if name in taken:
         raise InputError(f"there is a skill '{name}' already", mend="choose another name")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

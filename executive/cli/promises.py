@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
@@ -47,7 +48,9 @@ def promises_of(tree: CompiledTree, *, knowledge: Knowledge, result: RobotResult
             continue
         if part.command is not None:
             given = [answer for path_id, answer in result.answers.items() if _below(path_id, part.path_id)]
-            promised += promises((part.command,), knowledge=knowledge, robot=tree.robot_name, answers=given)
+            (promise,) = promises((part.command,), knowledge=knowledge, robot=tree.robot_name, answers=given)
+            elsewhere = tuple(surface_region(knowledge, name) for name in part.elsewhere)
+            promised.append(replace(promise, source=(*promise.source, *elsewhere)))
         elif part.skill is not None:
             promised += _driven(part.skill, tree.robot_name)
     return tuple(promised)

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.behaviours.board import FromBoard
-from executive.command import Command
+from executive.command import Command, Task
 from executive.compiling.plans import NodePlan, RememberPosePlan, SequencePlan, SkillPlan, Source
 from executive.compiling.policies import AskPlan, PolicyFrame, SkipPlan, SummaryPlan, needs_way_back, under_policy
+from executive.compiling.search import surfaces_elsewhere
 from executive.compiling.skill_steps import skill_plan
 from executive.compiling.steps import START, step_plan
 from executive.compiling.trips import are_trips, refuse_several, trips_plan
@@ -28,13 +29,14 @@ class StepPart:
     """A part of a mission with something to show for it: a command, or a skill on its own.
 
     `path_id` is that of its subtree. `excused` are pairs of path ids: when the first succeeded although the second
-    failed, the part was skipped.
+    failed, the part was skipped. `elsewhere` are the surfaces on which a thing may be found that is not in its place.
     """
 
     path_id: str
     command: Command | None = None
     skill: SkillPlan | None = None
     excused: tuple[tuple[str, str], ...] = ()
+    elsewhere: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -150,14 +152,14 @@ def _group_plans(items: Sequence[_Item], base: str, site: _Site) -> tuple[tuple[
                 plan = trips_plan(_shop(item, base, site), following)
                 made: tuple[StepPart, ...] = tuple(StepPart(plan.path_id, c) for c in (item.command, following))
             else:
-                plan, made = _plan(item, base, site)
+                plan, made = _plan(item, following, base, site)
             plans, parts = [*plans, plan], [*parts, *made]
     problems.raise_any()
     return tuple(plans), tuple(parts)
 
 
-def _plan(item: _Item, base: str, site: _Site) -> tuple[NodePlan, tuple[StepPart, ...]]:
-    """The subtree of one command, skill or used mission."""
+def _plan(item: _Item, following: Command | None, base: str, site: _Site) -> tuple[NodePlan, tuple[StepPart, ...]]:
+    """The subtree of one command, skill or used mission; `following` is the command right after it."""
     step = item.step
     if step.used is not None:
         return _used_plan(step, step.used, f"{base}/{item.number}-{slug(step.used.name)}", site)
@@ -167,10 +169,25 @@ def _plan(item: _Item, base: str, site: _Site) -> tuple[NodePlan, tuple[StepPart
             step.skill, path_id, step.source, knowledge=site.knowledge, registry=site.registry, names=site.names
         )
         return leaf, (StepPart(path_id, skill=leaf),)
-    shop = _shop(item, base, site)
+    shop = replace(_shop(item, base, site), avoided=_goals(following, site.knowledge))
     refuse_several(shop)
     plan = step_plan(shop)
-    return plan, (StepPart(shop.path_id, shop.command),)
+    return plan, (StepPart(shop.path_id, shop.command, elsewhere=_elsewhere(shop)),)
+
+
+def _goals(command: Command | None, knowledge: Knowledge) -> frozenset[str]:
+    """The surfaces to which a command brings what is fetched before."""
+    place = None if command is None or command.goal is None else knowledge.place(command.goal)
+    return frozenset() if place is None else frozenset(knowledge.surfaces_in(place))
+
+
+def _elsewhere(shop: Workshop) -> tuple[str, ...]:
+    """Where else the thing of a command to get it may be found."""
+    command, knowledge = shop.command, shop.knowledge
+    if command.task is not Task.GRASP or command.object is None or command.goal is None or not shop.anywhere:
+        return ()
+    name = knowledge.thing(command.object.name) or command.object.name
+    return surfaces_elsewhere(knowledge, name, shop.place(command.goal), shop.avoided)
 
 
 def _used_plan(step: MissionStep, used: Mission, base: str, site: _Site) -> tuple[NodePlan, tuple[StepPart, ...]]:
@@ -189,7 +206,8 @@ def _shop(item: _Item, base: str, site: _Site) -> Workshop:
     if command is None:
         raise InputError("a step has no commands", mend="give it 'say', a command, a skill or a file to use")
     path_id = f"{base}/{item.number}-{step_name(command)}"
-    return Workshop(site.knowledge, site.registry, path_id, site.start_key, command, item.step.source)
+    source, anywhere = item.step.source, item.step.elsewhere
+    return Workshop(site.knowledge, site.registry, path_id, site.start_key, command, source, anywhere)
 
 
 def _under(body: NodePlan, policy: StepPolicy, frame: PolicyFrame) -> tuple[NodePlan, tuple[tuple[str, str], ...]]:

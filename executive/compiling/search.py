@@ -30,15 +30,17 @@ def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> t
     return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
 
 
-def surfaces_elsewhere(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
+def surfaces_elsewhere(
+    knowledge: Knowledge, thing: str, place: str | None, avoided: frozenset[str] = frozenset()
+) -> tuple[str, ...]:
     """The surfaces to look at when the thing is not in its place: where it usually is, then others of the same room,
-    then any others; `MOST_ELSEWHERE` at most."""
+    then any others; `MOST_ELSEWHERE` at most, and none that are `avoided`."""
     if place is None:
         return ()
     usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
     near = knowledge.surfaces_in(knowledge.room(place))
     inside = knowledge.surfaces_in(place)
-    others = dict.fromkeys(name for name in (*usual, *near, *knowledge.surfaces) if name not in inside)
+    others = dict.fromkeys(name for name in (*usual, *near, *knowledge.surfaces) if name not in {*inside, *avoided})
     return tuple(others)[:MOST_ELSEWHERE]
 
 
@@ -90,7 +92,7 @@ def search_plan(shop: Workshop, thing: Thing, place: str | None, key: str, *, an
     """
     surfaces = required_surfaces(shop, thing, place)
     name = shop.knowledge.thing(thing.name) or thing.name
-    elsewhere = surfaces_elsewhere(shop.knowledge, name, place) if anywhere else ()
+    elsewhere = surfaces_elsewhere(shop.knowledge, name, place, shop.avoided) if anywhere and shop.anywhere else ()
     looks = look_plans(shop, thing, surfaces, key)
     further = look_plans(shop.at("elsewhere"), thing, elsewhere, key)
     looked = where(place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
@@ -135,4 +137,3 @@ def required_surfaces(shop: Workshop, thing: Thing, place: str | None) -> tuple[
 def where(place: str | None) -> str:
     """The place as the end of a sentence."""
     return "anywhere" if place is None else f"in the {place}"
-

@@ -44,8 +44,9 @@ def grasp_plan(shop: Workshop, *, anywhere: bool = True) -> NodePlan:
         raise shop.error("the one gripper cannot take hold of a second thing", "put the first one down before")
     place = None if shop.command.goal is None else shop.place(shop.command.goal)
     surfaces = set(required_surfaces(shop, thing, place))
-    if anywhere:
-        surfaces |= set(surfaces_elsewhere(shop.knowledge, shop.knowledge.thing(thing.name) or thing.name, place))
+    if anywhere and shop.anywhere:
+        name = shop.knowledge.thing(thing.name) or thing.name
+        surfaces |= set(surfaces_elsewhere(shop.knowledge, name, place, shop.avoided))
     around = tuple(shop.surface(name) for name in shop.knowledge.surfaces if name in surfaces)
     key = f"{shop.path_id}/sighting"
     search = search_plan(shop.at("find"), thing, place, key, anywhere=anywhere)

@@ -32,7 +32,11 @@ def pose_2d(pose: Pose) -> Pose2D:
 
 @dataclass(frozen=True)
 class Workshop:
-    """Makes the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start."""
+    """Makes the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
+
+    `anywhere` says whether a thing that is not in its place is looked for elsewhere, too, but never on the surfaces in
+    `avoided`: what lies there is where it is to go.
+    """
 
     knowledge: Knowledge
     registry: Registry
@@ -40,6 +44,8 @@ class Workshop:
     start_key: str
     command: Command
     source: Source | None
+    anywhere: bool = True
+    avoided: frozenset[str] = frozenset()
 
     def at(self, *parts: str) -> Workshop:
         """The same workshop for a subtree below."""

@@ -98,13 +98,17 @@ class SkillCall:
 
 @dataclass(frozen=True)
 class MissionStep:
-    """One step, one of three: commands, or a skill, or the steps of another mission. `source` is None when spoken."""
+    """One step, one of three: commands, or a skill, or the steps of another mission. `source` is None when spoken.
+
+    With `elsewhere`, a thing that is not in its place is looked for elsewhere, too.
+    """
 
     commands: tuple[Command, ...] = ()
     source: SourceLine | None = None
     policy: StepPolicy = StepPolicy()
     skill: SkillCall | None = None
     used: Mission | None = None
+    elsewhere: bool = True
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+from executive.command import Command
 from executive.errors import InputError, Problems
 from executive.knowledge import Knowledge
 from executive.language import DependencyParser, Status, understand
@@ -82,14 +83,15 @@ class _Resolver:
         if step.skill is not None:
             return MissionStep(source=source, policy=policy, skill=_skill_call(file, index))
         if step.say is None:
-            return MissionStep((typed_command(file, index, self.knowledge),), source, policy)
+            commands: tuple[Command, ...] = (typed_command(file, index, self.knowledge),)
+            return MissionStep(commands, source, policy, elsewhere=step.elsewhere is not False)
         answer = understand(
             step.say, parser=self.parser, knowledge=self.knowledge, require_wake=False, robot_name=self.robot_name
         )
         if answer.status is not Status.OK:
             mend = "say it in other words, or write take, to, do and object"
             raise file.error((*path, "say"), (answer.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], mend)
-        return MissionStep(answer.commands, source, policy)
+        return MissionStep(answer.commands, source, policy, elsewhere=step.elsewhere is not False)
 
     def _used(self, file: MissionFile, index: int, chain: tuple[Path, ...]) -> Mission:
         """The mission of the file that a step uses."""

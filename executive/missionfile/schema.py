@@ -114,6 +114,9 @@ class StepFile(PolicyFile):
     object: Text | None = Field(None, description="The thing that it is done to.")
     skill: Text | None = Field(None, description="The name of a registered skill.")
     use: Text | None = Field(None, description="Another mission file, as seen from this file's folder.")
+    elsewhere: StrictBool | None = Field(
+        None, description="Whether a thing that is not in its place is looked for elsewhere, too (it is unless said)."
+    )
     with_: dict[str, Any] | None = Field(
         None, alias="with", description="The skill's input ports, or the parameters of the used file."
     )
@@ -133,6 +136,8 @@ class StepFile(PolicyFile):
             raise ValueError("'do' and 'object' go together")
         if self.with_ is not None and self.skill is None and self.use is None:
             raise ValueError("'with' goes with 'skill' or 'use'")
+        if self.elsewhere is not None and (self.skill is not None or self.use is not None):
+            raise ValueError("'elsewhere' goes with a sentence or a command")
         if self.gives is not None and self.skill is None:
             raise ValueError("'gives' goes with 'skill'")
         return self

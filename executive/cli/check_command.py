@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 from rich.console import Console
@@ -22,9 +22,12 @@ from executive.knowledge import Knowledge
 from executive.language import DependencyParser, load_parser
 from executive.mission import MissionFile, load_mission, mission_from_file, overridden
 from executive.registry import installed_skills
+from executive.view.collapse import folded_to
 from executive.view.model import node_view
 from executive.view.text import to_rich
 from plant.worlds.world import World
+
+SHOWN_NODES: Final = 40
 
 __all__ = ["CheckedFile", "Checker", "check"]
 
@@ -154,7 +157,7 @@ def _show(one: CheckedFile, console: Console, *, quiet: bool) -> None:
     if not quiet:
         for command in one.tree.commands:
             console.print(f"  {command}", markup=False)
-        console.print(to_rich(node_view(one.tree.root)))
+        console.print(to_rich(folded_to(node_view(one.tree.root), SHOWN_NODES), collapsed=False))
     if one.ok:
         console.print(f"  {_in_words(one.tree, one.estimate)}")
 

@@ -80,7 +80,8 @@ class Fresh:
             self._stale_since_s = None
             return self._condition.violated(context)
         self._stale_since_s = now_s if self._stale_since_s is None else self._stale_since_s
-        said = f"the last reading of {self._what} is {age_s:.1f} s old" if age_s < 1e6 else f"no {self._what} yet"
+        old = f"the last reading of {self._what} is {age_s:.1f} s old"
+        said = old if math.isfinite(age_s) else f"there is no reading of {self._what} yet"
         if fresh.policy is StaleData.WAIT and now_s - self._stale_since_s <= fresh.patience_s:
             return Waiting(f"waits for {self._what}: {said}")
         return Failed(Cause.PRECONDITION, said)
@@ -218,6 +219,4 @@ def battery_above(least: float, freshness: Freshness = Freshness(10.0, StaleData
 
 def localised(patience_s: float = 2.0, freshness: Freshness = Freshness(2.0, StaleData.WAIT)) -> Condition:
     """The robot knows where it is, as its scans say; with old ones it stands and waits."""
-    return Fresh(
-        Localised(patience_s), "a scan that tells its place", lambda c: c.localiser.estimate().stamp_s, freshness
-    )
+    return Fresh(Localised(patience_s), "its place", lambda c: c.localiser.estimate().stamp_s, freshness)

@@ -145,8 +145,8 @@ class Interrupts(MemoryComposite):
 
     At every tick they are looked at in order. Monitor violated: FAILURE with its cause, all below is stopped. Monitor
     or call waiting: all below is suspended, RUNNING. Interrupt called or under way: all below is suspended and it is
-    ticked: RUNNING, or FAILURE with its cause when it fails. Else the mission is ticked, and its status, cause and
-    sentence are taken over.
+    ticked: RUNNING, or FAILURE with its cause when it fails; when it succeeds, the next are looked at in the same tick.
+    With nothing to do, the mission is ticked, and its status, cause and sentence are taken over.
     """
 
     goes_on_after = Status.SUCCESS

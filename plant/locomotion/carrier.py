@@ -120,6 +120,11 @@ class Carrier:
         """The velocity that is being commanded now, after the acceleration limit."""
         return self._velocity
 
+    @property
+    def posture(self) -> tuple[float, float]:
+        """The height and pitch that are being commanded now, on the way to those wanted."""
+        return float(self._posture[0]), float(self._posture[1])
+
     def place(self, context: Context, pose: Pose2D, height_m: float) -> None:
         """Set the body's pose at the beginning of a run."""
         values = (pose.x_m, pose.y_m, pose.yaw_rad, height_m, 0.0)

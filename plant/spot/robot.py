@@ -63,7 +63,7 @@ class SpotRobot:
         joints = positions[self._index.positions]
         self._arm_hold = joints[self._index.arm]
         self._arm_rate = np.zeros(len(self._arm_hold))
-        self._jaw_goal = JawGoal(max(0.0, -float(joints[self._index.jaw])), 20.0)
+        self._jaw_goal = self._jaw_goal_before = JawGoal(max(0.0, -float(joints[self._index.jaw])), 20.0)
         self._jaw_still_s = 0.0
         self._posture = (float(spot_facts()["capabilities"]["standing_height"]), 0.0)
         self._leg_servos = LegServos(self._index, joints[self._index.legs])
@@ -157,7 +157,7 @@ class SpotRobot:
             )
         command = self._begin(Part.GRIPPER, JawGoal(opening_rad, force_n), until_s, lease)
         if self._book.status(command).state is CommandState.RUNNING:
-            self._jaw_goal = JawGoal(opening_rad, force_n)
+            self._jaw_goal_before, self._jaw_goal = self._jaw_goal, JawGoal(opening_rad, force_n)
             self._jaw_still_s = 0.0
         return command
 
@@ -252,7 +252,7 @@ class SpotRobot:
         self._arm_hold = joints[self._index.arm] if hold is None else array_of(hold)
         self._arm_rate = np.zeros(len(self._arm_hold))
         opening_rad, force_n, self._jaw_still_s = state["jaw"]
-        self._jaw_goal = JawGoal(opening_rad, force_n)
+        self._jaw_goal = self._jaw_goal_before = JawGoal(opening_rad, force_n)
         self._posture = (state["posture"][0], state["posture"][1])
         self._leg_servos.restore(state["legs"])
         self._trot.restore(state["trot"])
@@ -289,10 +289,26 @@ class SpotRobot:
             self._halt(part, reason)
 
     def _halt(self, part: Part, reason: str) -> None:
-        if part is Part.ARM and self._book.running(part) is not None:
-            joints = self._positions()[self._index.positions]
-            self._arm_hold, self._arm_rate = joints[self._index.arm], np.zeros(len(self._index.arm))
+        if self._book.running(part) is not None:
+            self._hold_still(part)
         self._book.finish(part, CommandState.STOPPED, reason)
+
+    def _hold_still(self, part: Part) -> None:
+        """Make where a part is the place where it stays; a jaw that clamps something goes on clamping."""
+        joints = self._positions()[self._index.positions]
+        if part is Part.ARM:
+            self._arm_hold, self._arm_rate = joints[self._index.arm], np.zeros(len(self._index.arm))
+        if part is Part.GRIPPER:
+            self._jaw_goal = self._stopped_jaw(max(0.0, -float(joints[self._index.jaw])))
+        if part is Part.POSTURE and self._model.carrier is not None:
+            self._posture = self._model.carrier.posture
+
+    def _stopped_jaw(self, opening_rad: float) -> JawGoal:
+        """A moving jaw stays where it is; one that has hold of a thing keeps its force, or gets that of before."""
+        rates = self._model.plant.GetVelocities(self._context)[self._index.velocities]
+        if abs(float(rates[self._index.jaw])) >= _JAW_STALL_RAD_S:
+            return JawGoal(opening_rad, self._jaw_goal.force_n)
+        return self._jaw_goal_before if self._jaw_goal.opening_rad > opening_rad else self._jaw_goal
 
     def _expire(self) -> None:
         for part in Part:

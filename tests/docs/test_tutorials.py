@@ -1,0 +1,125 @@
+"""The tutorials do what they say: files are written, commands run, and the shown output comes."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import sysconfig
+import venv
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from documents import DOCS, Block, blocks
+
+TUTORIALS = sorted((DOCS / "tutorials").glob("[0-9]*.md"))
+SLOW = [page for page in TUTORIALS if any(block.mark == "slow" for block in blocks(page))]
+FAST = [page for page in TUTORIALS if page not in SLOW]
+
+
+def name_of(page):
+    return page.stem
+
+
+class Reader:
+    """Somebody who follows a tutorial in an empty folder, with an environment of their own to install into."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.output, self.old = folder / "work", "", ""
+        self.folder.mkdir()
+        self.bin = self._environment(folder / "env")
+
+    def _environment(self, folder: Path) -> Path:
+        """A virtual environment that also sees all that this one has."""
+        venv.create(folder, with_pip=False, symlinks=True)
+        (site,) = folder.glob("lib/python*/site-packages")
+        ours = sysconfig.get_paths()["purelib"]
+        (site / "ours.pth").write_text(f"import site; site.addsitedir({ours!r})\n")
+        for name, module in {"errand": "executive.cli", "pytest": "pytest", "pip": "pip"}.items():
+            script = folder / "bin" / name
+            script.write_text(f'#!/bin/sh\nexec {shlex.quote(str(folder / "bin" / "python"))} -m {module} "$@"\n')
+            script.chmod(0o755)
+        return folder / "bin"
+
+    def follow(self, block: Block) -> None:
+        """Do what a block asks for, or look whether it shows what came."""
+        kind, _, rest = block.mark.partition(": ")
+        {"file": self.write, "old": self.remember, "new": self.change}.get(kind, lambda block, rest: None)(block, rest)
+        if block.kind == "sh":
+            self.run(block)
+        if block.kind == "text":
+            self.compare(block)
+
+    def write(self, block: Block, name: str) -> None:
+        (self.folder / name).write_text(block.text)
+
+    def remember(self, block: Block, name: str) -> None:
+        assert block.text in (self.folder / name).read_text(), f"{name} does not hold what line {block.line} shows"
+        self.old = block.text
+
+    def change(self, block: Block, name: str) -> None:
+        path = self.folder / name
+        path.write_text(path.read_text().replace(self.old, block.text))
+
+    def run(self, block: Block) -> None:
+        path = os.pathsep.join([str(self.bin), os.environ["PATH"]])
+        environment = {**os.environ, "PATH": path, "COLUMNS": "200", "PIP_NO_INDEX": "1", "PYTHONPATH": ""}
+        shell = ["bash", "-e", "-c", block.text]
+        done = subprocess.run(shell, cwd=self.folder, env=environment, capture_output=True, text=True, timeout=600)
+        self.output = done.stdout + done.stderr
+        failed = done.returncode != 0
+        assert failed == (block.mark == "fails"), f"line {block.line}: status {done.returncode}\n{self.output}"
+
+    def compare(self, block: Block) -> None:
+        came = squeezed(self.output)
+        for line in block.text.splitlines():
+            assert line == "..." or squeezed(line) in came, f"line {block.line}: {line!r} is not in\n{self.output}"
+
+
+def squeezed(text):
+    return re.sub(r"\s+", " ", text).strip()
+
+
+@pytest.mark.parametrize("page", FAST, ids=name_of)
+def test_a_tutorial_does_what_it_says(page, tmp_path):
+    reader = Reader(tmp_path)
+    for block in blocks(page):
+        reader.follow(block)
+
+
+@pytest.mark.mission
+@pytest.mark.parametrize("page", SLOW, ids=name_of)
+def test_a_tutorial_with_a_run_in_the_plant_does_what_it_says(page, tmp_path):
+    reader = Reader(tmp_path)
+    for block in blocks(page):
+        reader.follow(block)
+
+
+def test_there_are_tutorials_of_both_kinds():
+    assert len(TUTORIALS) >= 4
+    assert SLOW
+    assert FAST
+
+
+def test_tutorials_are_numbered_and_say_first_what_will_be_learnt():
+    for number, page in enumerate(TUTORIALS, start=1):
+        lines = page.read_text().splitlines()
+        assert page.name.startswith(f"{number:02d}-")
+        assert lines[0].startswith(f"# {number}. ")
+        assert lines[2].startswith("You will learn")
+        steps = re.findall(r"^## (\d+)\. ", page.read_text(), re.MULTILINE)
+        assert steps == [str(n) for n in range(1, len(steps) + 1)]
+
+
+def test_the_reader_notices_output_that_did_not_come(tmp_path):
+    reader = Reader(tmp_path)
+    reader.follow(Block("sh", "echo one\n", "", 1))
+    with pytest.raises(AssertionError, match="'two' is not in"):
+        reader.follow(Block("text", "two\n", "", 3))
+
+
+def test_the_reader_notices_a_command_that_fails(tmp_path):
+    with pytest.raises(AssertionError, match="status 3"):
+        Reader(tmp_path).follow(Block("sh", "exit 3\n", "", 1))

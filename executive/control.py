@@ -182,6 +182,12 @@ class Control:
                 self._pressed = None
                 self._note("stop button released", "the stop button is released")
 
+    @property
+    def stop_pressed(self) -> str | None:
+        """Why nothing may move while the stop button is pressed; None when it is not."""
+        with self._changed:
+            return self._pressed
+
     def set_breakpoint(self, path_id: str) -> None:
         """Pause before the node begins, each time. Raises ValueError for a node that the run does not have."""
         with self._changed:

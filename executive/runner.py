@@ -158,6 +158,7 @@ class _Run:
             seed=self._settings.seed,
             board=Board(slug(entry.tree.robot_name)),
             ask=lambda question: self._control.ask(question, self._clock),
+            stop_pressed=lambda: self._control.stop_pressed,
         )
         return Session(entry.tree, context, keeper, self._control, entry.journal)
 

@@ -100,7 +100,7 @@ def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable
     ]
     if len(fitting) == 1:
         return fitting[0]
-    fields = {_UNIT.sub("", name) for names in records.values() for name in names}
+    fields = {_UNIT.sub("", name) for names in (*records.values(), hints) for name in names}
     known = {**dict.fromkeys(hints), **dict.fromkeys(sorted(fields))}
     wrong = next((key for key in loose if _named(key, known) is None), next(iter(loose)))
     near = did_you_mean(wrong, known)

@@ -103,7 +103,7 @@ def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable
     fields = {_UNIT.sub("", name) for names in (*records.values(), hints) for name in names}
     known = {**dict.fromkeys(hints), **dict.fromkeys(sorted(fields))}
     wrong = next((key for key in loose if _named(key, known) is None), next(iter(loose)))
-    near = did_you_mean(wrong, known)
+    near = did_you_mean(wrong, [word for word in known if word != wrong])
     ports = f"its ports are {listing(hints)}" if hints else "it has no input ports"
     raise PortValueError((wrong,), f"there is no input port '{wrong}'", f"did you mean '{near}'?" if near else ports)
 
@@ -224,7 +224,8 @@ def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...
     place = knowledge.place(name)
     surfaces = () if place is None else knowledge.surfaces_in(place)
     if not surfaces:
-        raise _unknown("surface or room with surfaces", name, knowledge.place_names(), knowledge, path)
+        known = tuple(one for one in knowledge.place_names() if knowledge.surfaces_in(one))
+        raise _unknown("surface or room with surfaces", name, known, knowledge, path)
     return tuple(_surface(surface, knowledge, path) for surface in surfaces)
 
 

@@ -65,6 +65,7 @@ class ScriptedRobot:
         self.holding = False
         self.driving = False
         self.charge = 0.9
+        self.standing = Pose2D(0.0, 0.0, 0.0)
         self.lease: Lease | None = None
         self.leases = 0
         self.calls: list[str] = []
@@ -79,7 +80,7 @@ class ScriptedRobot:
     def odometry(self) -> Odometry:
         if "odometry" in self.raising:
             raise self.raising["odometry"]
-        return Odometry(self.clock.now(), RigidTransform(), (0.0, 0.0, 0.0))
+        return Odometry(self.clock.now(), self.standing.transform(), (0.0, 0.0, 0.0))
 
     def gripper(self) -> Gripper:
         return Gripper(self.clock.now(), 0.3, 10.0 if self.holding else 0.0, self.holding)
@@ -379,7 +380,8 @@ def run_tree(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> 
 
     def runner(tree: CompiledTree, **options: Any) -> Any:
         settings = replace(RunSettings(seed=3), **options.pop("settings", {}))
-        entry = RunEntry(tree, robot, StillLocaliser(), EmptyCostmap())  # type: ignore[arg-type]
+        localiser = options.pop("localiser", None) or StillLocaliser()
+        entry = RunEntry(tree, robot, localiser, EmptyCostmap())  # type: ignore[arg-type]
         return run(
             [entry],
             clock=clock,

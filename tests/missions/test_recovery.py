@@ -1,0 +1,152 @@
+"""Whole missions in the plant in which something goes wrong: they recover, or they fail and say so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from executive.cli.assembly import judge, knowledge_of, open_world, run_entry
+from executive.command import parse_command
+from executive.compiler import Step, compile_commands
+from executive.outcome import Outcome
+from executive.registry import built_in_skills
+from executive.runner import RunSettings, run
+from executive.worker import LockStepWorker
+from plant.diagram import LooseModel
+from plant.simulation import Simulation
+
+FETCH = (
+    "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
+    "Take [drink] to [start] and do [Nothing] to [Nothing]",
+)
+BOX = """<sdf version="1.9"><model name="box"><link name="box"><inertial><mass>20</mass></inertial>{parts}</link>
+</model></sdf>"""
+BOX_PART = (
+    """<{kind} name="{kind}"><pose>0 0 0.4 0 0 0</pose><geometry><box><size>{size}</size></box></geometry></{kind}>"""
+)
+
+pytestmark = pytest.mark.mission
+
+
+class Mission:
+    """A mission in the flat, with what happened in it."""
+
+    def __init__(self, texts, *, seed=1, **plant: Any) -> None:
+        self.world = open_world("flat")
+        self.knowledge = knowledge_of(self.world)
+        steps = [Step(parse_command(text)) for text in texts]
+        self.tree = compile_commands(
+            "m", steps, knowledge=self.knowledge, registry=built_in_skills(), robot_name="Alice"
+        )
+        self.simulation = Simulation(self.world, seed=seed, robot_names=("Alice",), looks=False, **plant)
+        self.entry = run_entry(self.simulation, self.world, self.tree)
+        self.transitions: list[dict[str, Any]] = []
+        self.seed = seed
+
+    def _publish(self, topic, message):
+        if topic == "transitions":
+            self.transitions.append(message)
+
+    def run(self, robot=None, observer=None):
+        """Run it to its end; the robot's result and the referee's verdict."""
+        entry = (
+            self.entry
+            if robot is None
+            else type(self.entry)(self.tree, robot, self.entry.localiser, self.entry.costmap)
+        )
+        clock = self.simulation.clock
+        result = run(
+            [entry],
+            clock=clock,
+            worker=LockStepWorker(clock),
+            publish=self._publish,
+            settings=RunSettings(seed=self.seed),
+            observer=observer,
+        ).worst
+        return result, judge(self.simulation, self.tree, self.knowledge, result)
+
+    def ended(self, part: str) -> list[str]:
+        """How the nodes with `part` in their path ids ended, in order."""
+        done = ("SUCCESS", "FAILURE")
+        return [t["to"] for t in self.transitions if part in t["node"] and t["to"] in done]
+
+
+def box_at(folder, x_m, y_m, size_m):
+    """A box that stands somewhere and that no map knows."""
+    size = " ".join(map(str, size_m))
+    path = folder / "box.sdf"
+    parts = "".join(BOX_PART.format(kind=kind, size=size) for kind in ("collision", "visual"))
+    path.write_text(BOX.format(parts=parts), encoding="utf-8")
+    return LooseModel("box", path, RigidTransform([x_m, y_m, 0.0]), fixed=True)
+
+
+def honest(result, verdict):
+    """The claim is true; a failure carries a cause and a sentence."""
+    claimed = result.outcome is Outcome.SUCCESS
+    assert not claimed or verdict.success, verdict.why
+    assert claimed or (result.cause is not None and result.message)
+
+
+def test_a_blocked_doorway_is_gone_around(tmp_path):
+    box = box_at(tmp_path, 9.0, 5.4, (0.7, 0.3, 0.8))
+    mission = Mission(FETCH, extra_models=(box,))
+    result, verdict = mission.run()
+    honest(result, verdict)
+    assert result.outcome is Outcome.SUCCESS, result.message
+    assert verdict.collisions == 0
+
+
+class WeakJaw:
+    """A robot whose jaw closes too weakly at first."""
+
+    def __init__(self, robot, weak_times, force_n):
+        self._robot, self._left, self._force_n = robot, weak_times, force_n
+
+    def __getattr__(self, name):
+        return getattr(self._robot, name)
+
+    def set_gripper(self, opening_rad, force_n, *, until_s, lease):
+        if opening_rad == 0.0 and force_n > 30.0 and self._left > 0:
+            self._left -= 1
+            force_n = self._force_n
+        return self._robot.set_gripper(opening_rad, force_n, until_s=until_s, lease=lease)
+
+
+def test_a_thing_that_slips_is_taken_again():
+    mission = Mission(FETCH)
+    robot = WeakJaw(mission.entry.robot, weak_times=1, force_n=1.0)
+    result, verdict = mission.run(robot)
+    honest(result, verdict)
+    assert mission.ended("1-kitchen/grasp")[0] == "FAILURE"
+
+
+def test_a_low_battery_is_charged_in_between_and_the_mission_goes_on():
+    mission = Mission(("Take [Nothing] to [workshop] and do [find] to [hammer]",), charge=0.153)
+    charges = []
+    battery = mission.entry.robot.battery
+    result, verdict = mission.run(observer=lambda progress: charges.append(battery().charge))
+    assert result.outcome is Outcome.SUCCESS, result.message
+    assert verdict.success, verdict.why
+    assert mission.ended("watch/battery")[-1] == "SUCCESS"
+    assert min(charges) > 0.1
+    assert max(charges) > 0.79
+
+
+def test_a_lost_place_is_found_again_and_the_mission_goes_on():
+    mission = Mission(("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]",))
+    localiser = mission.entry.localiser
+    moved = []
+
+    def mislead(progress):
+        if progress.now_s > 4.0 and not moved:
+            moved.append(True)
+            estimate = localiser.estimate()
+            wrong = RigidTransform(RollPitchYaw(0.0, 0.0, 2.0), [-4.0, -3.0, 0.0]) @ estimate.X_WO
+            localiser.accept(type(estimate)(estimate.stamp_s, wrong, estimate.covariance, True))
+
+    result, verdict = mission.run(observer=mislead)
+    assert result.outcome is Outcome.SUCCESS, result.message
+    assert verdict.success, verdict.why
+    assert mission.ended("watch/lost")[-1] == "SUCCESS"

@@ -290,6 +290,11 @@ class Control:
             self._note("question", f"{question.id}: {question.text}")
             return asked
 
+    def held(self, duration_s: float) -> None:
+        """The run was held so long (robot's clock); that does not count against the time of questions."""
+        with self._changed:
+            self._desk.postpone(duration_s)
+
     def rest(self, duration_s: float) -> None:
         """Let the wall's clock run on, less long when something is wished meanwhile."""
         with self._changed:

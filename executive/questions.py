@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Condition
 from types import MappingProxyType
 
@@ -58,6 +58,11 @@ class QuestionDesk:
             raise ValueError(f"'{text}' is no answer to '{question_id}'; choose one of: {', '.join(options)}")
         pending.take(text)
         self._leave(question_id)
+
+    def postpone(self, by_s: float) -> None:
+        """Give all open questions more time."""
+        for pending in self._open.values():
+            pending.open = replace(pending.open, until_s=pending.open.until_s + by_s)
 
     def close(self) -> None:
         """Nobody waits for answers any more."""

@@ -192,6 +192,7 @@ class _Run:
             self._time.go_on()
         else:
             self._time.stop()
+            self._control.held(self._settings.tick_period_s)
             for session in live:
                 session.hold()
         if self._time.elapsed_s() >= self._settings.time_limit_s:

@@ -7,7 +7,7 @@ from py_trees.common import Status
 
 from executive.control import Control, Mode
 from executive.outcome import Outcome
-from skills.api import Cause, Question, nobody_to_ask
+from skills.api import Cause, Failed, Question, Running, Succeeded, nobody_to_ask
 from skills.robot import Lease
 
 GRASP = "alice/fetch-drink/1-kitchen/grasp"
@@ -133,8 +133,6 @@ def test_at_a_breakpoint_the_node_has_not_begun(compiled, run_tree, make, contro
 
 
 def test_a_breakpoint_holds_each_time_until_it_is_cleared(compiled, run_tree, make, control, script):
-    from skills.api import Failed
-
     script.ends["grasp"] = lambda skill: Failed(Cause.EXECUTION, "slipped")
     stops = []
 
@@ -337,8 +335,6 @@ def test_wrong_answers_and_late_ones_are_refused(control, clock):
 
 
 def test_a_skill_asks_the_operator_in_the_midst_of_a_run(compiled, run_tree, make, control, script):
-    from skills.api import Running, Succeeded
-
     said = []
 
     def ask(skill):
@@ -354,6 +350,22 @@ def test_a_skill_asks_the_operator_in_the_midst_of_a_run(compiled, run_tree, mak
 
     script.ends["navigate"] = ask
     result = run_tree(compiled(GO), control=control, observer=observe)
+    assert (result.outcome, said) == (Outcome.SUCCESS, ["retry"])
+
+
+def test_a_pause_does_not_count_against_the_time_of_a_question(compiled, run_tree, control, script):
+    said = []
+
+    def ask(skill):
+        skill.asked = getattr(skill, "asked", None) or skill.context.ask(QUESTION)
+        if not skill.asked.done():
+            return Running("waiting for an answer")
+        said.append(skill.asked.result())
+        return Succeeded("asked")
+
+    actions = {10: control.pause, 200: control.resume, 215: lambda: control.answer(QUESTION.id, "retry")}
+    script.ends["navigate"] = ask
+    result = run_tree(compiled(GO), control=control, observer=at_ticks(actions))
     assert (result.outcome, said) == (Outcome.SUCCESS, ["retry"])
 
 

@@ -37,22 +37,22 @@ class _Facts(BaseModel):
 class Pose(_Facts):
     """A planar pose in the world frame: x, y in metres, yaw in radians, counter-clockwise from x."""
 
-    x: float
-    y: float
-    yaw: float = 0.0
+    x: float = Field(description="metres")
+    y: float = Field(description="metres")
+    yaw: float = Field(default=0.0, description="radians")
 
 
 class RobotFacts(_Facts):
     """The robot: the name by which it is spoken to."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Annotated[str, Field(min_length=1, description="as in \"Hey Alice\"")]
 
 
 class BatteryFacts(_Facts):
     """When the robot goes to the dock and until when it charges there; states of charge from 0 to 1."""
 
-    low: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.15
-    charged: Annotated[float, Field(gt=0.0, le=1.0)] = 0.8
+    low: Annotated[float, Field(ge=0.0, lt=1.0, description="below this the mission is interrupted")] = 0.15
+    charged: Annotated[float, Field(gt=0.0, le=1.0, description="at this the mission goes on")] = 0.8
 
     @model_validator(mode="after")
     def _in_order(self) -> BatteryFacts:
@@ -64,49 +64,51 @@ class BatteryFacts(_Facts):
 class Place(_Facts):
     """A room: other names, where the robot stands to be in it, its outline (world frame, m)."""
 
-    pose: Pose
-    polygon: Polygon
-    aliases: tuple[str, ...] = ()
+    pose: Pose = Field(description="where the robot stands to be there")
+    polygon: Polygon = Field(description="outline, corners (x, y)")
+    aliases: tuple[str, ...] = Field(default=(), description="other names")
 
 
 class SurfaceFacts(_Facts):
     """A flat top in a room: other names, height above the floor (m), outline, and poses from which it is seen whole."""
 
-    place: str
-    height: Annotated[float, Field(gt=0.0)]
-    polygon: Polygon
-    viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1)]
-    aliases: tuple[str, ...] = ()
+    place: str = Field(description="the room that it is in")
+    height: Annotated[float, Field(gt=0.0, description="of the top above the floor, m")]
+    polygon: Polygon = Field(description="outline of the top, corners (x, y)")
+    viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1, description="poses from which it is seen whole")]
+    aliases: tuple[str, ...] = Field(default=(), description="other names")
 
 
 class ThingFacts(_Facts):
     """A class of things: other names, the categories it belongs to, the surfaces where it usually is."""
 
-    aliases: tuple[str, ...] = ()
-    categories: tuple[str, ...] = ()
-    usual: tuple[str, ...] = ()
+    aliases: tuple[str, ...] = Field(default=(), description="other names")
+    categories: tuple[str, ...] = Field(default=(), description="as in \"a drink\"")
+    usual: tuple[str, ...] = Field(default=(), description="surfaces where it usually is, likeliest first")
 
 
 class Person(_Facts):
     """Somebody: other names, the place where they usually are, and where exactly when that is known."""
 
-    at: str
-    aliases: tuple[str, ...] = ()
-    pose: Pose | None = None
+    at: str = Field(description="the place where they usually are")
+    aliases: tuple[str, ...] = Field(default=(), description="other names")
+    pose: Pose | None = Field(default=None, description="where exactly, when that is known")
 
 
 class Knowledge(_Facts):
     """All that is known of one world. Names are matched without regard to case."""
 
-    robot: RobotFacts
-    start: Pose
-    dock: Pose
-    battery: BatteryFacts = BatteryFacts()
-    places: dict[str, Place]
-    surfaces: dict[str, SurfaceFacts]
-    things: dict[str, ThingFacts]
-    people: dict[str, Person] = Field(default_factory=dict)
-    defaults: dict[str, dict[str, str]] = Field(default_factory=dict)
+    robot: RobotFacts = Field(description="the robot")
+    start: Pose = Field(description="where it stands at the beginning")
+    dock: Pose = Field(description="where it stands to charge")
+    battery: BatteryFacts = Field(default=BatteryFacts(), description="when it charges, and until when")
+    places: dict[str, Place] = Field(description="the rooms by name")
+    surfaces: dict[str, SurfaceFacts] = Field(description="the flat tops where things lie, by name")
+    things: dict[str, ThingFacts] = Field(description="the classes of things by name")
+    people: dict[str, Person] = Field(default_factory=dict, description="the people by name")
+    defaults: dict[str, dict[str, str]] = Field(
+        default_factory=dict, description="for a task, the room for each thing or category when none was said"
+    )
 
     def place(self, name: str) -> str | None:
         """The room or surface that `name` means, by its own name; None when unknown."""

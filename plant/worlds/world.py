@@ -36,38 +36,40 @@ class _Strict(BaseModel):
 class Rules(_Strict):
     """How things lie on surfaces, in metres; see `objects.yaml`."""
 
-    from_edge_m: Span
-    clear_m: float
-    rim_m: float
-    drop_m: float
+    from_edge_m: Span = Field(description="least and greatest distance of a thing's centre from the front edge")
+    clear_m: float = Field(description="between things, and between a thing and what it must keep clear of")
+    rim_m: float = Field(description="between a thing's outline and the surface's own outline")
+    drop_m: float = Field(description="things start this high above the surface")
 
 
 class ObjectRule(_Strict):
     """A loose thing, its class, and the surfaces on which it may lie."""
 
-    name: str
-    model: str
-    surfaces: tuple[str, ...] = Field(min_length=1)
+    name: str = Field(description="its name in this world")
+    model: str = Field(description="a class of `plant/models/catalogue.yaml`")
+    surfaces: tuple[str, ...] = Field(min_length=1, description="surfaces of knowledge.yaml; the seed chooses one")
 
 
 class PersonRule(_Strict):
     """A person who stands before the robot's start pose: ranges of distance, bearing and turn from facing it."""
 
-    name: str
-    model: str
-    distance_m: Span
-    bearing_rad: Span
-    turned_rad: Span
+    name: str = Field(description="the person's name in knowledge.yaml")
+    model: str = Field(description="a class of `plant/models/catalogue.yaml`")
+    distance_m: Span = Field(description="least and greatest distance from the start pose")
+    bearing_rad: Span = Field(description="least and greatest bearing, seen from the start pose")
+    turned_rad: Span = Field(description="least and greatest turn away from facing the robot")
 
 
 class SeedRules(_Strict):
     """The schema of `objects.yaml`."""
 
-    rules: Rules
-    fronts: dict[str, tuple[tuple[Point, Point], ...]]
-    keep_clear: tuple[Polygon, ...] = ()
-    objects: tuple[ObjectRule, ...]
-    people: tuple[PersonRule, ...] = ()
+    rules: Rules = Field(description="distances that hold for all things")
+    fronts: dict[str, tuple[tuple[Point, Point], ...]] = Field(
+        description="for each surface, the edges (from and to, x and y) that the robot can stand before"
+    )
+    keep_clear: tuple[Polygon, ...] = Field(default=(), description="outlines on which nothing may lie, corners (x, y)")
+    objects: tuple[ObjectRule, ...] = Field(description="the loose things")
+    people: tuple[PersonRule, ...] = Field(default=(), description="the people")
 
 
 class _Pose(BaseModel):

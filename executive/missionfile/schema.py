@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StrictBool, StrictInt, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StrictBool, StrictInt, field_validator, model_validator
 
 from executive.behaviours.conditions import StaleData
 from executive.command import Task
@@ -163,11 +163,12 @@ class MissionFile(PolicyFile):
     steps: Annotated[tuple[StepFile, ...], Field(min_length=1)] = Field(description="What to do, one after the other.")
     _source: YamlSource | None = PrivateAttr(default=None)
 
-    @model_validator(mode="after")
-    def _cannot_skip_itself(self) -> MissionFile:
-        if self.on_failure is OnFailure.SKIP:
+    @field_validator("on_failure")
+    @classmethod
+    def _cannot_skip_itself(cls, on_failure: OnFailure | None) -> OnFailure | None:
+        if on_failure is OnFailure.SKIP:
             raise ValueError("a whole mission cannot be skipped; set 'on_failure: skip' under 'each' or on a step")
-        return self
+        return on_failure
 
     @property
     def source(self) -> YamlSource | None:
@@ -208,7 +209,8 @@ def write_schema(path: Path) -> None:
     path.write_text(schema_text(), encoding="utf-8")
 
 
-_PARAMETER: Final[Mapping[str, Any]] = MappingProxyType({"type": "string", "pattern": r"\$\{[A-Za-z_][A-Za-z0-9_]*\}"})
+_REFERENCE: Final = r"^\$\{[A-Za-z_][A-Za-z0-9_]*\}$"
+_PARAMETER: Final[Mapping[str, Any]] = MappingProxyType({"type": "string", "pattern": _REFERENCE})
 _CLOSED_TYPES: Final = ("number", "integer", "boolean")
 
 

@@ -173,7 +173,9 @@ def with_a_tab(text, rng):
 def unbalanced(text, rng):
     lines = text.splitlines()
     at = chosen(rng, [n for n, line in enumerate(lines) if ":" in line and not line.startswith("#")])
-    lines[at] = lines[at].split(":")[0] + ": " + chosen(rng, ["{", "[", '"', "'", "}", "*x", "!!python/object:x y", "@"])
+    lines[at] = (
+        lines[at].split(":")[0] + ": " + chosen(rng, ["{", "[", '"', "'", "}", "*x", "!!python/object:x y", "@"])
+    )
     return "\n".join(lines).encode()
 
 

@@ -16,11 +16,13 @@ from executive.compiler import CompiledTree
 from executive.control import Control
 from executive.runner import Observer, Progress
 from executive.snapshot import NodeState, Snapshot
+from executive.view.looks import Looks
 from executive.view.model import node_view
 from executive.view.text import to_rich
 
 REFRESH_S = 0.2
 BAR_CELLS = 20
+FEWEST_ROWS = 5
 PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 
 
@@ -59,7 +61,21 @@ class _Picture:
             Text(line, style=HELP_STYLE if line == HELP else PROMPT_STYLE, overflow="fold")
             for line in self._prompt(progress.now_s)
         ]
-        self._live.update(Group(*pictures, *lines, *prompt), refresh=True)
+        below = sum(len(text.split("\n")) for text in (*lines, *prompt))
+        rows = max(FEWEST_ROWS, (self._live.console.height - below) // max(1, len(pictures)))
+        shown = [fitted(picture, rows) for picture in pictures]
+        self._live.update(Group(*shown, *lines, *prompt), refresh=True)
+
+
+def fitted(picture: Text, rows: int) -> Text:
+    """At most so many lines of a tree, with what runs among them."""
+    lines = picture.split("\n")
+    if len(lines) <= rows:
+        return picture
+    running = [number for number, line in enumerate(lines) if Looks.RUNNING.value.symbol in line.plain]
+    middle = running[-1] if running else 0
+    first = max(0, min(middle - 2 * rows // 3, len(lines) - rows))
+    return Text("\n", no_wrap=True, overflow="ellipsis").join(lines[first : first + rows])
 
 
 def _of_tree(tree: CompiledTree, states: Snapshot) -> Snapshot:

@@ -1,0 +1,56 @@
+"""The live tree: what runs stays in sight however small the terminal, and the prompt below it."""
+
+import io
+
+import pytest
+from py_trees.common import Status
+from rich.console import Console
+from rich.text import Text
+
+from executive.cli.live import fitted, live_view
+from executive.control import Control
+from executive.runner import Progress
+from executive.snapshot import NodeState
+
+
+def tree_of(count, running):
+    return Text("\n".join(f"{'▶' if number == running else '○'} node {number}" for number in range(count)))
+
+
+@pytest.mark.parametrize("running", [0, 1, 17, 38, 39])
+def test_what_runs_is_among_the_lines_that_fit(running):
+    shown = fitted(tree_of(40, running), 10).plain.splitlines()
+    assert len(shown) == 10
+    assert f"▶ node {running}" in shown
+
+
+def test_a_tree_that_fits_is_shown_whole():
+    picture = tree_of(8, 3)
+    assert fitted(picture, 8) is picture
+
+
+def test_a_tree_at_rest_is_shown_from_its_root():
+    assert fitted(tree_of(40, None), 10).plain.splitlines()[0] == "○ node 0"
+
+
+def test_the_tree_under_way_is_drawn_on_a_small_terminal(compiled, make):
+    first, aside = compiled(*make.FETCH), compiled(make.FETCH[1], name="go aside")
+    states = {path_id: NodeState(Status.RUNNING, message="at it") for path_id in (*first.path_ids, *aside.path_ids)}
+    screen = io.StringIO()
+    console = Console(file=screen, force_terminal=True, width=80, height=14)
+    with live_view(first, console, Control()) as observe:
+        observe(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": aside}))
+    assert "at it" in screen.getvalue()
+    assert "fetch drink" not in screen.getvalue()
+
+
+def test_without_a_terminal_each_end_is_a_line(compiled, make):
+    tree = compiled(*make.FETCH)
+    leaf = next(node for node in tree.root.walk() if not node.children)
+    states = {path_id: NodeState() for path_id in tree.path_ids}
+    states[leaf.path_id] = NodeState(Status.SUCCESS, message="well done")
+    told = io.StringIO()
+    with live_view(tree, Console(file=told, width=200)) as observe:
+        observe(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": tree}))
+        observe(Progress(1.1, 21, 0, {"Alice": states}, {"Alice": tree}))
+    assert told.getvalue().count("well done") == 1

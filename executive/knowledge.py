@@ -45,7 +45,7 @@ class Pose(_Facts):
 class RobotFacts(_Facts):
     """The robot: the name by which it is spoken to."""
 
-    name: Annotated[str, Field(min_length=1, description="as in \"Hey Alice\"")]
+    name: Annotated[str, Field(min_length=1, description='as in "Hey Alice"')]
 
 
 class BatteryFacts(_Facts):
@@ -83,7 +83,7 @@ class ThingFacts(_Facts):
     """A class of things: other names, the categories it belongs to, the surfaces where it usually is."""
 
     aliases: tuple[str, ...] = Field(default=(), description="other names")
-    categories: tuple[str, ...] = Field(default=(), description="as in \"a drink\"")
+    categories: tuple[str, ...] = Field(default=(), description='as in "a drink"')
     usual: tuple[str, ...] = Field(default=(), description="surfaces where it usually is, likeliest first")
 
 

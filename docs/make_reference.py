@@ -1,0 +1,237 @@
+"""Writes `docs/reference/` from the schemas, the registered skills and the faults: run it after changing one of them.
+
+python docs/make_reference.py
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from executive.knowledge import Knowledge
+from executive.mission import MissionFile
+from executive.registry import built_in_skills
+from executive.testing.skill_test import SkillTestFile
+from executive.types import describe_type, field_types
+from plant.worlds.world import SeedRules
+from skills.api import Skill
+from skills.testing.fault_kinds import STANDARD_FAULTS
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "docs" / "reference"
+NOTE = "<!-- Written by docs/make_reference.py; don't edit. -->\n\n"
+
+
+@dataclasses.dataclass(frozen=True)
+class SchemaPage:
+    """A page on one kind of YAML file: its schema, a few words, and a file of ours as the example."""
+
+    name: str
+    title: str
+    words: str
+    model: type[BaseModel]
+    example: str
+
+
+SCHEMA_PAGES = (
+    SchemaPage(
+        "mission-file",
+        "Mission files",
+        "What a robot is to do, as a short list of steps. `errand check FILE` refuses a wrong one with file and line; "
+        "`missions/mission.schema.json` is the same schema for editors.",
+        MissionFile,
+        "missions/guarded_delivery.yaml",
+    ),
+    SchemaPage(
+        "knowledge",
+        "Knowledge files",
+        "`knowledge.yaml` of a world: what the robot is told. Metres and radians, in the world frame.",
+        Knowledge,
+        "plant/worlds/flat/knowledge.yaml",
+    ),
+    SchemaPage(
+        "world-objects",
+        "World files",
+        "`objects.yaml` of a world: what the seed sets in it. The world itself is `world.dmd.yaml` (Drake's model "
+        "directives), what is known of it `knowledge.yaml`.",
+        SeedRules,
+        "plant/worlds/flat/objects.yaml",
+    ),
+    SchemaPage(
+        "skill-test",
+        "Skill tests",
+        "`*.skilltest.yaml`: tests of one skill as data, collected by pytest.",
+        SkillTestFile,
+        "tests/skills/stow/stow.skilltest.yaml",
+    ),
+)
+
+
+def pages() -> dict[str, str]:
+    """The text of every page by file name."""
+    written = {f"{page.name}.md": schema_page(page) for page in SCHEMA_PAGES}
+    return {**written, "skills.md": skills_page(), "faults.md": faults_page()}
+
+
+def schema_page(page: SchemaPage) -> str:
+    """The page on one schema: a table for each part, then the example."""
+    plain = page.model.model_json_schema(by_alias=True)
+    schema = _words_inlined(plain, plain.get("$defs", {}))
+    parts = {page.model.__name__: schema, **schema.get("$defs", {})}
+    order = [name for name in _reachable(schema, schema.get("$defs", {})) if "properties" in parts[name]]
+    sections = [_section(_heading(name), parts[name]) for name in order]
+    main = _section("The file", schema)
+    example = (ROOT / page.example).read_text(encoding="utf-8")
+    shown = f"## Example\n\n`{page.example}`:\n\n```yaml\n{example}```\n"
+    return f"{NOTE}# {page.title}\n\n{page.words} Unknown keys are refused.\n\n{main}{''.join(sections)}{shown}"
+
+
+def _reachable(schema: Mapping[str, Any], parts: Mapping[str, Any]) -> list[str]:
+    """The parts in the order in which the schema first speaks of them."""
+    found: list[str] = []
+
+    def look(value: Any) -> None:
+        if isinstance(value, dict):
+            name = str(value.get("$ref", "")).rpartition("/")[2]
+            if name and name not in found:
+                found.append(name)
+                look(parts[name])
+            for key, item in value.items():
+                if key != "$defs":
+                    look(item)
+        elif isinstance(value, list):
+            for item in value:
+                look(item)
+
+    look(schema)
+    return found
+
+
+def _words_inlined(value: Any, parts: Mapping[str, Any]) -> Any:
+    """The schema with lists of words put where they are spoken of."""
+    if isinstance(value, list):
+        return [_words_inlined(item, parts) for item in value]
+    if not isinstance(value, dict):
+        return value
+    part = parts.get(str(value.get("$ref", "")).rpartition("/")[2], {})
+    words = {"enum": part["enum"]} if "enum" in part else {}
+    rest = {key: _words_inlined(item, parts) for key, item in value.items() if not (words and key == "$ref")}
+    return {**rest, **words}
+
+
+def _heading(name: str) -> str:
+    """A model's name as a heading: "StepFile" is "Step"."""
+    word = name.removesuffix("File").removesuffix("Setup").removesuffix("Facts").removesuffix("Rule")
+    return "".join(f" {c.lower()}" if c.isupper() and n else c for n, c in enumerate(word))
+
+
+def _section(heading: str, part: Mapping[str, Any]) -> str:
+    required = part.get("required", [])
+    rows = [_row(key, facts, key in required) for key, facts in part["properties"].items()]
+    table = "\n".join(["| key | takes | unless said | meaning |", "|---|---|---|---|", *rows])
+    return f"## {heading}\n\n{part.get('description', '')}\n\n{table}\n\n"
+
+
+def _row(key: str, facts: Mapping[str, Any], needed: bool) -> str:
+    default = "needed" if needed else _default(facts.get("default"))
+    cells = (f"`{key}`", _takes(facts), default, facts.get("description", ""))
+    return f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
+
+
+def _default(value: Any) -> str:
+    return "" if value in (None, [], {}) or isinstance(value, dict) else f"`{json.dumps(value)}`"
+
+
+def _takes(facts: Mapping[str, Any]) -> str:
+    """What a key takes, in words."""
+    if "$ref" in facts:
+        name = _heading(facts["$ref"].rpartition("/")[2])
+        return f"[{name}](#{name.lower().replace(' ', '-')})"
+    if "enum" in facts or "const" in facts:
+        return " or ".join(f"`{value}`" for value in facts.get("enum", [facts.get("const")]))
+    if "anyOf" in facts or "allOf" in facts:
+        options = [_takes(option) for option in facts.get("anyOf", facts.get("allOf"))]
+        return " or ".join(dict.fromkeys(option for option in options if option != "nothing"))
+    return _plain(facts)
+
+
+def _plain(facts: Mapping[str, Any]) -> str:
+    kind = facts.get("type", "anything")
+    if kind == "array":
+        items = facts.get("prefixItems")
+        return f"list of {len(items)}: {_takes(items[0])}" if items else f"list of {_takes(facts.get('items', {}))}"
+    if kind == "object":
+        inner = facts.get("additionalProperties")
+        return f"names to {_takes(inner)}" if isinstance(inner, dict) and inner else "names to values"
+    return {"null": "nothing", "boolean": "true or false", "string": "text", "integer": "whole number"}.get(
+        kind, str(kind)
+    ) + _limits(facts)
+
+
+def _limits(facts: Mapping[str, Any]) -> str:
+    """Bounds in words."""
+    words = {"minimum": "from {}", "exclusiveMinimum": "above {}", "maximum": "to {}", "exclusiveMaximum": "below {}"}
+    told = [text.format(f"{facts[key]:g}") for key, text in words.items() if key in facts]
+    return f" {' '.join(told)}" if told else ""
+
+
+def skills_page() -> str:
+    """The page on the skills that come with the project."""
+    sections = "".join(_skill(name, skill) for name, skill in built_in_skills().items())
+    words = "Each is registered under its name in the group `errand.skills`, as skills of others are."
+    return f"{NOTE}# Skills\n\n{words}\n\n{sections}"
+
+
+def _skill(name: str, skill: type[Skill[Any]]) -> str:
+    ports = "".join(_ports(skill))
+    causes = "\n".join(f"| {cause.value} | {why} |" for cause, why in skill.causes.items())
+    ages = ", ".join(f"{source} {age_s:g} s" for source, age_s in skill.max_data_age_s.items())
+    limits = f"Time limit unless said: {skill.default_timeout_s:g} s." + (f" Oldest data: {ages}." if ages else "")
+    summary = " ".join((skill.__doc__ or "").split())
+    failures = f"| it fails with | when |\n|---|---|\n{causes}"
+    return f"## {name}\n\n{summary}\n\n{limits}\n\n{ports}{failures}\n\n"
+
+
+def _ports(skill: type[Skill[Any]]) -> Iterator[str]:
+    hints = field_types(skill.Inputs)
+    rows = []
+    for field in dataclasses.fields(skill.Inputs):
+        default = "needed" if field.default is dataclasses.MISSING else f"`{field.default}`"
+        rows.append(f"| `{field.name}` | {_type(hints[field.name])} | {default} |")
+    if rows:
+        yield " ".join((skill.Inputs.__doc__ or "").split()) + "\n\n"
+        yield "| input | type | unless said |\n|---|---|---|\n" + "\n".join(rows) + "\n\n"
+    if skill.outputs:
+        given = "\n".join(f"| `{port}` | {_type(kind)} |" for port, kind in skill.outputs.items())
+        yield f"| output | type |\n|---|---|\n{given}\n\n"
+
+
+def _type(hint: Any) -> str:
+    return describe_type(hint).replace("skills.api.", "").replace("skills.robot.", "").replace("|", "&#124;")
+
+
+def faults_page() -> str:
+    """The page on the faults that can be injected by name."""
+    rows = "\n".join(f"| `{kind.example}` | {kind.meaning} |" for kind in STANDARD_FAULTS)
+    words = (
+        "A fault is the words of its kind and, perhaps, when it is on: `at 3 s` or `from 3 s` (and ever after), "
+        "`from 3 s to 5 s`, `after 4 calls`, or nothing (always). Verbs go by their names in `skills/robot.py` or as "
+        "camera, lidar, arm, jaw, base and body."
+    )
+    return f"{NOTE}# Faults by name\n\n{words}\n\n| for instance | what happens |\n|---|---|\n{rows}\n"
+
+
+def main() -> None:
+    """Write all pages."""
+    FOLDER.mkdir(exist_ok=True)
+    for name, text in pages().items():
+        (FOLDER / name).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

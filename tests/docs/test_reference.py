@@ -1,0 +1,35 @@
+"""The reference pages are those that the schemas, skills and faults give now."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from documents import DOCS
+
+SPEC = importlib.util.spec_from_file_location("make_reference", DOCS / "make_reference.py")
+assert SPEC is not None
+make_reference = importlib.util.module_from_spec(SPEC)
+sys.modules["make_reference"] = make_reference
+SPEC.loader.exec_module(make_reference)
+PAGES = make_reference.pages()
+
+
+@pytest.mark.parametrize("name", sorted(PAGES))
+def test_a_page_is_current(name):
+    """Run `python docs/make_reference.py` when this fails."""
+    assert (DOCS / "reference" / name).read_text(encoding="utf-8") == PAGES[name]
+
+
+def test_there_is_no_other_page():
+    assert {path.name for path in (DOCS / "reference").iterdir()} == set(PAGES)
+
+
+@pytest.mark.parametrize("page", make_reference.SCHEMA_PAGES, ids=lambda page: page.name)
+def test_every_key_of_a_schema_is_explained(page):
+    schema = page.model.model_json_schema(by_alias=True)
+    parts = [schema, *(part for part in schema.get("$defs", {}).values() if "properties" in part)]
+    mute = [key for part in parts for key, facts in part["properties"].items() if not facts.get("description")]
+    assert mute == []

@@ -24,7 +24,8 @@ class LocaliserOptions:
 
     `initial_sigma` is the spread of the given start pose in x, y (m) and yaw (rad). Odometry is expected to err by
     `drift_per_m` of the way, `yaw_drift_rad_per_m` and `yaw_drift_per_rad` of a turn. Fewer explained points than
-    `lost_share`, for `lost_scans` scans on end, means lost; `found_share` is needed to be found again.
+    `lost_share`, for `lost_scans` scans on end, means lost; `found_share` is needed to be found again. Places whose
+    shares differ by less than `alike_share` count as alike.
     """
 
     height_band_m: tuple[float, float] = (0.7, 1.3)
@@ -38,6 +39,7 @@ class LocaliserOptions:
     yaw_drift_per_rad: float = 0.03
     lost_share: float = 0.4
     found_share: float = 0.6
+    alike_share: float = 0.02
     lost_scans: int = 5
     search_radius_m: float = 1.5
     search_every_scans: int = 10
@@ -166,7 +168,10 @@ class ScanMatchingLocaliser:
             self._poor_scans, self._localised = 0, True
 
     def _best_match(self, points_F: FloatArray, centre: Pose2D, radius_m: float | None) -> Match | None:
-        """Score many poses, refine the best few: the one that explains most, None when it explains too little."""
+        """Score many poses, refine the best few: the one that explains most, None when it explains too little.
+
+        Of several that explain about as much the one nearest to the centre.
+        """
         options = self._options
         if len(points_F) < options.min_points:
             return None
@@ -175,8 +180,11 @@ class ScanMatchingLocaliser:
         best = poses[np.argsort(-score_poses(self._grid, few, poses), kind="stable")[:20]]
         spread = np.diag([0.2**2, 0.2**2, 0.15**2])
         matches = [match(self._grid, points_F, Pose2D(*pose), spread, options.matching) for pose in best.tolist()]
-        found = max(matches, key=lambda m: m.inlier_share, default=None)
-        return found if found is not None and found.inlier_share >= options.found_share else None
+        most = max((found.inlier_share for found in matches), default=0.0)
+        if most < options.found_share:
+            return None
+        alike = (found for found in matches if found.inlier_share >= most - options.alike_share)
+        return min(alike, key=lambda m: math.hypot(m.pose.x_m - centre.x_m, m.pose.y_m - centre.y_m))
 
 
 def candidate_poses(grid: GridMap, centre: Pose2D, radius_m: float | None) -> FloatArray:

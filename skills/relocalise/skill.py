@@ -21,12 +21,8 @@ _SCAN_PATIENCE_S = 2.0
 
 @dataclass(frozen=True)
 class RelocaliseInputs:
-    """`near_m`: how far from where it believes to be the first search goes; then the whole map is searched.
+    """`turns`: in how many headings it searches at most, an eighth of a turn apart."""
 
-    `turns`: in how many headings it searches at most, an eighth of a turn apart.
-    """
-
-    near_m: float = 1.5
     turns: int = 8
 
 
@@ -48,7 +44,7 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         self._base = Base(context)
 
     def run(self, inputs: RelocaliseInputs) -> Routine[Succeeded]:
-        """Search near, then everywhere; turn a little, and again."""
+        """Search the whole map; turn a little, and again."""
         self._base = Base(self.context)
         localiser = self.context.localiser
         if not isinstance(localiser, SearchingLocaliser):
@@ -56,10 +52,9 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         if (yield from self._agreed(localiser)):
             return Succeeded("the scans agree with the map already")
         for turn in range(max(1, inputs.turns)):
-            for radius_m in (inputs.near_m, None) if turn == 0 else (None,):
-                if (yield from self._found(localiser, radius_m)):
-                    pose = self.context.pose()
-                    return Succeeded(f"found itself at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+            if (yield from self._found(localiser)):
+                pose = self.context.pose()
+                return Succeeded(f"found itself at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
             if turn + 1 < inputs.turns:
                 yield from self._turn()
         raise SkillFailure(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
@@ -69,13 +64,13 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         self._base.stop()
         super().end()
 
-    def _found(self, localiser: Localiser, radius_m: float | None) -> Routine[bool]:
+    def _found(self, localiser: Localiser) -> Routine[bool]:
         """Search with a new scan, believe what is found, and see whether the next scans agree."""
-        message = f"searching within {radius_m:g} m" if radius_m is not None else "searching the whole map"
+        message = "searching the whole map"
         scan = yield from self._new_scan(message)
         assert isinstance(localiser, SearchingLocaliser)
         found: LocalisationEstimate | None = yield from self.compute(
-            lambda: localiser.search(scan, radius_m), latency_s=SEARCH_LATENCY_S, name="search the map", message=message
+            lambda: localiser.search(scan, None), latency_s=SEARCH_LATENCY_S, name="search the map", message=message
         )
         if found is None:
             return False

@@ -1,0 +1,57 @@
+"""Clearing the seen layer: what is gone is forgotten, what stands there is seen anew."""
+
+import dataclasses
+
+import numpy as np
+from planar_robot import Bench, Box
+
+from skills.api import Cause, Running, Succeeded
+from skills.clear_costmap.skill import ClearCostmap, ClearCostmapInputs
+from skills.robot import Pose2D
+
+CRATE = Box(4.4, 5.2, 4.8, 5.8, 0.0, 1.2)
+
+
+def outcome(context, bench):
+    skill = ClearCostmap(context)
+    skill.begin(ClearCostmapInputs())
+    while isinstance(step := skill.step(), Running):
+        bench.tick()
+    skill.end()
+    return step
+
+
+def seen_bench():
+    bench = Bench(Pose2D(3.0, 5.5, 0.0), unmapped=[CRATE])
+    for _ in range(40):
+        bench.tick()
+    assert len(bench.costmap.seen_m()) > 0
+    return bench
+
+
+def test_what_stands_there_still_is_seen_again():
+    bench = seen_bench()
+    assert isinstance(outcome(bench.context(), bench), Succeeded)
+    assert len(bench.costmap.seen_m()) > 0
+
+
+def test_what_is_gone_is_forgotten():
+    bench = seen_bench()
+    bench.robot.boxes.remove(CRATE)
+    assert isinstance(outcome(bench.context(), bench), Succeeded)
+    assert len(bench.costmap.seen_m()) == 0
+
+
+def test_what_was_surveyed_stays():
+    bench = seen_bench()
+    near_wall = np.array([[0.5, 5.5]])
+    before = bench.costmap.clearance_m(near_wall)
+    assert bench.costmap.forget_seen() > 0
+    assert len(bench.costmap.seen_m()) == 0
+    assert bench.costmap.clearance_m(near_wall) == before
+
+
+def test_a_costmap_that_cannot_forget_is_a_failed_precondition():
+    bench = seen_bench()
+    step = outcome(dataclasses.replace(bench.context(), costmap=object()), bench)
+    assert step.cause is Cause.PRECONDITION

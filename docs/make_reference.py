@@ -164,7 +164,8 @@ def _plain(facts: Mapping[str, Any]) -> str:
     kind = facts.get("type", "anything")
     if kind == "array":
         items = facts.get("prefixItems")
-        return f"list of {len(items)}: {_takes(items[0])}" if items else f"list of {_takes(facts.get('items', {}))}"
+        one = f"[{', '.join(map(_takes, items))}]" if items else _takes(facts.get("items", {}))
+        return one if items else f"list of {one}"
     if kind == "object":
         inner = facts.get("additionalProperties")
         return f"names to {_takes(inner)}" if isinstance(inner, dict) and inner else "names to values"

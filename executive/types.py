@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import types
 import typing
 from collections.abc import Mapping
@@ -45,6 +46,7 @@ def describe_type(hint: Any) -> str:
     return hint.__name__ if isinstance(hint, type) and not typing.get_args(hint) else str(hint).replace("typing.", "")
 
 
+@functools.lru_cache(maxsize=512)
 def field_types(record: type) -> Mapping[str, Any]:
     """The resolved type hints of a dataclass, by field name."""
-    return typing.get_type_hints(record)
+    return types.MappingProxyType(typing.get_type_hints(record))

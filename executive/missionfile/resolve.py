@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -12,7 +12,7 @@ from typing import Final
 from executive.command import Command
 from executive.errors import InputError, Problems
 from executive.knowledge import Knowledge
-from executive.language import DependencyParser, Status, understand
+from executive.language import DependencyParser, Status, Understanding, understand
 from executive.missionfile.model import Mission, MissionStep, SkillCall
 from executive.missionfile.names import typed_command
 from executive.missionfile.overrides import overridden
@@ -61,6 +61,7 @@ class _Resolver:
     robot_name: str
     world: str
     steps_so_far: int = 0
+    understood: dict[str, Understanding] = field(default_factory=dict)
 
     def mission(self, file: MissionFile, chain: tuple[Path, ...]) -> Mission:
         """The mission of a file that the files of `chain` led to, itself the last."""
@@ -85,13 +86,19 @@ class _Resolver:
         if step.say is None:
             commands: tuple[Command, ...] = (typed_command(file, index, self.knowledge),)
             return MissionStep(commands, source, policy, elsewhere=step.elsewhere is not False)
-        answer = understand(
-            step.say, parser=self.parser, knowledge=self.knowledge, require_wake=False, robot_name=self.robot_name
-        )
+        answer = self._understand(step.say)
         if answer.status is not Status.OK:
             mend = "say it in other words, or write take, to, do and object"
             raise file.error((*path, "say"), (answer.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], mend)
         return MissionStep(answer.commands, source, policy, elsewhere=step.elsewhere is not False)
+
+    def _understand(self, sentence: str) -> Understanding:
+        """What a sentence means; one that stands there again means the same."""
+        if sentence not in self.understood:
+            self.understood[sentence] = understand(
+                sentence, parser=self.parser, knowledge=self.knowledge, require_wake=False, robot_name=self.robot_name
+            )
+        return self.understood[sentence]
 
     def _used(self, file: MissionFile, index: int, chain: tuple[Path, ...]) -> Mission:
         """The mission of the file that a step uses."""

@@ -1,0 +1,90 @@
+"""`errand check`: what scripts rely on, and what people see."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from executive.cli import main
+
+ROOT = Path(__file__).parents[3]
+GOOD = ROOT / "missions" / "go_living_room.yaml"
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(main.app, ["check", *map(str, arguments)])
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(text, name="m.yaml"):
+        (tmp_path / name).write_text(text)
+        return tmp_path / name
+
+    return to_file
+
+
+def test_a_good_file_is_told_with_commands_tree_and_estimate():
+    result = invoke(GOOD)
+    assert result.exit_code == 0
+    assert "Take [Nothing] to [living room] and do [Nothing] to [Nothing]" in result.stdout
+    assert "navigate" in result.stdout
+    assert "of the battery when all goes well" in result.stdout
+
+
+def test_json_is_one_object_for_all_files(write):
+    bad = write("name: x\nsteps:\n  - {to: kichen}\n  - {to: hall, timeout: 0}\n")
+    result = invoke(GOOD, bad, "--json")
+    assert result.exit_code == 2
+    told = json.loads(result.stdout.splitlines()[-1])
+    assert set(told) == {"ok", "errors", "nodes", "commands"}
+    assert told["ok"] is False
+    assert told["nodes"] > 3
+    assert told["commands"] == ["Take [Nothing] to [living room] and do [Nothing] to [Nothing]"]
+    assert told["errors"] == [
+        {
+            "file": str(bad),
+            "line": 4,
+            "message": "steps.1.timeout: input should be greater than 0",
+            "hint": "it reads 0 now",
+        }
+    ]
+
+
+def test_all_errors_of_a_file_are_told(write):
+    bad = write("name: x\nsteps:\n  - {to: kichen}\n  - say: sing\n  - {skill: fly}\n  - use: nowhere.yaml\n")
+    told = json.loads(invoke(bad, "--json").stdout)
+    assert [error["line"] for error in told["errors"]] == [3, 4, 6]
+    assert told["errors"][0]["hint"] == "did you mean 'kitchen'?"
+
+
+def test_a_good_file_alone_is_ok():
+    assert json.loads(invoke(GOOD, "--json").stdout)["ok"] is True
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "says"),
+    [
+        ("name: x\nsteps:\n  - {skill: navigate, with: {x: 0.0, y: 0.0}}\n", 3, "blocked"),
+        ("name: x\nsteps:\n  - {skill: navigate, with: {x: 60.0, y: 0.0}}\n", 3, "blocked"),
+        ("name: x\nsteps:\n  - say: bring the extinguisher from the workshop to the kitchen\n", 3, "no 'extinguisher'"),
+        ("name: x\nworld: moon\nsteps:\n  - say: go to the kitchen\n", 2, "unknown world 'moon'"),
+    ],
+)
+def test_what_the_robot_cannot_do_is_refused(write, text, line, says):
+    result = invoke(write(text), "--json")
+    (error,) = json.loads(result.stdout)["errors"]
+    assert (result.exit_code, error["line"], says in error["message"]) == (2, line, True), error
+    assert error["hint"]
+
+
+def test_people_read_the_errors_on_standard_error(write):
+    result = invoke(write("name: x\nstep: []\n"))
+    assert result.exit_code == 2
+    assert "m.yaml:2: unknown key 'step'; did you mean 'steps'?" in result.stderr
+
+
+def test_a_world_that_is_not_there_is_no_traceback():
+    result = invoke(GOOD, "--world", "fla")
+    assert (result.exit_code, "did you mean 'flat'?" in result.stderr) == (2, True)

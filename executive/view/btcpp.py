@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
@@ -21,7 +21,7 @@ from executive.view.text import note_of, printable
 
 FORMAT: Final = "4"
 _BUILT_IN: Final[Mapping[str, str]] = MappingProxyType({"sequence": "Sequence", "selector": "Fallback"})
-_CONDITIONS: Final = frozenset({"condition"})
+_CONDITIONS: Final = frozenset({"condition", "monitor"})
 _RESERVED: Final = frozenset({"ID", "name"})
 _BUILT_IN_NAMES: Final = """
     Root BehaviorTree TreeNodesModel SubTree Action Condition Control Decorator
@@ -36,34 +36,43 @@ _TAKEN: Final = frozenset(re.findall(r"\w+", _BUILT_IN_NAMES))
 
 def to_btcpp(root: NodeView) -> str:
     """The tree as an XML document."""
-    steps = {id(child): tree_id for child, tree_id in _step_ids(root)}
+    parts = _parts(root)
+    steps = {id(node): tree_id for node, tree_id in parts}
     main = _identifier(root.name)
     document = Element("root", {"BTCPP_format": FORMAT, "main_tree_to_execute": main})
     _tree(document, main, root, steps)
-    for child in root.children:
-        if id(child) in steps:
-            _tree(document, steps[id(child)], child, {})
+    for node, tree_id in parts:
+        _tree(document, tree_id, node, steps)
     document.append(_models(root, list(steps.values())))
     ElementTree.indent(document)
     return ElementTree.tostring(document, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def _step_ids(root: NodeView) -> Iterator[tuple[NodeView, str]]:
-    """The root's children that have nodes below, each with a name that no other tree has."""
+def _parts(root: NodeView) -> list[tuple[NodeView, str]]:
+    """The steps of the mission and what watches over it, each with a name that no other tree has.
+
+    The path id of a mission has two parts; it is the root, or stands below the nodes that watch over it.
+    """
+    missions = [node for _, node in root.walk() if node.path_id.count("/") == 1]
+    parents = {id(node): node for node in (root, *missions)}
+    parts: list[tuple[NodeView, str]] = []
     taken = {_identifier(root.name)}
-    for child in root.children:
-        if not child.children or root.kind not in _BUILT_IN:
-            continue
-        wish = _identifier(child.path_id.rsplit("/", 1)[-1], "Step")
-        names = (wish if n == 1 else f"{wish}_{n}" for n in range(1, len(taken) + 2))
-        tree_id = next(name for name in names if name not in taken)
-        taken.add(tree_id)
-        yield child, tree_id
+    for child in (child for parent in parents.values() for child in parent.children):
+        if child.children and id(child) not in parents:
+            parts.append((child, _free(_identifier(child.path_id.rsplit("/", 1)[-1], "Step"), taken)))
+            taken.add(parts[-1][1])
+    return parts
+
+
+def _free(wish: str, taken: Collection[str]) -> str:
+    """The wish, with a number where that name is taken."""
+    names = (wish if number == 1 else f"{wish}{number}" for number in range(1, len(taken) + 2))
+    return next(name for name in names if name not in taken)
 
 
 def _tree(document: Element, tree_id: str, node: NodeView, steps: Mapping[int, str]) -> None:
     tree = SubElement(document, "BehaviorTree", {"ID": tree_id})
-    tree.append(_element(node, steps))
+    tree.append(_element(node, {key: name for key, name in steps.items() if key != id(node)}))
 
 
 def _element(node: NodeView, steps: Mapping[int, str]) -> Element:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from executive.view.model import NodeView
 from executive.view.text import closed
 
-MANY_NODES = 120
+MANY_NODES = 80
 
 
 def folded_below(root: NodeView, depth: int) -> NodeView:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
@@ -35,7 +36,8 @@ class Feed:
             return
         with self._lock:
             shown = self._without_picture(message)
-            self._messages.append(_encoded({"topic": topic, "t": round(t, 4), "data": shown}))
+            sent_ms = round(time.time() * 1e3, 1)  # lets the page say how far it is behind
+            self._messages.append(_encoded({"topic": topic, "t": round(t, 4), "sent_ms": sent_ms, "data": shown}))
         self._call_listeners()
 
     def tell(self, about: str, word: Mapping[str, Any]) -> None:

@@ -33,7 +33,7 @@ class Look:
 class Looks(enum.Enum):
     """The looks of all states."""
 
-    IDLE = Look("not run", "○", "[ ]", "#8b949e", "#57606a", "#ffffff", "dim", "2 3")
+    IDLE = Look("not run", "○", "[ ]", "#c4cad1", "#57606a", "#ffffff", "dim", "2 3")
     RUNNING = Look("running", "▶", "[>]", "#0072b2", "#00537f", "#e5f3fb", "bold blue", "7 3")
     SUCCESS = Look("success", "✓", "[+]", "#009e73", "#00573f", "#e6f6f1", "green")
     FAILURE = Look("failure", "✗", "[x]", "#d55e00", "#8f3f00", "#fdeee3", "bold red")

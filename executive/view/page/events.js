@@ -23,6 +23,7 @@
     rebuild() {
       this.taken = 0;
       this.rows = [];
+      this.wasFollowing = false;
       this.list.replaceChildren();
       this.draw(this.t, this.following);
     }
@@ -55,6 +56,8 @@
         const entry = this.entry(this.store.messages[this.taken]);
         if (entry) this.append(entry);
       }
+      if (following && this.wasFollowing) return this.scroll(this.list.lastElementChild);
+      this.wasFollowing = following;
       let now = null;
       for (const row of this.rows) {
         row.li.classList.toggle("later", row.t > t + 1e-6);
@@ -62,7 +65,10 @@
         if (row.t <= t + 1e-6) now = row.li;
       }
       if (!following && now) now.classList.add("now");
-      const target = following ? this.list.lastElementChild : now;
+      this.scroll(following ? this.list.lastElementChild : now);
+    }
+
+    scroll(target) {
       if (target && target !== this.scrolled && !this.list.contains(document.activeElement)) {
         this.scrolled = target;
         this.list.scrollTop = target.offsetTop - this.list.offsetTop - this.list.clientHeight + target.clientHeight + 6;

@@ -24,6 +24,17 @@
   const timeline = new Timeline(store, () => schedule());
   const events = new EventPanel(byId("events"), byId("events-shown"), store, (t) => { timeline.hold(); timeline.go(t); });
 
+  const delays = []; // ms from a change of a node to its pixels, the latest ones
+  let fresh = [], greeted = false;
+  function measure() {
+    const shown = fresh;
+    fresh = [];
+    if (shown.length) requestAnimationFrame(() => setTimeout(() => {
+      delays.push(...shown.map((sent) => Date.now() - sent));
+      delays.splice(0, delays.length - 500);
+    }));
+  }
+
   let planned = false;
   function schedule() {
     if (planned) return;
@@ -31,6 +42,7 @@
     requestAnimationFrame(() => { planned = false; draw(); });
   }
 
+  // The tree follows at once; what costs more is drawn a few times a second.
   function draw() {
     const replaying = !timeline.following;
     const view = replaying ? store.at(timeline.t) : store.now;
@@ -40,24 +52,37 @@
     tree.at = state ? state.at : null;
     tree.draw(view);
     header.draw(store, view, replaying);
-    camera.draw(view);
-    map.draw(view);
-    events.draw(timeline.t, timeline.following);
     control.draw(state, store.now.outcomes.length > 0);
     questions.draw(state ? state.questions : [], store.end);
-    scene.seek(timeline.t);
+    measure();
+    slowly(view);
+  }
+
+  const SLOW_MS = 150;
+  let drawn = 0, due = null, latest = null;
+  function slowly(view) {
+    latest = view;
+    if (due !== null) return;
+    due = setTimeout(() => {
+      due = null;
+      drawn = performance.now();
+      map.draw(latest);
+      camera.draw(latest);
+      events.draw(timeline.t, timeline.following);
+      timeline.drawMarks();
+      scene.seek(timeline.t);
+    }, Math.max(20, SLOW_MS - (performance.now() - drawn)));
   }
 
   function take(messages) {
-    let logged = false;
     for (const message of messages) {
-      logged = store.add(message) || logged;
+      store.add(message);
+      if (greeted && message.topic === "transitions") fresh.push(message.sent_ms);
       if (message.topic === "map") map.setMap(message.data, addressOf(message.data.picture)).catch(() => {});
       if (message.live === "hello") greet(message.data);
       if (message.live === "recording" && message.data.address) scene.show(`${message.data.address}?token=${encodeURIComponent(token)}`, true);
       if (message.live === "progress") store.end = Math.max(store.end, message.data.now_s);
     }
-    if (logged) timeline.drawMarks();
     timeline.grow();
     schedule();
   }
@@ -71,7 +96,12 @@
 
   function connect() {
     const socket = new WebSocket(`ws://${location.host}/feed?token=${encodeURIComponent(token)}`);
-    socket.addEventListener("message", (event) => take(JSON.parse(event.data)));
+    let batches = 0;
+    socket.addEventListener("message", (event) => {
+      take(JSON.parse(event.data));
+      batches += 1;
+      greeted = batches > 1; // the first ones tell what was before the page was opened
+    });
     socket.addEventListener("close", () => {
       store.live.control = store.live.control ? { ...store.live.control, mode: "ended", questions: [] } : null;
       byId("announced").textContent = "errand has ended; the page shows what happened.";
@@ -82,7 +112,6 @@
   function setTheme(theme) {
     document.documentElement.dataset.theme = theme;
     map.recolour();
-    timeline.drawMarks();
     schedule();
   }
 
@@ -108,5 +137,5 @@
   } else {
     connect();
   }
-  window.errand.page = { store, timeline };
+  window.errand.page = { store, timeline, delays };
 })();

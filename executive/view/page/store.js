@@ -59,16 +59,15 @@
       this.known = new Map();
     }
 
-    // Take a message in; gives true when it is one of the log.
+    // Take a message in: one of the log, or the newest word on something that is not logged.
     add(message) {
-      if (message.live) { this.live[message.live] = message.data; return false; }
+      if (message.live) { this.live[message.live] = message.data; return; }
       this.messages.push(message);
       this.end = Math.max(this.end, message.t);
       if (message.topic === "run") this.run = message.data;
       if (message.topic === "map") this.map = message.data;
       if (message.topic === "tree") this.learn(message.data.root, 0);
       this.apply(this.now, message);
-      return true;
     }
 
     learn(node, depth) {

@@ -112,32 +112,30 @@
 
     paint(entry) {
       const state = this.view.states.get(entry.node.id), look = lookOf(state);
-      const { symbol, word } = LOOKS[look];
-      if (entry.row.dataset.look !== look) {
-        entry.row.dataset.look = look;
-        entry.symbol.textContent = symbol;
-      }
       const progress = this.progress && this.progress.node === entry.node.id && look === "running" ? this.progress : null;
-      const note = this.noteOf(entry, state, progress);
-      const shown = [state && state.cause, note].filter(Boolean).join(": ");
-      if (entry.shown !== shown) {
-        entry.shown = shown;
-        entry.note.replaceChildren();
-        if (state && state.cause) entry.note.append(element("b", "", state.cause), note ? ": " : "");
-        entry.note.append(note);
-      }
-      entry.bar.hidden = !progress || progress.progress === null || progress.progress === undefined;
-      if (!entry.bar.hidden) entry.bar.firstChild.style.width = `${Math.round(100 * progress.progress)}%`;
+      const note = this.noteOf(entry, state, progress), cause = (state && state.cause) || "";
+      const done = progress && typeof progress.progress === "number" ? progress.progress : null;
+      const stops = this.breakpoints ? this.breakpoints.has(entry.node.id) : null;
+      const key = [look, cause, note, done, entry.open, stops, this.at === entry.node.id].join("\u0001");
+      if (entry.key === key) return;
+      entry.key = key;
+      entry.row.dataset.look = look;
+      entry.symbol.textContent = LOOKS[look].symbol;
+      entry.note.replaceChildren();
+      if (cause) entry.note.append(element("b", "", cause), note ? ": " : "");
+      entry.note.append(note);
+      entry.bar.hidden = done === null;
+      if (done !== null) entry.bar.firstChild.style.width = `${Math.round(100 * done)}%`;
       if (entry.list) {
         entry.list.hidden = !entry.open;
         entry.fold.textContent = entry.open ? "▾" : "▸";
         entry.li.setAttribute("aria-expanded", entry.open);
         entry.count.textContent = entry.open ? "" : `(${entry.size} nodes)`;
       }
-      entry.li.setAttribute("aria-label", [entry.node.type, entry.node.name, word, shown].filter(Boolean).join(", "));
-      const can = Boolean(this.breakpoints);
-      entry.dot.hidden = !can;
-      if (can) entry.dot.setAttribute("aria-pressed", this.breakpoints.has(entry.node.id));
+      const said = [entry.node.type, entry.node.name, LOOKS[look].word, [cause, note].filter(Boolean).join(": ")];
+      entry.li.setAttribute("aria-label", said.filter(Boolean).join(", "));
+      entry.dot.hidden = !this.breakpoints;
+      entry.dot.setAttribute("aria-pressed", Boolean(stops));
       entry.row.classList.toggle("at", this.at === entry.node.id);
     }
 

@@ -1,0 +1,69 @@
+"""Messages in the forms that viewers draw."""
+
+import base64
+import math
+
+import cv2
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from executive.record.drawable import boxes, drawable, with_picture
+from executive.record.event_log import EventLog
+from executive.record.reader import read_events
+from executive.record.surroundings import map_message
+from skills.estimate.grid_map import GridMap
+
+SEEN = {"class_name": "coke", "score": 0.9, "box": [10, 20, 30, 40]}
+
+
+def test_a_path_becomes_poses_in_a_frame():
+    ((topic, message),) = drawable("path", {"robot": "Alice", "frame": "world", "poses": [[1, 2, math.pi / 2]]}, 3.5)
+    assert (topic, message["frame_id"], message["timestamp"]) == ("path", "world", {"sec": 3, "nsec": 500000000})
+    assert message["poses"][0]["position"] == {"x": 1.0, "y": 2.0, "z": 0.0}
+    assert message["poses"][0]["orientation"]["z"] == pytest.approx(math.sqrt(0.5))
+
+
+def test_boxes_become_closed_lines_and_captions():
+    message = boxes([SEEN], 1.0)
+    assert message["points"][0]["type"] == 2
+    assert [(p["x"], p["y"]) for p in message["points"][0]["points"]] == [(10, 20), (30, 20), (30, 40), (10, 40)]
+    assert message["texts"][0]["text"] == "coke 0.90"
+
+
+def test_a_message_without_a_picture_is_left_alone():
+    message = {"image": None, "x": 1}
+    assert with_picture(message, 0.0) is message
+
+
+def test_a_picture_is_small(tmp_path, clock):
+    """A key image of 640 x 480 with fine texture stays below 200 kB in the log."""
+    noise = np.random.default_rng(0).normal(128, 12, (480, 640, 3)).clip(0, 255).astype(np.uint8)
+    log = EventLog(tmp_path / "log.mcap", clock)
+    log("detections", {"image": noise, "source": "hand", "detections": []})
+    log.close()
+    assert log.path.stat().st_size < 200_000
+
+
+def test_a_map_comes_back_the_right_way_up(knowledge, tmp_path, clock):
+    occupied = np.zeros((4, 6), bool)
+    occupied[0, 0] = True  # smallest x and y: the lower left of the picture
+    log = EventLog(tmp_path / "log.mcap", clock)
+    log("map", map_message(GridMap(occupied, 0.5, (-1.0, -2.0)), knowledge, world="flat"))
+    log.close()
+    (event,) = read_events(log.path)
+    assert (event.data["origin_m"], event.data["size_m"]) == ({"x": -1.0, "y": -2.0}, {"x": 3.0, "y": 2.0})
+    assert {place["name"] for place in event.data["places"]} == {"kitchen", "bedroom", "hall", "bathroom"}
+    picture = cv2.imdecode(np.frombuffer(base64.b64decode(event.data["data"]), np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert picture.shape == (4, 6)
+    assert (picture[3, 0], picture[0, 0]) == (0, 255)
+
+
+def test_every_topic_of_a_mission_has_a_schema_of_its_own(tmp_path, compiled, run_tree, make, clock):
+    log = EventLog(tmp_path / "log.mcap", clock)
+    run_tree(compiled(*make.FETCH), publish=log)
+    log.close()
+    with log.path.open("rb") as file:
+        named = {channel.topic: schema.name for schema, channel, _ in make_reader(file).iter_messages() if schema}
+    assert named["pose"] == "foxglove.PoseInFrame"
+    assert "errand.Message" not in named.values()

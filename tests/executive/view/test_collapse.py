@@ -1,0 +1,65 @@
+"""Large trees are folded where nothing is to be seen, and never where something happens."""
+
+import pytest
+from py_trees.common import Status
+
+from executive.snapshot import NodeState
+from executive.view.collapse import folded_below, folded_to
+from executive.view.model import NodeView
+from executive.view.text import to_text
+from skills.api import Cause
+
+DONE, IDLE = NodeState(Status.SUCCESS), NodeState()
+RUNS, FAILED = NodeState(Status.RUNNING), NodeState(Status.FAILURE, Cause.PLANNING, "no way")
+
+
+def step(number: int, state: NodeState, leaf_state: NodeState | None = None) -> NodeView:
+    leaves = tuple(
+        NodeView(f"r/{number}/{n}", "skill", f"leaf {n}", leaf_state or state if n == 0 else state) for n in range(10)
+    )
+    return NodeView(f"r/{number}", "sequence", f"step {number}", state, children=leaves)
+
+
+def mission(*states: NodeState) -> NodeView:
+    return NodeView("r", "sequence", "mission", RUNS, children=tuple(step(n, state) for n, state in enumerate(states)))
+
+
+def shown(tree: NodeView) -> list[str]:
+    return [node.path_id for _, node in tree.walk()]
+
+
+def test_a_small_tree_is_shown_whole():
+    tree = mission(DONE, IDLE)
+    assert folded_to(tree, 100) == tree
+
+
+def test_what_runs_or_failed_stays_in_sight_and_the_rest_is_folded():
+    tree = folded_to(mission(DONE, RUNS, FAILED, IDLE), 30)
+    assert [child.hidden for child in tree.children] == [10, 0, 0, 10]
+    assert {"r/1/0", "r/2/0"} <= set(shown(tree))
+
+
+def test_a_failure_below_what_succeeded_stays_in_sight():
+    tree = NodeView("r", "sequence", "m", RUNS, children=(step(0, DONE, FAILED), step(1, DONE), step(2, DONE)))
+    assert [child.hidden for child in folded_to(tree, 15).children] == [0, 10, 10]
+
+
+def test_an_idle_tree_is_folded_from_its_deepest_level():
+    tree = folded_to(NodeView("top", "sequence", "top", IDLE, children=(mission(IDLE, IDLE),)), 12)
+    assert shown(tree) == ["top", "r", "r/0", "r/1"] or shown(tree) == ["top", "r"]
+
+
+def test_the_number_of_hidden_nodes_is_told():
+    assert "step 0 - (10 nodes)" in to_text(folded_to(mission(DONE, RUNS), 15))
+
+
+@pytest.mark.parametrize(("depth", "count"), [(0, 1), (1, 3), (2, 23), (9, 23)])
+def test_a_depth_cuts_and_counts(depth, count):
+    tree = folded_below(mission(DONE, RUNS), depth)
+    assert len(shown(tree)) == count
+    assert tree.below == 22
+
+
+def test_a_negative_depth_is_refused():
+    with pytest.raises(ValueError, match="at least 0"):
+        folded_below(mission(DONE), -1)

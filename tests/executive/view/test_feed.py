@@ -1,0 +1,78 @@
+"""The feed: in order, without pictures, and never lost between two looks."""
+
+import base64
+import json
+import threading
+
+import pytest
+
+from executive.view.feed import Feed
+
+PICTURE = {"format": "png", "data": base64.b64encode(b"bytes").decode(), "source": "hand"}
+START = (0, 0)
+
+
+def test_messages_come_in_order_and_once():
+    feed = Feed()
+    for number in range(5):
+        feed("pose", number / 10, {"x": number})
+    cursor, texts = feed.since(START)
+    assert [json.loads(text)["data"]["x"] for text in texts] == [0, 1, 2, 3, 4]
+    assert feed.since(cursor) == (cursor, [])
+
+
+def test_pictures_are_kept_aside():
+    feed = Feed()
+    feed("detections", 1.0, PICTURE)
+    (text,) = feed.since(START)[1]
+    assert json.loads(text)["data"] == {"format": "png", "source": "hand", "picture": 0}
+    assert feed.picture(0) == ("png", b"bytes")
+    with pytest.raises(LookupError, match="no picture 1"):
+        feed.picture(1)
+
+
+def test_of_words_that_are_not_logged_only_the_newest_is_told():
+    feed = Feed()
+    for number in range(3):
+        feed.tell("progress", {"now_s": number})
+    cursor, texts = feed.since(START)
+    assert [json.loads(text) for text in texts] == [{"live": "progress", "data": {"now_s": 2}}]
+    feed.tell("control", {"mode": "paused"})
+    assert len(feed.since(cursor)[1]) == 1
+
+
+def test_nobody_waits_where_no_page_reads():
+    feed = Feed()
+    feed("pose", 0.0, {})
+    assert feed.wait_sent(60.0)
+
+
+def test_a_writer_waits_for_its_readers_and_not_longer():
+    feed = Feed()
+    feed.joined()
+    feed("pose", 0.0, {})
+    assert not feed.wait_sent(0.01)
+    threading.Timer(0.05, lambda: feed.sent(feed.since(START)[0])).start()
+    assert feed.wait_sent(5.0)
+    feed("pose", 0.1, {})
+    threading.Timer(0.05, feed.left).start()
+    assert feed.wait_sent(5.0)
+
+
+def test_readers_in_other_threads_miss_nothing():
+    feed, seen = Feed(), []
+    done = threading.Event()
+
+    def read() -> None:
+        cursor = START
+        while not done.is_set() or feed.since(cursor)[1]:
+            cursor, texts = feed.since(cursor)
+            seen.extend(json.loads(text)["data"]["x"] for text in texts)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    for number in range(2000):
+        feed("pose", 0.0, {"x": number})
+    done.set()
+    reader.join()
+    assert seen == list(range(2000))

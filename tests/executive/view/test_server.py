@@ -1,0 +1,212 @@
+"""The page's server: nothing without the token, nothing from elsewhere, actions reach the control."""
+
+import http.client
+import json
+import threading
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+from websockets.exceptions import InvalidStatus, WebSocketException
+from websockets.sync.client import connect
+
+from executive.control import Control, Mode
+from executive.view.actions import RefusedError, control_actions, text_of
+from executive.view.feed import Feed
+from executive.view.server import PageContent, PageServer
+from executive.view.watch import ControlWatch
+
+
+@pytest.fixture
+def control() -> Control:
+    control = Control(attended=True)
+    control.begin({})
+    return control
+
+
+@pytest.fixture
+def feed() -> Feed:
+    return Feed()
+
+
+@pytest.fixture
+def server(feed, control, tmp_path):
+    recording = tmp_path / "recording.html"
+    recording.write_text("<p>recorded</p>")
+    actions = {**control_actions(control), "say": lambda values: f"first: {text_of(values, 'text')}"}
+    with PageServer(PageContent(feed, actions, scene_url="http://127.0.0.1:7000", recording=recording)) as running:
+        yield running
+
+
+def token_of(server: PageServer) -> str:
+    return parse_qs(urlsplit(server.url).query)["token"][0]
+
+
+def ask(server: PageServer, method: str, path: str, body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection.request(method, path, body, {name.replace("_", "-"): value for name, value in headers.items()})
+    answer = connection.getresponse()
+    return answer.status, answer.read()
+
+
+def act(server: PageServer, name: str, values: object = None, **headers: str) -> tuple[int, dict]:
+    own = {"X_Errand_Token": token_of(server), "Origin": f"http://127.0.0.1:{server.port}"}
+    status, body = ask(server, "POST", f"/action/{name}", json.dumps(values or {}).encode(), **{**own, **headers})
+    return status, json.loads(body)
+
+
+def test_it_listens_on_this_machine_only(server):
+    assert server._socket.getsockname()[0] == "127.0.0.1"
+
+
+def test_each_server_has_a_token_of_its_own(feed, server):
+    with PageServer(PageContent(feed)) as other:
+        assert token_of(other) != token_of(server)
+        assert len(token_of(other)) >= 32
+
+
+@pytest.mark.parametrize("path", ["/", "/recording.html", "/picture/0"])
+def test_nothing_of_the_run_is_shown_without_the_token(server, feed, path):
+    feed("detections", 0.0, {"format": "png", "data": "AAAA"})
+    assert ask(server, "GET", path)[0] == 403
+    assert ask(server, "GET", f"{path}?token=wrong")[0] == 403
+    assert ask(server, "GET", f"{path}?token={token_of(server)}")[0] == 200
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"X_Errand_Token": ""},
+        {"X_Errand_Token": "wrong"},
+        {"X_Errand_Token": "ünï".encode().decode("latin-1")},
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Origin": "http://127.0.0.1:1"},
+        {"Host": "evil.example"},
+    ],
+)
+def test_every_action_is_refused_without_the_token_or_from_elsewhere(server, control, headers):
+    before = control.state
+    for name in ("pause", "resume", "step", "cancel", "stop", "release", "break", "unbreak", "answer", "say"):
+        assert act(server, name, {"text": "x", "node": "x", "id": "x"}, **headers)[0] == 403
+    assert control.state == before
+
+
+@pytest.mark.parametrize(
+    ("query", "headers"),
+    [
+        ("", {}),
+        ("?token=wrong", {}),
+        ("right", {"Origin": "http://evil.example"}),
+        ("right", {"Origin": "null"}),
+        ("right", {"Host": "evil.example"}),
+    ],
+)
+def test_the_websocket_is_refused_without_the_token_or_from_elsewhere(server, query, headers):
+    address = f"ws://127.0.0.1:{server.port}/feed" + (f"?token={token_of(server)}" if query == "right" else query)
+    origin = headers.get("Origin", f"http://127.0.0.1:{server.port}")
+    extra = {name: value for name, value in headers.items() if name != "Origin"}
+    with (
+        pytest.raises((InvalidStatus, WebSocketException, TimeoutError)),
+        connect(address, origin=origin, additional_headers=extra, proxy=None) as socket,
+    ):
+        socket.recv(timeout=2)
+
+
+def test_the_websocket_tells_all_there_is_and_then_what_is_new(server, feed):
+    feed("pose", 0.5, {"x": 1})
+    address = f"ws://127.0.0.1:{server.port}/feed?token={token_of(server)}"
+    with connect(address, origin=f"http://127.0.0.1:{server.port}", proxy=None) as socket:
+        (hello,) = json.loads(socket.recv(timeout=5))
+        assert hello["data"]["scene"] == "http://127.0.0.1:7000"
+        assert "pause" in hello["data"]["actions"]
+        assert json.loads(socket.recv(timeout=5))[0]["data"] == {"x": 1}
+        feed("pose", 0.6, {"x": 2})
+        assert json.loads(socket.recv(timeout=5))[0]["data"] == {"x": 2}
+
+
+def test_two_pages_are_told_the_same(server, feed):
+    address = f"ws://127.0.0.1:{server.port}/feed?token={token_of(server)}"
+    with connect(address, proxy=None) as one, connect(address, proxy=None) as two:
+        for socket in (one, two):
+            socket.recv(timeout=5)
+        feed("pose", 0.1, {"x": 7})
+        assert [json.loads(socket.recv(timeout=5))[0]["data"]["x"] for socket in (one, two)] == [7, 7]
+
+
+def test_actions_reach_the_control(server, control):
+    assert act(server, "pause") == (200, {"said": "pausing"})
+    assert control.state.mode is Mode.PAUSED
+    assert act(server, "resume")[0] == 200
+    assert control.state.mode is Mode.RUNNING
+    act(server, "stop")
+    assert control.state.mode is Mode.STOPPED
+    act(server, "release")
+    act(server, "cancel")
+    assert control.heed().cancel == "cancelled from the page"
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "status", "words"),
+    [
+        ("break", {"node": "alice/nowhere"}, 409, "no node 'alice/nowhere'"),
+        ("break", {}, 409, "needs a text under 'node'"),
+        ("answer", {"id": "q", "text": "yes"}, 409, "not open"),
+        ("say", {"text": "  "}, 409, "needs a text"),
+        ("say", [1], 409, "no JSON object"),
+        ("dance", {}, 404, "no action 'dance'"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_a_reason(server, name, values, status, words):
+    given, answer = act(server, name, values)
+    assert (given, words in answer["error"]) == (status, True)
+
+
+def test_garbage_as_values_is_refused(server):
+    status, body = ask(server, "POST", "/action/pause", b"{nonsense", X_Errand_Token=token_of(server))
+    assert (status, b"no JSON object" in body) == (409, True)
+
+
+def test_every_state_of_the_control_is_told(feed, control):
+    watch = ControlWatch(control, feed)
+    told = threading.Event()
+    feed.listen(told.set)
+    control.pause("for a test")
+    assert told.wait(5)
+    control.end()
+    watch.close()
+    words = [json.loads(text)["data"] for text in feed.since((0, 0))[1]]
+    assert words[-1]["mode"] == "ended"
+
+
+def test_a_closed_server_frees_its_port_and_hangs_up(feed):
+    server = PageServer(PageContent(feed))
+    with connect(f"ws://127.0.0.1:{server.port}/feed?token={token_of(server)}", proxy=None) as socket:
+        socket.recv(timeout=5)
+        server.close()
+        with pytest.raises(WebSocketException):
+            socket.recv(timeout=5)
+    server.close()
+    with PageServer(PageContent(feed), port=server.port):
+        pass
+
+
+def test_a_taken_port_is_an_error(feed, server):
+    with pytest.raises(OSError, match="in use"):
+        PageServer(PageContent(feed), port=server.port)
+
+
+def test_the_page_needs_nothing_from_elsewhere(server):
+    status, page = ask(server, "GET", f"/?token={token_of(server)}")
+    assert status == 200
+    for address in (
+        part.split(b'"')[0] for part in page.split(b'src="')[1:] + page.split(b'rel="stylesheet" href="')[1:]
+    ):
+        assert address.startswith(b"page/")
+        assert ask(server, "GET", f"/{address.decode()}")[0] == 200
+    assert b"http:" not in page
+    assert b"https:" not in page
+
+
+def test_refusals_are_exceptions_with_a_plain_sentence():
+    with pytest.raises(RefusedError, match="needs a text under 'text'"):
+        text_of({"text": 3}, "text")

@@ -17,9 +17,11 @@ from skills.navigate.footprint import Footprint
 from skills.robot import Pose2D
 
 START = Pose2D(0.0, 0.0, 0.0)
-ABLE = Abilities(
-    {"coke": 0.35, "beer": 0.55, "hammer": 0.5}, 5.0, frozenset({"coke", "beer", "hammer"}), frozenset({"red"})
-)
+MASSES = {"coke": 0.35, "beer": 0.55, "hammer": 0.5}
+ABLE = Abilities(MASSES, 5.0, frozenset(MASSES), frozenset({"red"}))
+GET = "Take [Nothing] to [kitchen] and do [grasp] to [{}]"
+GO = "Take [Nothing] to [{}] and do [Nothing] to [Nothing]"
+ONLY_COKE = {"classes": frozenset({"coke"})}
 
 
 class StraightWays:
@@ -118,12 +120,12 @@ def test_a_raw_pose_out_of_reach_is_refused(check):
         (GET.format("hammer"), {"lift_kg": 0.4}, "'hammer' is too heavy: 0.5 kg"),
         (
             GET.format("drink"),
-            {"classes": frozenset({"coke"})},
+            ONLY_COKE,
             "what beer looks like",
         ),
         (
             "Take [Nothing] to [kitchen] and do [find] to [drink]",
-            {"classes": frozenset({"coke"})},
+            ONLY_COKE,
             "what beer looks like",
         ),
         (GET.format("blue coke"), {}, "what blue looks like"),

@@ -2,8 +2,10 @@
 
 import pytest
 
-from executive.cli.promises import promises
+from executive.cli.promises import promises, promises_of
 from executive.command import parse_command
+from executive.compiler import compile_mission
+from executive.mission import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from plant.referee import PromiseKind
 
 
@@ -50,3 +52,58 @@ def test_answers_go_to_the_checks_in_order(knowledge, answer):
     check = "Take [Nothing] to [kitchen] and do [find] to [hammer]"
     first, second = promised(knowledge, check, check, answers=[True, answer])
     assert (first.kind, first.answer, second.answer) == (PromiseKind.ANSWERED, True, answer)
+
+
+GET = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
+GO = "Take [Nothing] to [hall] and do [Nothing] to [Nothing]"
+SKIPPED = StepPolicy(on_failure=OnFailure.SKIP)
+
+
+@pytest.fixture
+def promised_by(knowledge, registry, run_tree):
+    """The promises of a mission's steps after it ran with the scripted robot."""
+
+    def after_running(*steps):
+        mission = Mission("m", "flat", "Alice", steps)
+        tree = compile_mission(mission, knowledge=knowledge, registry=registry)
+        return promises_of(tree, knowledge=knowledge, result=run_tree(tree).robots[0])
+
+    return after_running
+
+
+def step(text, policy=SKIPPED):
+    return MissionStep((parse_command(text),), policy=policy)
+
+
+def test_a_step_that_was_skipped_promises_nothing(promised_by, script):
+    script.seen_on = ()
+    assert [promise.kind for promise in promised_by(step(GET), step(GO))] == [PromiseKind.WENT]
+
+
+def test_a_step_that_could_have_been_skipped_but_was_done_promises(promised_by):
+    assert [promise.kind for promise in promised_by(step(GET))] == [PromiseKind.GRASPED]
+
+
+def test_steps_of_a_used_mission_that_was_skipped_promise_nothing(promised_by, script):
+    script.seen_on = ()
+    used = Mission("inner", "flat", "Alice", (step(GO, StepPolicy()), step(GET, StepPolicy())))
+    outer = MissionStep(policy=SKIPPED, used=used)
+    assert [promise.kind for promise in promised_by(outer, step(GO))] == [PromiseKind.WENT]
+
+
+def test_a_drive_to_a_pose_promises_the_body_there(promised_by):
+    (promise,) = promised_by(MissionStep(skill=SkillCall("navigate", {"x": 4.0, "y": -1.0})))
+    assert promise.kind is PromiseKind.WENT
+    assert promise.goal[0].contains((4.1, -0.9, 0.5))
+    assert not promise.goal[0].contains((4.5, -1.0, 0.5))
+
+
+def test_a_thing_may_be_taken_from_where_else_it_was_looked_for(promised_by):
+    (promise,) = promised_by(step("Take [Nothing] to [bedroom] and do [grasp] to [coke]"))
+    assert {region.name for region in promise.source} == {"bedside table", "counter", "shelf"}
+
+
+def test_an_answer_belongs_to_its_own_check(promised_by, script):
+    find = "Take [Nothing] to [{}] and do [find] to [coke]"
+    kitchen, bedroom = promised_by(step(find.format("kitchen")), step(find.format("bedroom")))
+    assert (kitchen.answer, bedroom.answer) == (True, False)

@@ -46,7 +46,11 @@ def describe_type(hint: Any) -> str:
     return hint.__name__ if isinstance(hint, type) and not typing.get_args(hint) else str(hint).replace("typing.", "")
 
 
-@functools.lru_cache(maxsize=512)
 def field_types(record: type) -> Mapping[str, Any]:
     """The resolved type hints of a dataclass, by field name."""
+    return _resolved(record)
+
+
+@functools.lru_cache(maxsize=512)
+def _resolved(record: type) -> Mapping[str, Any]:
     return types.MappingProxyType(typing.get_type_hints(record))

@@ -8,7 +8,11 @@
     constructor(store, onMove) {
       Object.assign(this, { store, onMove, following: true, playing: null, t: 0 });
       this.slider = byId("slider");
-      this.slider.addEventListener("input", () => { this.hold(); this.go(Number(this.slider.value)); });
+      this.slider.addEventListener("input", () => {
+        const wanted = Number(this.slider.value); // before `hold` shows the present time again
+        this.hold();
+        this.go(wanted);
+      });
       byId("live").addEventListener("click", () => this.follow());
       byId("play").addEventListener("click", () => this.toggle());
       new ResizeObserver(() => this.drawMarks()).observe(byId("marks"));

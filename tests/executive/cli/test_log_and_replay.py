@@ -1,0 +1,142 @@
+"""`errand log`, `errand replay` and `errand tree` of a log: what scripts rely on, and bad input."""
+
+import json
+import re
+import threading
+import urllib.request
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from executive.cli import main, replay_command
+from executive.record.event_log import EventLog
+from skills.api import Cause, Failed
+
+
+def invoke(*arguments: object):
+    return CliRunner().invoke(main.app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def log_path(tmp_path, compiled, run_tree, make, script, clock) -> Path:
+    script.ends["approach"] = lambda skill: Failed(Cause.TIMEOUT, "no room to stand")
+    log = EventLog(tmp_path / "log.mcap", clock)
+    run_tree(compiled(*make.FETCH), publish=log)
+    log.close()
+    return log.path
+
+
+def test_log_json_is_a_list_of_transitions_alone_on_standard_output(log_path):
+    result = invoke("log", log_path, "--json")
+    changes = json.loads(result.stdout)
+    assert result.exit_code == 0
+    assert all(list(change) == ["t", "node", "from", "to", "cause", "message"] for change in changes)
+    assert any(change["cause"] == "TIMEOUT" and change["message"] == "no room to stand" for change in changes)
+
+
+def test_log_prints_a_timeline(log_path):
+    result = invoke("log", log_path)
+    assert result.exit_code == 0
+    assert "no room to stand" in re.sub(r"\s+", " ", result.stdout)
+
+
+@pytest.mark.parametrize("verb", ["log", "replay", "tree"])
+@pytest.mark.parametrize(("name", "words"), [("absent.mcap", "cannot read"), ("text.mcap", "no event log")])
+def test_what_is_no_log_is_refused_in_one_line(tmp_path, verb, name, words):
+    (tmp_path / "text.mcap").write_text("hello")
+    result = invoke(verb, tmp_path / name)
+    (line,) = result.stderr.splitlines()
+    assert (result.exit_code, result.stdout, words in line, name in line) == (2, "", True, True)
+
+
+def test_replay_writes_one_html_file(log_path, tmp_path):
+    html = tmp_path / "replay.html"
+    assert invoke("replay", log_path, "--html", html).exit_code == 0
+    page = html.read_text()
+    assert "no room to stand" in page
+    assert 'src="' not in page.split('id="recorded"')[0]
+
+
+def test_replay_into_a_folder_that_is_not_there_is_refused(log_path, tmp_path):
+    result = invoke("replay", log_path, "--html", tmp_path / "absent" / "x.html")
+    assert (result.exit_code, "x.html" in result.stderr) == (2, True)
+
+
+def test_replay_serves_the_page_and_ends(log_path, monkeypatch):
+    seen = []
+
+    def look(limit_s: float | None) -> None:
+        seen.append(limit_s)
+
+    monkeypatch.setattr(replay_command, "wait", look)
+    result = invoke("replay", log_path, "--view-for", "3")
+    assert (result.exit_code, seen) == (0, [3.0])
+    assert re.search(r"http://127\.0\.0\.1:\d+/\?token=[\w-]+", result.stdout)
+
+
+def test_waiting_ends_by_itself():
+    before = threading.active_count()
+    replay_command.wait(0.01)
+    assert threading.active_count() == before
+
+
+def test_a_served_replay_answers(log_path, monkeypatch):
+    answers = []
+
+    def look(limit_s: float | None) -> None:
+        answers.append(limit_s)
+
+    served = replay_command.served
+
+    def noted(content, port):
+        server = served(content, port)
+        with urllib.request.urlopen(server.url) as answer:
+            answers.append(answer.status)
+        return server
+
+    monkeypatch.setattr(replay_command, "wait", look)
+    monkeypatch.setattr(replay_command, "served", noted)
+    assert invoke("replay", log_path).exit_code == 0
+    assert answers == [200, None]
+
+
+def test_tree_of_a_log_is_its_last_state(log_path):
+    root = json.loads(invoke("tree", log_path, "--format", "json").stdout)
+    assert (root["status"], root["cause"]) == ("FAILURE", "TIMEOUT")
+
+
+def test_tree_of_a_log_at_a_time(log_path):
+    root = json.loads(invoke("tree", log_path, "--format", "json", "--at", "0.1").stdout)
+    assert root["status"] == "RUNNING"
+
+
+def test_at_is_for_logs_only():
+    result = invoke("tree", "go to the kitchen", "--at", "3")
+    assert (result.exit_code, "--at is for logs" in result.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("source", ["log", "sentence"])
+def test_every_format_of_a_tree(log_path, source):
+    named = log_path if source == "log" else "is there a hammer in the workshop"
+    texts = {form: invoke("tree", named, "--format", form).stdout for form in ("text", "svg", "mermaid", "xml", "json")}
+    assert texts["mermaid"].startswith("flowchart LR\n")
+    assert ElementTree.fromstring(texts["xml"]).get("BTCPP_format") == "4"
+    assert ElementTree.fromstring(texts["svg"]).tag.endswith("svg")
+    assert json.loads(texts["json"])["id"].startswith("alice/")
+    assert len(texts["text"].splitlines()) > 3
+
+
+def test_depth_cuts_every_format():
+    sentence = "is there a hammer in the workshop"
+    assert len(invoke("tree", sentence, "--depth", "0").stdout.splitlines()) == 1
+    assert json.loads(invoke("tree", sentence, "--depth", "0", "--format", "json").stdout)["children"] == []
+
+
+def test_a_large_tree_is_folded_unless_told_otherwise():
+    sentence = "fetch me a drink from the kitchen"
+    few = invoke("tree", sentence, "--most", "30").stdout.splitlines()
+    many = invoke("tree", sentence, "--most", "10000").stdout.splitlines()
+    assert len(few) <= 30 < len(many)
+    assert not [line for line in many if "nodes)" in line]

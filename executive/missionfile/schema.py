@@ -170,6 +170,13 @@ class MissionFile(PolicyFile):
             raise ValueError("a whole mission cannot be skipped; set 'on_failure: skip' under 'each' or on a step")
         return on_failure
 
+    @field_validator("ask")
+    @classmethod
+    def _cannot_skip_when_asked(cls, ask: AskFile | None) -> AskFile | None:
+        if ask is not None and ask.default == "skip":
+            raise ValueError("a whole mission cannot be skipped; set 'default' to retry or stop")
+        return ask
+
     @property
     def source(self) -> YamlSource | None:
         """The file's data and lines; None when it was not read from a file."""

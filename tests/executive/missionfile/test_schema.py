@@ -61,6 +61,7 @@ def test_on_failure_retry_is_one_retry_unless_said(load):
         ("timeout: 600", "timeout: true", 2, "timeout: should be a number"),
         ("timeout: 600", "timeout: .nan", 2, "finite"),
         ("timeout: 600", "on_failure: skip", 2, "a whole mission cannot be skipped"),
+        ("timeout: 600", "on_failure: ask\nask: {default: skip}", 3, "a whole mission cannot be skipped"),
         ("retries: 1", "retries: 1.5", 3, "each.retries: should be a whole number"),
         ("retries: 1", "retries: -1", 3, "greater than or equal to 0"),
         ("on_failure: skip", "on_failure: skipp", 3, "did you mean 'skip'?"),

@@ -16,14 +16,18 @@ from executive.runner import RunEntry
 from plant.models.catalogue import load_catalogue
 from plant.referee import Verdict
 from plant.simulation import Simulation
+from plant.snapshot.file import SnapshotError
 from plant.spot.robot import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
 from skills.detect.appearance import load_appearance
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import MapError, load_grid_map
-from skills.estimate.localiser import ScanMatchingLocaliser
+from skills.estimate.grid_map import GridMap, MapError, load_grid_map
+from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
 from skills.navigate.footprint import Footprint
+from skills.robot import Pose2D
 
+UNSURE_SIGMA = (0.5, 0.5, 0.3)
+UNSURE_RADIUS_M = 4.0
 LIFT_KG = 5.0
 """What Spot's arm lifts continuously at half a metre, by its data sheet."""
 
@@ -58,8 +62,10 @@ def simulate(world: World, *, seed: int, robot_name: str, record: bool) -> Simul
         raise InputError(str(error)) from error
 
 
-def run_entry(simulation: Simulation, world: World, tree: CompiledTree) -> RunEntry:
+def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, believed: Pose2D | None = None) -> RunEntry:
     """The robot of a tree's name with its estimators.
+
+    `believed` is where the robot believed to be before a restart; it looks for its place in a wide circle then.
 
     Raises:
         InputError: there is no such robot, or the world's maps cannot be read.
@@ -74,9 +80,29 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree) -> RunEn
     return RunEntry(
         tree=tree,
         robot=simulation.robots[tree.robot_name],
-        localiser=ScanMatchingLocaliser(scan_map, world.start),
+        localiser=_localiser(scan_map, world.start, believed),
         costmap=LayeredCostmap(keepout_map),
     )
+
+
+def _localiser(scan_map: GridMap, start: Pose2D, believed: Pose2D | None) -> ScanMatchingLocaliser:
+    if believed is None:
+        return ScanMatchingLocaliser(scan_map, start)
+    usual = LocaliserOptions()
+    wide = LocaliserOptions(
+        height_band_m=scan_map.height_band_m or usual.height_band_m,
+        initial_sigma=UNSURE_SIGMA,
+        search_radius_m=UNSURE_RADIUS_M,
+    )
+    return ScanMatchingLocaliser(scan_map, believed, wide)
+
+
+def take_up_plant(simulation: Simulation, path: Path, *, label: str | None) -> None:
+    """Let the plant go on from the state that it keeps in a file. Raises InputError."""
+    try:
+        simulation.restore(path, label=label)
+    except SnapshotError as error:
+        raise InputError(str(error)) from error
 
 
 def judge(simulation: Simulation, tree: CompiledTree, knowledge: Knowledge, result: RobotResult) -> Verdict:

@@ -4,32 +4,35 @@ from __future__ import annotations
 
 import json
 import logging
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
+from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from executive.cli.assembly import knowledge_of, open_world
 from executive.cli.check_command import check
-from executive.cli.check_command import check
-from executive.cli.live import live_view
+from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run
 from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.new_skill_command import new_skill
 from executive.cli.output import BAD_INPUT, NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.page_view import PageView
+from executive.cli.queue_command import queue
 from executive.cli.replay_command import replay
-from executive.cli.requests import Request, filed, said
+from executive.cli.requests import Request
+from executive.cli.resume_command import resume
+from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.cli.tree_command import tree
-from executive.compiler import CompiledTree
 from executive.errors import InputError
 from executive.language import Status, Understanding, load_parser, parse_lines
 from executive.mission import DEFAULT_WORLD
-from executive.view.text import to_rich
+from executive.store.missions import MissionStore
 
 app = typer.Typer(
     name="errand",
@@ -43,15 +46,18 @@ World = Annotated[str | None, typer.Option(help="World by name or folder; flat u
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]
 MissionFile = Annotated[Path | None, typer.Argument(metavar="FILE", help="A mission file.", show_default=False)]
 NoWake = Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")]
+Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
+PageOf = Callable[[Request], PageView | None]
 
 
-app.command()(check)
 app.command()(check)
 app.command()(tree)
 app.command()(log)
 app.command()(replay)
 app.command()(new_skill)
+app.command()(resume)
+app.add_typer(queue)
 
 
 @app.command()
@@ -95,17 +101,24 @@ def run(
     as_json: AsJson = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
+    store: Store = None,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
     view_port: Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0 takes a free one.")] = 0,
 ) -> None:
     """Run a sentence or a mission file in the simulated world."""
+    console = console_for(as_json)
+    wants_page = view or view_for is not None
     with refusals():
-        request = _request(file, say, world, require_wake=not no_wake)
-        compiled = request.compile()
-        page = PageView(request, console_for(as_json), port=view_port) if view or view_for is not None else None
-        finished = _run_shown(
-            request, compiled, seed, out, record=not no_record, as_json=as_json, quiet=quiet, page=page
+        finished, page = _run_kept(
+            Asked(file, say, world, not no_wake),
+            seed,
+            out,
+            store or out / STORE,
+            record=not no_record,
+            quiet=quiet,
+            console=console,
+            page=lambda request: PageView(request, console, port=view_port) if wants_page else None,
         )
     if as_json:
         print_json(finished.report.to_json())
@@ -129,7 +142,7 @@ def evaluate(
     """Run a mission at many seeds and count what the trees claim and what the referee saw."""
     with refusals():
         chosen = seed_range(seeds)
-        _request(file, say, world, require_wake=not no_wake).compile()
+        Asked(file, say, world, not no_wake).request().compile()
     arguments = [*([str(file)] if file else ["--say", say or ""]), *(["--world", world] if world else [])]
     arguments += ["--no-wake"] if no_wake else []
     console = console_for(as_json)
@@ -156,42 +169,29 @@ def main() -> None:
     app()
 
 
-def _request(file: Path | None, say: str | None, world: str | None, *, require_wake: bool) -> Request:
-    if (file is None) == (say is None):
-        raise InputError("a mission file or --say is needed, and not both", mend='try: --say "Hey Alice, ..."')
-    if say is not None:
-        return said(say, world=world, require_wake=require_wake)
-    assert file is not None
-    return filed(file, world=world)
-
-
-def _run_shown(
-    request: Request,
-    compiled: CompiledTree,
-    seed: int,
-    out: Path,
-    *,
-    record: bool,
-    as_json: bool,
-    quiet: bool,
-    page: PageView | None = None,
-) -> Finished:
-    """Run it with the commands before, the tree while it runs, and the verdicts after."""
-    console = console_for(as_json)
-    for command in request.mission.commands:
-        console.print(str(command), markup=False)
-    seen: dict[str, Any] = {} if page is None else {"page": page, "control": page.control}
-    start = partial(run_request, request, compiled, seed=seed, out=out, record=record, **seen)
-    if quiet:
-        finished = start()
-    else:
-        with live_view(compiled, console) as observer:
-            finished = start(observer=observer)
-        console.print(to_rich(finished.tree, collapsed=False))
-    for line in finished.report.lines():
-        console.print(line)
-    console.print(f"Written to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}", markup=False)
-    return finished
+def _run_kept(
+    asked: Asked, seed: int, out: Path, store: Path, *, record: bool, quiet: bool, console: Console, page: PageOf
+) -> tuple[Finished, PageView | None]:
+    """Run it, shown, and kept in the store so that another process can take it up."""
+    request = asked.request()
+    compiled = request.compile()
+    shown = page(request)
+    with MissionStore(store) as missions, missions.claimed():
+        mission = missions.add(asked.order(request, compiled, seed=seed, out=out, record=record), queued=False)
+        for broken in give_up_broken(missions, mission):
+            console.print(
+                f"Mission {broken.id} ({broken.order.name}) had been broken off; it is given up.", markup=False
+            )
+        with kept(missions, mission) as ended:
+            control = control_for(console, quiet=quiet) if shown is None else shown.control
+            durable = new_run(missions, mission)
+            start = partial(
+                run_request, request, compiled, seed=seed, out=out, record=record, page=shown, durable=durable
+            )
+            finished = show_run(start, request, compiled, console, control=control, quiet=quiet)
+            ended(finished.report)
+    show_files(out, console)
+    return finished, shown
 
 
 def _show_meaning(meaning: Understanding, as_json: bool) -> None:

@@ -6,11 +6,12 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 
 from executive.cli.assembly import judge, run_entry, simulate
+from executive.cli.durable import Durable
 from executive.cli.page_view import PageView, log_map
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Request
@@ -44,18 +45,23 @@ def run_request(
     observer: Observer | None = None,
     control: Control | None = None,
     page: PageView | None = None,
+    durable: Durable | None = None,
 ) -> Finished:
     """Run a compiled request in the plant and write log, tree, recording and pictures into `out`.
 
-    The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it.
+    The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it;
+    with `durable` another process can take it up, or this one takes up another's.
 
     Raises:
         InputError: the world cannot be used.
     """
     simulation = simulate(request.world, seed=seed, robot_name=request.mission.robot_name, record=record)
-    entry = run_entry(simulation, request.world, tree)
+    entry = run_entry(simulation, request.world, tree, believed=None if durable is None else durable.pose)
+    if durable is not None:
+        entry = replace(entry, journal=durable.journal)
+        durable.begin(simulation)
     clock = simulation.clock
-    log = EventLog(out / "log.mcap", clock)
+    log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     souvenirs = Souvenirs(log)
     try:
         if page is not None:

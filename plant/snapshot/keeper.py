@@ -74,14 +74,14 @@ class SnapshotKeeper:
 
 
 def restore(snapshot: Snapshot, engine: KeptEngine, referee: KeptReferee, facts: Mapping[str, Any]) -> None:
-    """Bring a plant to a snapshot's state.
+    """Bring a plant to a snapshot's state; all of `facts` must be as they were.
 
     Raises:
         SnapshotError: the snapshot is one of another world, of other robots or of another version of the plant.
     """
     kept = snapshot.values["facts"]
-    if kept != dict(facts):
-        differing = ", ".join(key for key in facts if kept.get(key) != facts[key])
+    differing = ", ".join(key for key in facts if kept.get(key) != facts[key])
+    if differing:
         raise SnapshotError(f"the plant's state is that of another simulation ({differing}); run the mission again")
     named = snapshot.arrays.items()
     world = {name.removeprefix(_WORLD): array for name, array in named if name.startswith(_WORLD)}

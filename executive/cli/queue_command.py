@@ -1,0 +1,98 @@
+"""`errand queue`: missions kept in a store, to be run one after another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from executive.cli.durable import STORE, Asked
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.queue_run import run_queue
+from executive.store.missions import MissionState, MissionStore, StoredMission
+
+__all__ = ["queue"]
+
+queue = typer.Typer(name="queue", help="Missions kept in a store, to be run one after another.", no_args_is_help=True)
+
+Out = Annotated[Path, typer.Option(help="Folder for logs; each mission gets one of its own in it.")]
+Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
+Number = Annotated[int, typer.Argument(metavar="NUMBER", help="The mission's number, as `errand queue list` shows it.")]
+AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
+
+
+@queue.command()
+def add(
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A mission file.", show_default=False)] = None,
+    say: Annotated[str | None, typer.Option(help="What is said.")] = None,
+    world: Annotated[str | None, typer.Option(help="World by name or folder.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
+    no_wake: Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")] = False,
+    out: Out = Path("out"),
+    store: Store = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Queue a sentence or a mission file, checked."""
+    with refusals():
+        asked = Asked(file, say, world, not no_wake)
+        request = asked.request()
+        order = asked.order(request, request.compile(), seed=seed, out=out, record=not no_record)
+        with MissionStore(store or out / STORE) as missions:
+            mission = missions.add(order, queued=True)
+    console_for(as_json).print(f"Mission {mission.id} is queued: {order.name}", markup=False)
+    if as_json:
+        print_json(_told(mission))
+
+
+@queue.command(name="list")
+def show(out: Out = Path("out"), store: Store = None, as_json: AsJson = False) -> None:
+    """Show all missions of the store and how far each is."""
+    with refusals(), MissionStore(store or out / STORE, create=False) as missions:
+        known = missions.missions()
+    table = Table("mission", "state", "name", "world", "seed", "commands", "message")
+    for each in known:
+        order = each.order
+        commands = "\n".join(order.commands)
+        table.add_row(str(each.id), _state(each), order.name, order.world_name, str(order.seed), commands, each.message)
+    console_for(as_json).print(table)
+    if as_json:
+        print_json({"missions": [_told(each) for each in known]})
+
+
+@queue.command()
+def remove(number: Number, out: Out = Path("out"), store: Store = None) -> None:
+    """Forget a mission."""
+    with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
+        missions.remove(number)
+    console_for(False).print(f"Mission {number} is removed.")
+
+
+@queue.command()
+def run(
+    out: Out = Path("out"),
+    store: Store = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run all that is queued, each mission in the world as the one before has left it."""
+    console = console_for(as_json)
+    with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
+        results = run_queue(missions, console, quiet=quiet)
+    console.print(f"{sum(result['achieved'] for result in results)} of {len(results)} missions achieved")
+    if as_json:
+        print_json({"missions": results})
+    if not all(result["achieved"] for result in results):
+        raise typer.Exit(NOT_ACHIEVED)
+
+
+def _state(mission: StoredMission) -> str:
+    return "running or broken off" if mission.state is MissionState.RUNNING else mission.state.value
+
+
+def _told(mission: StoredMission) -> dict[str, Any]:
+    order = mission.order
+    told = {"mission": mission.id, "state": mission.state.value, "name": order.name, "world": order.world_name}
+    return {**told, "seed": order.seed, "commands": list(order.commands), "message": mission.message}

@@ -1,0 +1,66 @@
+"""Runs what is queued, one mission after another; each begins in the world as the one before has left it."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from rich.console import Console
+
+from executive.cli.durable import asked_again, kept, new_run, next_run, plant_file, same_world
+from executive.cli.mission_run import run_request
+from executive.cli.shown import control_for, show_files, show_run
+from executive.compiling.workshop import slug
+from executive.errors import InputError
+from executive.store.missions import MissionState, MissionStore, StoredMission
+
+_ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
+
+
+def run_queue(missions: MissionStore, console: Console, *, quiet: bool) -> list[dict[str, Any]]:
+    """Run all that is queued, until one is cancelled; their reports.
+
+    Raises:
+        InputError: a mission was broken off before and waits to be taken up, or one cannot begin.
+    """
+    results: list[dict[str, Any]] = []
+    broken = missions.missions(MissionState.RUNNING)
+    if broken:
+        what = f"mission {broken[-1].id} ({broken[-1].order.name}) was broken off"
+        raise InputError(what, mend="`errand resume` goes on with it and then with the queue", file=missions.path)
+    while queued := [each for each in missions.missions(MissionState.QUEUED) if each.queued]:
+        results.append(start_of(missions, queued[0], console, quiet=quiet))
+        if results[-1]["outcome"] == MissionState.CANCELLED.value:
+            break
+    return results
+
+
+def start_of(missions: MissionStore, mission: StoredMission, console: Console, *, quiet: bool) -> dict[str, Any]:
+    """Run one mission of the store from its beginning; its report.
+
+    Raises:
+        InputError: its file, its world or the plant's state cannot be used.
+    """
+    order = mission.order
+    request = asked_again(mission, missions.path).request()
+    tree = request.compile()
+    out = Path(order.out) / f"{mission.id:03d}-{slug(order.name)}" if mission.queued else Path(order.out)
+    before = _before(missions, mission) if mission.queued else None
+    durable = new_run(missions, mission) if before is None else next_run(missions, mission, before)
+    console.print(f"[bold]Mission {mission.id}[/bold]: {order.name}")
+    with kept(missions, mission) as ended:
+        start = partial(run_request, request, tree, seed=order.seed, out=out, record=order.record, durable=durable)
+        finished = show_run(start, request, tree, console, control=control_for(console, quiet=quiet), quiet=quiet)
+        ended(finished.report)
+    show_files(out, console)
+    return {**finished.report.to_json(), "mission": mission.id, "achieved": finished.report.achieved}
+
+
+def _before(missions: MissionStore, mission: StoredMission) -> StoredMission | None:
+    """The mission that left the world in which this one begins; None when it begins in a fresh one."""
+    ended = [each for each in missions.missions(*_ENDED) if each.queued and each.starts and each.id < mission.id]
+    last = max(ended, key=lambda each: each.id, default=None)
+    if last is None or not same_world(last, mission) or last.clock_s is None:
+        return None
+    return last if plant_file(missions).with_name(f"{plant_file(missions).name}.a").exists() else None

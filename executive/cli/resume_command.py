@@ -1,0 +1,88 @@
+"""`errand resume`: takes up the mission that a crash or a kill broke off, and then the rest of its queue."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+from rich.console import Console
+
+from executive.cli.durable import STORE, TakenUp, kept, take_up
+from executive.cli.mission_run import Finished, run_request
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.queue_run import run_queue, start_of
+from executive.cli.shown import control_for, show_files, show_past, show_run
+from executive.errors import InputError, listing
+from executive.store.missions import MissionState, MissionStore, StoredMission
+
+__all__ = ["resume"]
+
+_MAY_GO_ON: Final = (MissionState.RUNNING, MissionState.CANCELLED, MissionState.ERROR)
+
+
+def resume(
+    store: Annotated[Path, typer.Option(help="Where the missions are kept.")] = Path("out") / STORE,
+    mission: Annotated[int | None, typer.Option(help="Its number, where it is not the one broken off.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
+) -> None:
+    """Go on with the mission that was broken off, from its last finished step; then with its queue."""
+    console = console_for(as_json)
+    with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
+        chosen = _broken_off(missions, mission)
+        results = [_go_on(missions, chosen, console, quiet=quiet)]
+        if chosen.queued:
+            results += run_queue(missions, console, quiet=quiet)
+    if as_json:
+        print_json({**results[0], "then": results[1:]})
+    if not all(result["achieved"] for result in results):
+        raise typer.Exit(NOT_ACHIEVED)
+
+
+def _broken_off(missions: MissionStore, number: int | None) -> StoredMission:
+    """The mission to go on with. Raises InputError when there is none."""
+    if number is None:
+        broken = missions.missions(MissionState.RUNNING)
+        if broken:
+            return broken[-1]
+        queued = missions.missions(MissionState.QUEUED)
+        mend = "`errand queue run` does what is queued" if queued else "`errand queue list` shows how missions ended"
+        raise InputError("no mission was broken off", mend=mend, file=missions.path)
+    chosen = missions.mission(number)
+    if chosen.state not in _MAY_GO_ON:
+        known = listing((state.value for state in _MAY_GO_ON), last="or")
+        raise InputError(
+            f"mission {number} is {chosen.state.value}", mend=f"name one that is {known}", file=missions.path
+        )
+    return chosen
+
+
+def _go_on(missions: MissionStore, mission: StoredMission, console: Console, *, quiet: bool) -> dict[str, Any]:
+    """Go on with one mission; its report with what was done with its past."""
+    order, out = mission.order, Path(mission.order.out)
+    if not missions.memory(mission.id).steps:
+        console.print(f"Mission {mission.id} ({order.name}) had not begun; it begins now.", markup=False)
+        return start_of(missions, mission, console, quiet=quiet)
+    taken = take_up(missions, mission)
+    console.print(f"Mission {mission.id} ({order.name}) goes on.", markup=False)
+    with kept(missions, mission) as ended:
+        start = _start(taken, mission, out)
+        finished = show_run(
+            start, taken.request, taken.tree, console, control=control_for(console, quiet=quiet), quiet=quiet
+        )
+        ended(finished.report)
+    console.print("What became of its past:")
+    show_past(taken.recollection.told, console)
+    show_files(out, console)
+    report = finished.report
+    told = list(taken.recollection.told)
+    return {**report.to_json(), "mission": mission.id, "achieved": report.achieved, "resumed": told}
+
+
+def _start(taken: TakenUp, mission: StoredMission, out: Path) -> partial[Finished]:
+    order = mission.order
+    return partial(
+        run_request, taken.request, taken.tree, seed=order.seed, out=out, record=order.record, durable=taken.durable
+    )

@@ -1,0 +1,59 @@
+"""A run as people see it: the commands before, the tree while it runs, the verdicts after."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+from rich.console import Console
+
+from executive.cli.live import live_view
+from executive.cli.mission_run import Finished
+from executive.cli.requests import Request
+from executive.compiler import CompiledTree
+from executive.control import Control
+from executive.runner import Observer
+from executive.view.text import to_rich
+
+
+class Start(Protocol):
+    """Runs a mission to its end."""
+
+    def __call__(self, *, control: Control, observer: Observer | None = None) -> Finished:
+        """Run it."""
+
+
+def control_for(console: Console, *, quiet: bool) -> Control:
+    """The control of a run without a page: attended where somebody sits at a terminal."""
+    attended = console.is_terminal and sys.stdin.isatty() and not quiet
+    return Control(attended=attended, pace=1.0 if attended else None)
+
+
+def show_run(
+    start: Start, request: Request, tree: CompiledTree, console: Console, *, control: Control, quiet: bool
+) -> Finished:
+    """Run it, shown on the console and controlled from there."""
+    for command in request.mission.commands:
+        console.print(str(command), markup=False)
+    if quiet:
+        finished = start(control=control)
+    else:
+        with live_view(tree, console, control) as observer:
+            finished = start(control=control, observer=observer)
+        console.print(to_rich(finished.tree, collapsed=False))
+    for line in finished.report.lines():
+        console.print(line)
+    return finished
+
+
+def show_files(out: Path, console: Console) -> None:
+    """Name what was left in a folder."""
+    console.print(f"Written to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}", markup=False)
+
+
+def show_past(told: Sequence[str], console: Console) -> None:
+    """Say what a resumed mission did with its past."""
+    for sentence in told:
+        console.print(f"  {sentence}", markup=False)

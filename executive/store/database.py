@@ -1,0 +1,131 @@
+"""Opens the store's SQLite file, and turns every way in which that may fail into one error with a mend."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from executive.errors import InputError
+
+VERSION: Final = 1
+APPLICATION_ID: Final = 0x45525244  # "ERRD"
+BUSY_S: Final = 2.0
+_SCHEMA: Final = """
+CREATE TABLE mission (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    state TEXT NOT NULL,
+    name TEXT NOT NULL,
+    sentence TEXT,
+    file TEXT,
+    text TEXT,
+    require_wake INTEGER NOT NULL,
+    world TEXT,
+    world_name TEXT NOT NULL,
+    robot TEXT NOT NULL,
+    seed INTEGER NOT NULL,
+    out TEXT NOT NULL,
+    record INTEGER NOT NULL,
+    commands TEXT NOT NULL,
+    fingerprint TEXT NOT NULL,
+    queued INTEGER NOT NULL,
+    starts INTEGER NOT NULL DEFAULT 0,
+    message TEXT NOT NULL DEFAULT '',
+    clock_s REAL,
+    pose TEXT
+);
+CREATE TABLE step (
+    mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
+    path_id TEXT NOT NULL,
+    status TEXT NOT NULL,
+    cause TEXT,
+    message TEXT NOT NULL,
+    checkpoint TEXT,
+    clock_s REAL NOT NULL,
+    PRIMARY KEY (mission, path_id)
+);
+CREATE TABLE value (
+    mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
+    key TEXT NOT NULL,
+    text TEXT NOT NULL,
+    PRIMARY KEY (mission, key)
+);
+"""
+
+
+def connect(path: Path, *, create: bool) -> sqlite3.Connection:
+    """Open the store, made new where `create` allows it.
+
+    A killed process loses nothing that was committed: the file is in write-ahead mode.
+
+    Raises:
+        InputError: there is none, it cannot be opened, it is damaged, or another version wrote it.
+    """
+    if not create and not path.is_file():
+        raise InputError("there is no store", mend="run or queue a mission first, or name one by --store", file=path)
+    with told(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
+        try:
+            _prepare(connection, path)
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+
+def _prepare(connection: sqlite3.Connection, path: Path) -> None:
+    """Set the modes, check whose file it is, and make the tables where there are none."""
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    if tables and application != APPLICATION_ID:
+        raise InputError("it is a database, but no store of missions", mend="name another file by --store", file=path)
+    if tables and version != VERSION:
+        mend = "finish its missions with the version that wrote it, or name another file by --store"
+        raise InputError(f"the store has version {version}, and this errand reads {VERSION}", mend=mend, file=path)
+    connection.execute("PRAGMA journal_mode = WAL")
+    connection.execute("PRAGMA synchronous = NORMAL")
+    connection.execute("PRAGMA foreign_keys = ON")
+    if not tables:
+        with transaction(connection):
+            for statement in filter(str.strip, _SCHEMA.split(";")):
+                connection.execute(statement)
+            connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            connection.execute(f"PRAGMA user_version = {VERSION}")
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """All or nothing."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+    except BaseException:
+        connection.execute("ROLLBACK")
+        raise
+    connection.execute("COMMIT")
+
+
+@contextmanager
+def told(path: Path) -> Iterator[None]:
+    """Failures of the database become an InputError."""
+    try:
+        yield
+    except sqlite3.OperationalError as error:
+        mend = "end the program that keeps it open, then try again" if _busy(error) else "name another by --store"
+        what = "another program has locked the store" if _busy(error) else f"cannot use the store ({error})"
+        raise InputError(what, mend=mend, file=path) from error
+    except sqlite3.DatabaseError as error:
+        mend = "move it away (its missions are lost), or name another by --store"
+        raise InputError(f"the store is damaged ({error})", mend=mend, file=path) from error
+    except OSError as error:
+        raise InputError(
+            f"cannot use the store ({error.strerror})", mend="name another by --store", file=path
+        ) from error
+
+
+def _busy(error: sqlite3.OperationalError) -> bool:
+    return "locked" in str(error) or "busy" in str(error)

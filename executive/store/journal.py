@@ -1,0 +1,110 @@
+"""Writes a mission's notes to the store, one transaction for each tick that brought something new."""
+
+from __future__ import annotations
+
+import json
+import math
+import sqlite3
+from collections.abc import Mapping
+from typing import Any, Final
+
+from executive.journal import TickNote
+from executive.snapshot import Transition
+from executive.store.database import transaction
+from executive.store.recollection import Recollection
+from executive.store.values import to_text
+from skills.robot import Pose2D
+
+MOVED_M: Final = 0.02
+TURNED_RAD: Final = 0.02
+_PUT_STEP: Final = "INSERT OR REPLACE INTO step VALUES (?, ?, ?, ?, ?, ?, ?)"
+_PUT_VALUE: Final = "INSERT OR REPLACE INTO value VALUES (?, ?, ?)"
+
+
+class StoreJournal:
+    """Implements `executive.journal.Journal`.
+
+    What cannot be written now, since another program holds the store, is written with a later tick: the robot's work
+    does not wait for it. `troubles` tells of what could not be kept.
+    """
+
+    def __init__(self, connection: sqlite3.Connection, mission: int) -> None:
+        self._connection, self._mission = connection, mission
+        self._written: dict[str, Any] = {}
+        self._steps: dict[str, tuple[object, ...]] = {}
+        self._values: dict[str, str] = {}
+        self._checkpoints: dict[str, str] = {}
+        self._pose: Pose2D | None = None
+        self._recollection: Recollection | None = None
+        self.troubles: list[str] = []
+
+    def remembering(self, recollection: Recollection) -> StoreJournal:
+        """The journal of a run that goes on from an earlier one: what that knew stays until it has been used."""
+        self._recollection = recollection
+        return self
+
+    def note(self, note: TickNote) -> None:
+        """Keep what a tick brought."""
+        self._take_steps(note)
+        self._take_values(note.board)
+        moved = note.pose is not None and _apart(self._pose, note.pose)
+        if self._steps or self._values or moved:
+            self._write(note)
+
+    def _take_steps(self, note: TickNote) -> None:
+        for change in note.changes:
+            if self._recollection is None or not self._recollection.pending(change.path_id):
+                self._checkpoints.pop(change.path_id, None)
+                self._steps[change.path_id] = self._row(change, note.now_s, None)
+        for path_id, checkpoint in note.checkpoints.items():
+            text = json.dumps(dict(checkpoint))
+            if self._checkpoints.get(path_id) != text:
+                self._checkpoints[path_id] = text
+                self._steps[path_id] = (self._mission, path_id, "RUNNING", None, "", text, note.now_s)
+
+    def _row(self, change: Transition, now_s: float, checkpoint: str | None) -> tuple[object, ...]:
+        after = change.after
+        cause = None if after.cause is None else after.cause.name
+        return (self._mission, change.path_id, after.status.name, cause, after.message, checkpoint, now_s)
+
+    def _take_values(self, board: Mapping[str, Any]) -> None:
+        for key, value in board.items():
+            if key in self._written and self._written[key] is value:
+                continue
+            self._written[key] = value
+            try:
+                self._values[key] = to_text(value)
+            except TypeError as error:
+                self._trouble(f"'{key}': {error}")
+
+    def _write(self, note: TickNote) -> None:
+        pose = note.pose or self._pose
+        text = None if pose is None else json.dumps((pose.x_m, pose.y_m, pose.yaw_rad))
+        dropped = () if self._recollection is None else tuple(self._recollection.dropped)
+        try:
+            with transaction(self._connection):
+                run = self._connection.executemany
+                run("DELETE FROM step WHERE mission = ? AND path_id = ?", [(self._mission, path) for path in dropped])
+                run(_PUT_STEP, self._steps.values())
+                run(_PUT_VALUE, [(self._mission, key, value) for key, value in self._values.items()])
+                self._connection.execute(
+                    "UPDATE mission SET clock_s = ?, pose = coalesce(?, pose) WHERE id = ?",
+                    (note.now_s, text, self._mission),
+                )
+        except sqlite3.Error as error:
+            self._trouble(f"the store could not be written ({error})")
+            return
+        self._steps, self._values, self._pose = {}, {}, pose
+        if self._recollection is not None:
+            self._recollection.dropped.difference_update(dropped)
+
+    def _trouble(self, sentence: str) -> None:
+        if sentence not in self.troubles:
+            self.troubles.append(sentence)
+
+
+def _apart(before: Pose2D | None, now: Pose2D) -> bool:
+    if before is None:
+        return True
+    turned = math.remainder(now.yaw_rad - before.yaw_rad, 2 * math.pi)
+    return math.hypot(now.x_m - before.x_m, now.y_m - before.y_m) > MOVED_M or abs(turned) > TURNED_RAD

@@ -1,0 +1,203 @@
+"""The missions in the store: what was asked for, their states, and how far each has come."""
+
+from __future__ import annotations
+
+import enum
+import fcntl
+import json
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+
+from py_trees.common import Status
+
+from executive.errors import InputError, listing
+from executive.store.database import connect, told, transaction
+from executive.store.journal import StoreJournal
+from executive.store.records import Memory, StepRecord
+from executive.store.values import from_text
+from skills.api import Cause
+from skills.robot import Pose2D
+
+
+class MissionState(enum.Enum):
+    """How far a mission is. RUNNING while no process works on it means: broken off, `errand resume` goes on."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    SUCCESS = "success"
+    FAILURE = "failure"
+    CANCELLED = "cancelled"
+    ERROR = "error"
+
+
+@dataclass(frozen=True)
+class Order:
+    """What was asked for, complete enough to compile the same tree again.
+
+    Either `sentence`, or `file` with its `text`; `world` as it was said, if it was. `out` is the folder for logs;
+    `fingerprint` that of the tree.
+    """
+
+    name: str
+    world_name: str
+    robot: str
+    seed: int
+    out: str
+    commands: tuple[str, ...]
+    fingerprint: str
+    sentence: str | None = None
+    file: str | None = None
+    text: str | None = None
+    world: str | None = None
+    require_wake: bool = False
+    record: bool = True
+
+
+@dataclass(frozen=True)
+class StoredMission:
+    """A mission in the store. `starts` counts how often it was started; `clock_s` and `pose` are the last noted."""
+
+    id: int
+    state: MissionState
+    order: Order
+    queued: bool
+    starts: int
+    message: str
+    clock_s: float | None
+    pose: Pose2D | None
+
+
+class MissionStore:
+    """One store file. Use it as a context manager, or close it."""
+
+    def __init__(self, path: Path, *, create: bool = True) -> None:
+        """Open it. Raises InputError: there is none, it is locked, damaged, or of another version."""
+        self.path = path
+        self._connection = connect(path, create=create)
+
+    def __enter__(self) -> MissionStore:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close it; idempotent."""
+        self._connection.close()
+
+    def add(self, order: Order, *, queued: bool) -> StoredMission:
+        """Keep a mission that is still to be run."""
+        values = {**asdict(order), "commands": json.dumps(order.commands), "queued": queued, "state": "queued"}
+        names, marks = ", ".join(values), ", ".join(f":{name}" for name in values)
+        with self._writing():
+            cursor = self._connection.execute(f"INSERT INTO mission ({names}) VALUES ({marks})", values)
+        return self.mission(cursor.lastrowid or 0)
+
+    def mission(self, number: int) -> StoredMission:
+        """The mission of this number. Raises InputError when there is none."""
+        rows = self._rows("SELECT * FROM mission WHERE id = ?", number)
+        if not rows:
+            known = [str(mission.id) for mission in self.missions()]
+            mend = f"known are {listing(known)}" if known else "the store is empty; queue one first"
+            raise InputError(f"there is no mission {number}", mend=mend, file=self.path)
+        return _mission(rows[0])
+
+    def missions(self, *states: MissionState) -> tuple[StoredMission, ...]:
+        """All missions in the order in which they came; only those in some states where given."""
+        found = map(_mission, self._rows("SELECT * FROM mission ORDER BY id"))
+        return tuple(mission for mission in found if not states or mission.state in states)
+
+    def remove(self, number: int) -> None:
+        """Forget a mission. Raises InputError when there is none."""
+        self.mission(number)
+        with self._writing():
+            self._connection.execute("DELETE FROM mission WHERE id = ?", (number,))
+
+    def begin(self, number: int) -> None:
+        """The mission is started, or started again."""
+        with self._writing():
+            self._connection.execute(
+                "UPDATE mission SET state = 'running', starts = starts + 1 WHERE id = ?", (number,)
+            )
+
+    def finish(self, number: int, state: MissionState, message: str) -> None:
+        """The mission has come to an end."""
+        with self._writing():
+            ended = (state.value, message, number)
+            self._connection.execute("UPDATE mission SET state = ?, message = ? WHERE id = ?", ended)
+
+    def memory(self, number: int) -> Memory:
+        """All that is known of how far a mission has come. Raises InputError when it cannot be read."""
+        steps = self._rows("SELECT * FROM step WHERE mission = ?", number)
+        values = self._rows("SELECT key, text FROM value WHERE mission = ?", number)
+        try:
+            board = {row["key"]: from_text(row["text"]) for row in values}
+            return Memory({row["path_id"]: _step(row) for row in steps}, board, self.mission(number).pose)
+        except ValueError as error:
+            mend = f"`errand queue remove {number}`, and give the mission again"
+            raise InputError(f"mission {number} cannot be taken up: {error}", mend=mend, file=self.path) from error
+
+    def journal(self, number: int) -> StoreJournal:
+        """Keeps notes of a mission's run."""
+        return StoreJournal(self._connection, number)
+
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Only one process at a time runs missions of a store; the claim ends with the process, however that ends.
+
+        Raises:
+            InputError: another process runs one.
+        """
+        with told(self.path), self.path.with_name(f"{self.path.name}-claim").open("a+") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                file.seek(0)
+                mend = "wait until it is done, or give another folder by --out or another --store"
+                what = f"process {file.read() or '?'} runs a mission of this store"
+                raise InputError(what, mend=mend, file=self.path) from error
+            file.truncate(0)
+            file.write(str(os.getpid()))
+            file.flush()
+            yield
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        with told(self.path), transaction(self._connection):
+            yield
+
+    def _rows(self, query: str, *values: object) -> list[sqlite3.Row]:
+        with told(self.path):
+            cursor = self._connection.cursor()
+            cursor.row_factory = sqlite3.Row
+            return cursor.execute(query, values).fetchall()
+
+
+def _mission(row: sqlite3.Row) -> StoredMission:
+    own = {name: row[name] for name in Order.__dataclass_fields__}
+    own |= {"commands": tuple(json.loads(row["commands"])), "require_wake": bool(row["require_wake"])}
+    return StoredMission(
+        id=row["id"],
+        state=MissionState(row["state"]),
+        order=Order(**{**own, "record": bool(row["record"])}),
+        queued=bool(row["queued"]),
+        starts=row["starts"],
+        message=row["message"],
+        clock_s=row["clock_s"],
+        pose=None if row["pose"] is None else Pose2D(*json.loads(row["pose"])),
+    )
+
+
+def _step(row: sqlite3.Row) -> StepRecord:
+    return StepRecord(
+        status=Status[row["status"]],
+        cause=None if row["cause"] is None else Cause[row["cause"]],
+        message=row["message"],
+        clock_s=row["clock_s"],
+        checkpoint={} if row["checkpoint"] is None else json.loads(row["checkpoint"]),
+    )

@@ -1,0 +1,37 @@
+"""What the store knows of a mission that was broken off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from py_trees.common import Status
+
+from skills.api import Cause
+from skills.robot import Pose2D
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """What a node last said: its status, when that began, and for a skill under way its checkpoint."""
+
+    status: Status
+    cause: Cause | None
+    message: str
+    clock_s: float
+    checkpoint: Mapping[str, Any]
+
+    @property
+    def ended(self) -> bool:
+        """True when the node came to an end."""
+        return self.status in (Status.SUCCESS, Status.FAILURE)
+
+
+@dataclass(frozen=True)
+class Memory:
+    """All that is known of a mission that was broken off: its nodes by path id, its blackboard, the last pose."""
+
+    steps: Mapping[str, StepRecord]
+    board: Mapping[str, Any]
+    pose: Pose2D | None

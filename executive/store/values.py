@@ -1,0 +1,147 @@
+"""Blackboard values as JSON text and back: plain values, tuples, enums, arrays, transforms and frozen dataclasses.
+
+Each value that is no plain JSON carries its kind, so that it comes back equal and of the same type. A class is looked
+up among the modules that are loaded; nothing is imported and nothing is called but a dataclass's constructor.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import json
+import sys
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+_KIND: Final = "$kind"
+
+
+def to_text(value: Any) -> str:
+    """The value as JSON text.
+
+    Raises:
+        TypeError: it, or a part of it, is of no kind that can be kept.
+    """
+    return json.dumps(_packed(value), separators=(",", ":"))
+
+
+def from_text(text: str) -> Any:
+    """The value that `to_text` wrote.
+
+    Raises:
+        ValueError: the text is damaged, or names a class that there is no more.
+    """
+    try:
+        return _unpacked(json.loads(text))
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"no value can be read from {text[:80]!r} ({error})") from error
+
+
+def _packed(value: Any) -> Any:
+    if value is None or (isinstance(value, bool | int | float | str) and not isinstance(value, enum.Enum)):
+        return value
+    for kind, (fits, pack, _) in _KINDS.items():
+        if fits(value):
+            return {_KIND: kind, **pack(value)}
+    raise TypeError(f"a {type(value).__name__} cannot be kept in the store")
+
+
+def _unpacked(value: Any) -> Any:
+    if not isinstance(value, dict):
+        if isinstance(value, list):
+            raise ValueError("a bare list is no stored value")
+        return value
+    if value[_KIND] not in _KINDS:
+        raise ValueError(f"unknown kind of value {value[_KIND]!r}")
+    return _KINDS[value[_KIND]][2](value)
+
+
+def _class_of(name: str) -> Any:
+    """The loaded class that is called "module:Class.Inner". Raises ValueError."""
+    module, _, path = name.partition(":")
+    found: Any = sys.modules.get(module)
+    for part in path.split("."):
+        found = getattr(found, part, None)
+    if not isinstance(found, type):
+        raise ValueError(f"there is no class {name} any more")
+    return found
+
+
+def _class_name(value: Any) -> str:
+    return f"{type(value).__module__}:{type(value).__qualname__}"
+
+
+def _pack_dataclass(value: Any) -> dict[str, Any]:
+    fields = {field.name: _packed(getattr(value, field.name)) for field in dataclasses.fields(value) if field.init}
+    return {"class": _class_name(value), "fields": fields}
+
+
+def _unpack_dataclass(packed: Mapping[str, Any]) -> Any:
+    found = _class_of(packed["class"])
+    if not dataclasses.is_dataclass(found):
+        raise ValueError(f"{packed['class']} is no dataclass")
+    make: Any = found
+    return make(**{name: _unpacked(item) for name, item in packed["fields"].items()})
+
+
+def _unpack_enum(packed: Mapping[str, Any]) -> Any:
+    found = _class_of(packed["class"])
+    if not issubclass(found, enum.Enum):
+        raise ValueError(f"{packed['class']} is no enum")
+    return found[packed["name"]]
+
+
+def _pack_array(value: Any) -> dict[str, Any]:
+    return {"dtype": str(value.dtype), "shape": list(value.shape), "items": value.ravel().tolist()}
+
+
+def _is_kept_dataclass(value: Any) -> bool:
+    return dataclasses.is_dataclass(value) and not isinstance(value, type)
+
+
+_Kind = tuple[Callable[[Any], bool], Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Any]]
+_KINDS: Final[Mapping[str, _Kind]] = MappingProxyType(
+    {
+        "enum": (
+            lambda v: isinstance(v, enum.Enum),
+            lambda v: {"class": _class_name(v), "name": v.name},
+            _unpack_enum,
+        ),
+        "number": (lambda v: isinstance(v, np.generic), lambda v: {"item": v.item()}, lambda p: p["item"]),
+        "array": (
+            lambda v: isinstance(v, np.ndarray) and v.dtype.kind in "biuf",
+            _pack_array,
+            lambda p: np.array(p["items"], dtype=p["dtype"]).reshape(p["shape"]),
+        ),
+        "transform": (
+            lambda v: isinstance(v, RigidTransform),
+            lambda v: {"matrix": v.GetAsMatrix34().tolist()},
+            lambda p: RigidTransform(np.array(p["matrix"])),
+        ),
+        "dataclass": (_is_kept_dataclass, _pack_dataclass, _unpack_dataclass),
+        "tuple": (
+            lambda v: isinstance(v, tuple),
+            lambda v: {"items": [*map(_packed, v)]},
+            lambda p: tuple(map(_unpacked, p["items"])),
+        ),
+        "list": (
+            lambda v: isinstance(v, list),
+            lambda v: {"items": [*map(_packed, v)]},
+            lambda p: [*map(_unpacked, p["items"])],
+        ),
+        "set": (
+            lambda v: isinstance(v, frozenset),
+            lambda v: {"items": sorted(map(to_text, v))},
+            lambda p: frozenset(map(from_text, p["items"])),
+        ),
+        "map": (
+            lambda v: isinstance(v, Mapping),
+            lambda v: {"items": [[_packed(key), _packed(item)] for key, item in v.items()]},
+            lambda p: {_unpacked(key): _unpacked(item) for key, item in p["items"]},
+        ),
+    }
+)

@@ -60,7 +60,7 @@ class AskFile(_Strict):
 
     text: Text | None = Field(None, description="The question; by default it tells what failed and why.")
     limit: Seconds = Field(60.0, description="Seconds on the robot's clock to wait for an answer.")
-    default: Literal["retry", "skip", "stop"] = Field("stop", description="The answer when nobody answers in time.")
+    default: Literal["skip", "stop"] = Field("stop", description="The answer when nobody answers in time.")
 
 
 class PolicyFile(_Strict):
@@ -174,7 +174,7 @@ class MissionFile(PolicyFile):
     @classmethod
     def _cannot_skip_when_asked(cls, ask: AskFile | None) -> AskFile | None:
         if ask is not None and ask.default == "skip":
-            raise ValueError("a whole mission cannot be skipped; set 'default' to retry or stop")
+            raise ValueError("a whole mission cannot be skipped; set 'default' to stop")
         return ask
 
     @property

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
-from skills.testing.blocks import ROOM, TABLE_CAN, Block
+from skills.testing.blocks import ROOM, TABLE_CAN, Block, can_at
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot, Start
 
@@ -148,6 +148,35 @@ def test_the_arm_follows_its_trajectory(clock, spot):
     clock.advance(0.6)
     assert robot.q_rad == pytest.approx(there)
     assert robot.command_status(command).state is CommandState.DONE
+
+
+def test_a_loose_block_between_the_fingers_is_taken_and_put_down(clock, spot):
+    robot = ScriptedRobot(clock, capabilities=spot)
+    between = robot._between_fingers_W()
+    can = can_at(float(between[0]), float(between[1]), float(between[2]) - 0.05)
+    robot.blocks.append(can)
+    lease = robot.acquire_lease("test")
+    for opening in (1.4, 0.0):
+        robot.set_gripper(opening, 40.0, until_s=9.0, lease=lease)
+        clock.advance(1.0)
+    assert robot.gripper().holding
+    assert robot.blocks == []
+    robot.set_gripper(1.4, 40.0, until_s=9.0, lease=lease)
+    clock.advance(1.0)
+    assert not robot.gripper().holding
+    assert robot.blocks[0].z0 == 0.0
+
+
+def test_a_docked_robot_charges_and_another_does_not(clock):
+    docked, walking = (ScriptedRobot(clock, start=Start(charge=0.5, docked=is_docked)) for is_docked in (True, False))
+    clock.advance(30.0)
+    assert docked.battery().charge == pytest.approx(0.55)
+    assert walking.battery().charge < 0.5
+
+
+def test_a_block_without_extent_is_refused():
+    with pytest.raises(ValueError, match="must hold"):
+        Block(1.0, 0.0, 1.0, 1.0)
 
 
 def test_it_starts_where_it_is_told(clock):

@@ -73,6 +73,20 @@ def test_a_conftest_may_add_faults_of_its_own(run_pytest):
     assert "1 passed" in done.stdout
 
 
+def test_a_skill_test_may_ask_for_the_plant(run_pytest):
+    done = run_pytest(
+        stow__skilltest__yaml="""\
+        skill: navigate
+        robot: {kind: plant}
+        with: {goal: {x: 0.0, y: 0.0}}
+        tests:
+          - {name: it walks, expect: {outcome: success, message: standing, within_s: 20}}
+          - {name: it is stopped, faults: [drive is stopped at 1 s], expect: {outcome: failure}}
+        """
+    )
+    assert "2 passed" in done.stdout, done.stdout
+
+
 def test_tests_that_use_nothing_of_it_load_nothing_heavy(run_pytest):
     done = run_pytest(
         test_light__py="""\

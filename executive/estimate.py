@@ -173,7 +173,7 @@ def _skill(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
     except ValueError as error:
         place = {} if node.source is None else {"file": node.source.file, "line": node.source.line}
         mend = "name another place or pose, or mend the world's map"
-        raise _CannotError(_located(str(error), mend, place)) from error
+        raise _CannotError(_located(str(error).rstrip("."), mend, place)) from error
     walk.pose = goal
     drive = walk.estimates.drive
     duration_s = drive.overhead_s + drive.per_metre_s * way.progress_m

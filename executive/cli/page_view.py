@@ -26,6 +26,7 @@ from executive.view.actions import Action, RefusedError, control_actions, text_o
 from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer
 from executive.view.watch import ControlWatch, ProgressWatch
+from plant.live_scene import LiveScene
 from plant.simulation import Simulation
 from skills.estimate.grid_map import load_grid_map
 
@@ -47,8 +48,9 @@ class PageView:
         """Serve the page and print its address. Raises InputError when the port is taken."""
         log.listen(self._feed)
         self._parser = self._threads.submit(load_parser)
-        actions = {**control_actions(self.control), "say": self._say()}
-        content = PageContent(self._feed, actions, scene_url=simulation.show_live().url)
+        scene = simulation.show_live()
+        actions = {**control_actions(self.control), "say": self._say(), "ease": easing(scene)}
+        content = PageContent(self._feed, actions, scene_url=scene.url)
         self._server = served(content, self._port)
         self._watch = ControlWatch(self.control, self._feed)
         self._console.print(f"The page: {self._server.url}", markup=False)
@@ -105,6 +107,16 @@ class PageView:
         tree = compile_mission(mission, knowledge=request.knowledge, registry=built_in_skills())
         self.control.preempt(tree)
         return "; ".join(map(str, mission.commands))
+
+
+def easing(scene: LiveScene) -> Action:
+    """An action for a browser that draws slowly: the scene is refreshed less often."""
+
+    def ease(_: Mapping[str, Any]) -> str:
+        scene.go_easy()
+        return "the scene is refreshed less often"
+
+    return ease
 
 
 def log_map(log: EventLog, request: Request) -> None:

@@ -15,7 +15,7 @@ from executive.view.actions import control_json
 from executive.view.feed import Feed
 
 PROGRESS_PERIOD_S: Final = 0.15
-SEND_LIMIT_S: Final = 0.05
+SEND_LIMIT_S: Final = 0.2
 _LOOK_AGAIN_S: Final = 0.5
 
 

@@ -39,7 +39,7 @@
     }
 
     tell(text, bad) {
-      byId("announced").textContent = text;
+      if (text) byId("announced").textContent = text;
       if (bad || this.saying) {
         byId("said").textContent = text;
         byId("said").classList.toggle("bad", bad);

@@ -1,7 +1,7 @@
 "use strict";
 // Puts the page together: messages come from the server while a run is under way, or stand in the page itself.
 (() => {
-  const { Store, TreePanel, MapPanel, Header, CameraPanel, ScenePanel, QuestionPanel, EventPanel, Timeline, ControlPanel, byId } = window.errand;
+  const { Store, TreePanel, MapPanel, Header, CameraPanel, ScenePanel, QuestionPanel, EventPanel, Timeline, ControlPanel, drawsSlowly, byId } = window.errand;
   const recorded = byId("recorded") ? JSON.parse(byId("recorded").textContent) : null;
   const token = new URLSearchParams(location.search).get("token") || "";
   const store = new Store();
@@ -92,6 +92,7 @@
     timeline.setLive(actions.length > 0);
     if (recording) scene.show(`${recording}?token=${encodeURIComponent(token)}`, true);
     else scene.show(address, false);
+    if (control.actions.has("ease") && drawsSlowly()) control.do("ease");
   }
 
   function connect() {

@@ -90,6 +90,14 @@
     }
   }
 
+  // True where the browser draws 3D on the processor: a scene then takes the time that the rest of the page needs.
+  function drawsSlowly() {
+    const brush = document.createElement("canvas").getContext("webgl");
+    const told = brush && brush.getExtension("WEBGL_debug_renderer_info");
+    const name = brush ? brush.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : brush.RENDERER) : "none";
+    return /swiftshader|llvmpipe|softpipe|software|none/i.test(name);
+  }
+
   // The scene while it runs, or its recording, which follows the slider.
   class ScenePanel {
     constructor(box) { this.box = box; this.address = null; this.recorded = false; }
@@ -158,5 +166,5 @@
     }
   }
 
-  Object.assign(window.errand, { Header, CameraPanel, ScenePanel, QuestionPanel, byId });
+  Object.assign(window.errand, { Header, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
 })();

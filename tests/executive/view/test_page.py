@@ -359,3 +359,11 @@ def test_a_page_elsewhere_reaches_nothing(browser, live, control, elsewhere):
     context.close()
     assert outcome == ["blocked", "opaque", "refused"]
     assert control.state.mode is Mode.RUNNING
+
+
+def test_a_browser_that_draws_on_the_processor_asks_for_fewer_pictures_of_the_scene(page):
+    eased = threading.Event()
+    with PageServer(PageContent(Feed(), {"ease": lambda values: str(eased.set())})) as server:
+        page.goto(server.url)
+        page.wait_for_timeout(500)
+        assert eased.wait(5)

@@ -1,0 +1,55 @@
+"""The live scene: served on this machine, and without any effect on the run."""
+
+import urllib.request
+
+import numpy as np
+import pytest
+
+from plant import live_scene
+from plant.simulation import Simulation
+from plant.worlds.world import load_world
+
+
+@pytest.fixture
+def simulation() -> Simulation:
+    return Simulation(load_world("flat"), seed=1, looks=False)
+
+
+def test_the_scene_is_served_on_this_machine(simulation):
+    scene = simulation.show_live()
+    with urllib.request.urlopen(scene.url) as answer:
+        assert b"meshcat" in answer.read().lower()
+
+
+@pytest.mark.parametrize(("easy", "refreshed"), [(False, 10), (True, 2)])
+def test_it_is_refreshed_a_few_times_a_second_of_the_wall(simulation, monkeypatch, easy, refreshed):
+    wall = {"s": 100.0}
+    monkeypatch.setattr(live_scene.time, "perf_counter", lambda: wall["s"])
+    scene = simulation.show_live()
+    if easy:
+        scene.go_easy()
+    shown = []
+    publish = scene.publish
+    monkeypatch.setattr(scene, "publish", lambda: (shown.append(wall["s"]), publish()))
+    for _ in range(32):
+        wall["s"] += 0.05
+        scene(0.0)
+    assert len(shown) == pytest.approx(1.6 * refreshed, rel=0.4)
+
+
+def test_it_shows_the_plant_as_it_is(simulation):
+    scene = simulation.show_live()
+    simulation.clock.advance(0.3)
+    scene.publish()
+    shown = scene._shown.plant.GetPositions(scene._shown_context)
+    assert np.array_equal(shown, simulation.engine.world.plant.GetPositions(simulation.engine.context))
+
+
+def test_a_run_is_the_same_with_it_and_without(simulation):
+    alone = Simulation(load_world("flat"), seed=1, looks=False)
+    simulation.show_live()
+    for each in (alone, simulation):
+        each.clock.advance(0.2)
+    plants = [each.engine.world.plant.GetPositions(each.engine.context) for each in (alone, simulation)]
+    assert np.array_equal(*plants)
+    assert alone.robots["Alice"].odometry().X_OB.IsExactlyEqualTo(simulation.robots["Alice"].odometry().X_OB)

@@ -6,6 +6,7 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from executive.behaviours.board import Board
 from executive.behaviours.context import RunContext
@@ -106,6 +107,22 @@ def run(
     return _Run(clock, worker, publish, settings, control, observer).run(entries)
 
 
+class _LastingLog:
+    """The log as the parts of a run see it: while a run is ending, a broken log keeps no robot from being stopped."""
+
+    def __init__(self, publish: Publish) -> None:
+        self._publish = publish
+        self.ending = False
+
+    def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
+        """Log a message. Raises what the log raises, but not while the run is ending."""
+        try:
+            self._publish(topic, message)
+        except Exception:
+            if not self.ending:
+                raise
+
+
 class _Run:
     """The state of one run."""
 
@@ -118,11 +135,11 @@ class _Run:
         control: Control,
         observer: Observer | None,
     ) -> None:
-        self._clock, self._worker, self._publish = clock, worker, publish
+        self._clock, self._worker, self._publish = clock, worker, _LastingLog(publish)
         self._settings, self._control, self._observer = settings, control, observer
         self._sessions: list[Session] = []
         self._ticks = 0
-        self._meter = TickMeter(publish, clock, limit_s=settings.tick_period_s)
+        self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
         self._begun_s, self._begun_wall_s = clock.now(), time.perf_counter()
         self._time = StoppableTime(clock)
 
@@ -135,8 +152,10 @@ class _Run:
             while not all(session.finished for session in self._sessions):
                 self._cycle()
         except (Exception, VerbHung, KeyboardInterrupt) as stop:
+            self._publish.ending = True
             ending = self._ending(stop)
         finally:
+            self._publish.ending = True
             for session in self._sessions:
                 session.close(ending)
             self._tell(self._control.end())
@@ -160,7 +179,11 @@ class _Run:
             ask=lambda question: self._control.ask(question, self._clock),
             stop_pressed=lambda: self._control.stop_pressed,
         )
-        return Session(entry.tree, context, keeper, self._control, entry.journal)
+        try:
+            return Session(entry.tree, context, keeper, self._control, entry.journal)
+        except BaseException:
+            keeper.give_back()
+            raise
 
     def _cycle(self) -> None:
         """One period: wishes are heeded, time passes, estimators see, trees tick."""

@@ -85,26 +85,51 @@ def tick_watch(robot_name: str, limit_s: float) -> Iterator[None]:
 @contextmanager
 def _alarm(limit_s: float, hung: Callable[[], VerbHung]) -> Iterator[None]:
     """Raise `hung()` when the block takes longer; an alarm around this one goes on counting."""
-    begun_s = time.monotonic()
     before = signal.getsignal(signal.SIGALRM)
-
-    def ring(number: int, frame: FrameType | None) -> None:
-        if time.monotonic() - begun_s >= limit_s - _ALARM_GRAIN_S:
-            raise hung()
-        if callable(before):
-            before(number, frame)
-
-    outer_s, _ = signal.setitimer(signal.ITIMER_REAL, 0.0)
+    outer = before if isinstance(before, _Ring) else None
+    ring = _Ring(limit_s, hung, outer)
+    foreign_s, _ = signal.setitimer(signal.ITIMER_REAL, 0.0)
     signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, min(limit_s, outer_s) if outer_s > 0.0 else limit_s)
+    ring.arm()
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-        if outer_s > 0.0:
-            left_s = outer_s - (time.monotonic() - begun_s)
-            signal.setitimer(signal.ITIMER_REAL, max(left_s, _ALARM_GRAIN_S))
+        if outer is not None:
+            outer.arm()
+        elif foreign_s > 0.0:
+            signal.setitimer(signal.ITIMER_REAL, max(foreign_s - ring.elapsed_s(), _ALARM_GRAIN_S))
+
+
+class _Ring:
+    """The handler of an alarm that knows of the one around it. Whichever is due first rings."""
+
+    def __init__(self, limit_s: float, hung: Callable[[], VerbHung], outer: _Ring | None) -> None:
+        self._begun_s = time.monotonic()
+        self._due_s, self._hung, self._outer = self._begun_s + limit_s, hung, outer
+
+    def __call__(self, _signal: int, _frame: FrameType | None) -> None:
+        self.raise_when_due(time.monotonic())
+        self.arm()  # it rang too early
+
+    def elapsed_s(self) -> float:
+        """How long the block has taken so far."""
+        return time.monotonic() - self._begun_s
+
+    def raise_when_due(self, now_s: float) -> None:
+        """Raise VerbHung for the outermost block whose time is over."""
+        if self._outer is not None:
+            self._outer.raise_when_due(now_s)
+        if now_s >= self._due_s:
+            raise self._hung()
+
+    def arm(self) -> None:
+        """Ring when the first block is due."""
+        signal.setitimer(signal.ITIMER_REAL, max(self._first_due_s() - time.monotonic(), _ALARM_GRAIN_S))
+
+    def _first_due_s(self) -> float:
+        return self._due_s if self._outer is None else min(self._due_s, self._outer._first_due_s())
 
 
 class _Helper:

@@ -29,7 +29,16 @@ from skills.testing.robot import ScriptedRobot
 CAPABILITIES = spot_capabilities()
 SENSES = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")
 USED = tuple(verb for verb in VERBS if verb != "take_lease")
-HANG_LIMITS = {"verb_limit_s": 0.1, "image_limit_s": 0.1}
+HANG_LIMITS = {"verb_limit_s": 0.2, "image_limit_s": 0.2}
+HANGS_S = 0.7
+
+
+@pytest.fixture(scope="module", autouse=True)
+def warm():
+    """What is compiled at first use is no hang."""
+    robot = ScriptedRobot(VirtualClock(), capabilities=CAPABILITIES)
+    robot.scan()
+    robot.image("hand")
 
 
 @dataclass(frozen=True)
@@ -109,7 +118,7 @@ def raising(call):
 
 
 def hanging(call):
-    time.sleep(0.5)
+    time.sleep(HANGS_S)
     return call.proceed()
 
 
@@ -181,7 +190,7 @@ def test_a_hang_ends_a_run_that_is_not_in_the_main_thread(tmp_path, verb):
     result, robot, topics = ended[0]
     assert result.outcome is (Outcome.SUCCESS if verb == "return_lease" else Outcome.ERROR)
     assert "outcome" in topics or verb == "acquire_lease"
-    time.sleep(0.6)  # what hung comes back, and finds that its lease no longer counts
+    time.sleep(HANGS_S)  # what hung comes back, and finds that its lease no longer counts
     assert robot.moving_parts == () or verb == "return_lease"
 
 
@@ -201,6 +210,33 @@ def test_a_skill_in_an_endless_loop_is_broken_off(compiled, run_tree, make, scri
     result = run_tree(compiled(*make.FETCH), settings={"tick_limit_s": 0.2})
     assert (result.outcome, result.worst.message) == (Outcome.ERROR, "a tick of Alice took longer than 0.2 s")
     assert (robot.driving, robot.holder, script.ended) == (False, None, script.begun)
+
+
+@pytest.mark.parametrize("written", [0, 3, 12])
+def test_a_log_that_breaks_ends_the_run_and_the_robot_stands(compiled, run_tree, make, script, robot, written):
+    left = iter(range(written))
+
+    def publish(topic, message):
+        if next(left, None) is None:
+            raise OSError("no space left on device")
+
+    result = run_tree(compiled(*make.FETCH), publish=publish)
+    assert (result.outcome, result.worst.cause) == (Outcome.ERROR, Cause.ERROR)
+    assert "no space left" in result.worst.message
+    assert (robot.driving, robot.holder, script.ended) == (False, None, script.begun)
+
+
+def test_a_clock_that_breaks_ends_the_run_and_the_robot_stands(compiled, run_tree, make, script, robot, clock):
+    whole = clock.advance
+
+    def advance(dt_s):
+        if clock.now() > 0.3:
+            raise OSError("the clock stands still")
+        whole(dt_s)
+
+    clock.advance = advance
+    result = run_tree(compiled(*make.FETCH))
+    assert (result.outcome, robot.driving, robot.holder) == (Outcome.ERROR, False, None)
 
 
 def test_garbage_is_named(clock):

@@ -13,8 +13,8 @@
   const OUTCOMES = { success: "success", failure: "failure", cancelled: "cancelled", error: "failure" };
 
   // What the pill says: the outcome when there is one, else the mode of the control, else what the tree says.
-  function modeOf(store, view) {
-    const control = store.live.control, outcome = view.outcomes[view.outcomes.length - 1];
+  function modeOf(store, view, replaying) {
+    const control = replaying ? null : store.live.control, outcome = view.outcomes[view.outcomes.length - 1];
     if (outcome) {
       const look = OUTCOMES[outcome.outcome] || "failure";
       return [look, LOOKS[look].symbol, outcome.outcome + (look === "failure" && outcome.cause ? ` (${outcome.cause})` : ""), outcome.message];
@@ -24,19 +24,25 @@
     return view.trees.length ? ["running", "▶", "running", ""] : ["idle", "○", "waiting", ""];
   }
 
+  // The mission's own node, whose path id has two parts; what watches over it stands above it.
+  function missionOf(root) {
+    if (root.id.split("/").length <= 2) return root;
+    return root.children.map(missionOf).find((node) => node.id.split("/").length === 2) || root;
+  }
+
   class Header {
     draw(store, view, replaying) {
       const tree = view.trees[view.trees.length - 1];
-      const title = tree ? `${tree.robot}: ${tree.root.name}` : "Errand";
-      byId("title").textContent = title;
-      document.title = tree ? `${tree.root.name} – Errand` : "Errand";
+      const mission = tree ? missionOf(tree.root).name : "";
+      byId("title").textContent = tree ? `${tree.robot}: ${mission}` : "Errand";
+      document.title = tree ? `${mission} – Errand` : "Errand";
       byId("clock").textContent = `${(replaying ? view.t : store.end).toFixed(1)} s`;
       byId("late").textContent = view.late;
       if (store.run) {
         byId("world").textContent = store.run.world;
         byId("seed").textContent = store.run.seed;
       }
-      const [look, symbol, text, why] = modeOf(store, view);
+      const [look, symbol, text, why] = modeOf(store, view, replaying);
       const pill = byId("mode");
       pill.dataset.look = look;
       pill.title = why || "";

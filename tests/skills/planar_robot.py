@@ -8,12 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numba import njit
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.api import SkillContext
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import GridMap
 from skills.estimate.localiser import ScanMatchingLocaliser
 from skills.estimate.planar import compose, inverse
 from skills.robot import (
@@ -31,6 +29,8 @@ from skills.robot import (
     Pose2D,
     Scan,
 )
+from skills.testing.blocks import Block as Box
+from skills.testing.blocks import block_array, cast_rays, grid_of
 
 OUTLINE = ((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25))
 BODY_HEIGHT_M = 0.52
@@ -42,18 +42,6 @@ X_BC = RigidTransform(
 )
 ELEVATIONS = np.deg2rad(np.arange(-15.0, 16.0, 2.0))
 LENS = Intrinsics(80, 60, 41.0, 41.0, 39.5, 29.5)
-
-
-@dataclass(frozen=True)
-class Box:
-    """An upright box from (x0, y0) to (x1, y1), from height z0 to z1."""
-
-    x0: float
-    y0: float
-    x1: float
-    y1: float
-    z0: float = 0.0
-    z1: float = 2.5
 
 
 TWO_ROOMS = (
@@ -71,42 +59,6 @@ TWO_ROOMS = (
     Box(4.4, 6.5, 5.6, 7.0, 0.0, 1.8),
 )
 """Two rooms side by side under a corridor 2.9 m wide; the way from one to the other leads through both doors."""
-
-
-def grid_of(boxes: Sequence[Box], band_m: tuple[float, float], resolution_m: float = 0.05) -> GridMap:
-    """The grid that a surveyor would make of the boxes that stand in a band of heights."""
-    x0, y0 = min(b.x0 for b in boxes) - 0.2, min(b.y0 for b in boxes) - 0.2
-    columns = math.ceil((max(b.x1 for b in boxes) + 0.2 - x0) / resolution_m)
-    rows = math.ceil((max(b.y1 for b in boxes) + 0.2 - y0) / resolution_m)
-    x = x0 + (np.arange(columns) + 0.5) * resolution_m
-    y = y0 + (np.arange(rows) + 0.5) * resolution_m
-    occupied = np.zeros((rows, columns), dtype=np.bool_)
-    for b in boxes:
-        if b.z0 < band_m[1] and b.z1 > band_m[0]:
-            occupied |= ((y > b.y0) & (y < b.y1))[:, None] & ((x > b.x0) & (x < b.x1))[None, :]
-    return GridMap(occupied, resolution_m, (x0, y0), height_band_m=band_m)
-
-
-@njit(cache=True)
-def cast_rays(origin, directions, boxes, limit):
-    """Distance along each direction (N, 3) to the nearest box or the floor; NaN beyond the limit."""
-    ranges = np.empty(directions.shape[0])
-    for n in range(directions.shape[0]):
-        best = limit
-        if directions[n, 2] < 0.0:
-            best = min(best, -origin[2] / directions[n, 2])
-        for b in range(boxes.shape[0]):
-            near, far = 0.0, best
-            for axis in range(3):
-                d = directions[n, axis]
-                d = d if abs(d) > 1e-12 else 1e-12
-                t0 = (boxes[b, axis] - origin[axis]) / d
-                t1 = (boxes[b, axis + 3] - origin[axis]) / d
-                near, far = max(near, min(t0, t1)), min(far, max(t0, t1))
-            if 0.0 < near < far:
-                best = near
-        ranges[n] = best if best < limit else np.nan
-    return ranges
 
 
 class PlanarClock:
@@ -183,7 +135,7 @@ class PlanarRobot:
         rays_C = np.stack([(u - LENS.cx) / LENS.fx, (v - LENS.cy) / LENS.fy, np.ones_like(u, dtype=float)], axis=-1)
         X_WC = self.pose.transform(BODY_HEIGHT_M) @ X_BC
         rays_W = rays_C.reshape(-1, 3) @ X_WC.rotation().matrix().T
-        depth = cast_rays(X_WC.translation(), np.ascontiguousarray(rays_W), self._box_array(), 4.0)
+        depth = cast_rays(X_WC.translation(), np.ascontiguousarray(rays_W), block_array(self.boxes), 4.0)[0]
         depth = np.nan_to_num(depth + 0.005 * self._rng.standard_normal(depth.shape), nan=0.0)
         grey = np.zeros((LENS.height, LENS.width), dtype=np.uint8)
         frames = FrameTree({"body": ("odom", self.odometry().X_OB), f"{source}_camera": ("body", X_BC)})
@@ -285,15 +237,12 @@ class PlanarRobot:
             self._commands[self._drive[0]] = CommandStatus(state, reason)
             self._drive = None
 
-    def _box_array(self) -> np.ndarray:
-        return np.array([(b.x0, b.y0, b.z0, b.x1, b.y1, b.z1) for b in self.boxes])
-
     def _sweep(self) -> Scan:
         X_WL = self.pose.transform(BODY_HEIGHT_M) @ X_BL
         e, a = ELEVATIONS[:, None], self._azimuths[None, :]
         rays = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e) + 0.0 * a], axis=-1).reshape(-1, 3)
         rays_W = np.ascontiguousarray(rays @ X_WL.rotation().matrix().T)
-        ranges = cast_rays(X_WL.translation(), rays_W, self._box_array(), 100.0)
+        ranges = cast_rays(X_WL.translation(), rays_W, block_array(self.boxes), 100.0)[0]
         ranges = ranges + 0.03 * self._rng.standard_normal(ranges.shape)
         ranges[ranges < 0.5] = np.nan
         shaped = ranges.reshape(len(ELEVATIONS), -1).astype(np.float32)

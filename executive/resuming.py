@@ -23,8 +23,8 @@ from executive.behaviours.explained import Explained
 from executive.behaviours.freshness import Remembered
 from executive.compiler import CompiledTree
 from executive.compiling.interrupts import InterruptsPlan
-from executive.compiling.plans import NodePlan, SkillPlan
-from executive.compiling.recovery import OnlyIfKnownPlan, RecoverPlan, RemedyPlan
+from executive.compiling.plans import NodePlan, SelectorPlan, SkillPlan
+from executive.compiling.recovery import OnlyIfHoldingPlan, OnlyIfKnownPlan, RecoverPlan, RemedyPlan
 from executive.store.recollection import Recollection
 from executive.store.records import Memory, StepRecord
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step
@@ -51,7 +51,7 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     skills = {node.path_id: node for node in _mission(tree.root).walk() if isinstance(node, SkillPlan)}
     kept = [path for path, plan in skills.items() if all(key in memory.board for _, key in plan.outputs)]
     recollection = Recollection(tree.path_ids, memory.steps).only(kept)
-    parents = {child.path_id: node.path_id for node in tree.root.walk() for child in node.children}
+    parents = {child.path_id: node for node in tree.root.walk() for child in node.children}
     change = _Change(memory, recollection, parents)
     root = tree.root
     if isinstance(root, InterruptsPlan):
@@ -73,7 +73,7 @@ class _Change:
 
     memory: Memory
     recollection: Recollection
-    parents: Mapping[str, str]
+    parents: Mapping[str, NodePlan]
 
     def all_of(self, plan: NodePlan) -> NodePlan:
         """The plan and all below, children first."""
@@ -99,9 +99,7 @@ class _Change:
             ports = {port: self.memory.board[key] for port, key in plan.outputs if key in self.memory.board}
             skill = resumed_skill(plan.skill, plan.path_id, ports, self.recollection)
             return dataclasses.replace(plan, skill=skill)
-        if isinstance(plan, OnlyIfKnownPlan):
-            if not self._begun(self.parents.get(plan.path_id)):
-                return plan
+        if isinstance(plan, OnlyIfKnownPlan | OnlyIfHoldingPlan) and self._was_reached(plan.path_id):
             return _built(plan, lambda node: _applies_as_before(node, self._begun(plan.path_id)))
         if isinstance(plan, RecoverPlan) and step is not None and step.status is Status.RUNNING:
             return dataclasses.replace(plan, forgets=())
@@ -118,8 +116,18 @@ class _Change:
         step = self.memory.steps.get(path_id)
         return step is not None and step.status is Status.FAILURE
 
-    def _begun(self, path_id: str | None) -> bool:
-        step = self.memory.steps.get(path_id or "")
+    def _was_reached(self, path_id: str) -> bool:
+        """Whether a way of a selector was gone or passed over, which a later one that was begun tells."""
+        parent = self.parents[path_id]
+        ways = [child.path_id for child in parent.children]
+        if not isinstance(parent, SelectorPlan):
+            return False
+        step = self.memory.steps.get(parent.path_id)
+        ended = step is not None and step.ended
+        return ended or any(map(self._begun, ways[ways.index(path_id) :]))
+
+    def _begun(self, path_id: str) -> bool:
+        step = self.memory.steps.get(path_id)
         return step is not None and step.status is not Status.INVALID
 
 

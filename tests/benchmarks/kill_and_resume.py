@@ -1,0 +1,131 @@
+"""Kills a mission at random moments of its robot's clock and takes it up; counts how often that ends right.
+
+Run it by hand, it takes a while: `python tests/benchmarks/kill_and_resume.py --moments 30`. The moments come from a
+seed; the process that runs the mission is killed with SIGKILL when its plant has come to the moment.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from executive.record.reader import read_events
+from plant.snapshot.file import SnapshotError, read_snapshot
+
+FETCH = ("Hey Alice, can you fetch me a drink from the kitchen", 60.0)
+TIDY = ("Hey Alice, take a drink from the kitchen to the sideboard", 75.0)
+MISSIONS = (FETCH, TIDY)
+STEP_S = 0.01
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One kill: at which moment (s) of which mission, and what came of it."""
+
+    number: int
+    sentence: str
+    moment_s: float
+    seed: int
+    killed: bool
+    right: bool
+    lifts: int
+    wall_s: float
+    message: str
+
+
+def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path) -> Trial:
+    """Run, kill, resume."""
+    begun = time.perf_counter()
+    command = [sys.executable, "-m", "executive.cli"]
+    asked = ["run", "--say", sentence, "--seed", str(seed), "--out", str(out), "--no-record", "--quiet", "--json"]
+    with (out / "first.txt").open("wb") as told:
+        process = subprocess.Popen([*command, *asked], stdout=told, stderr=subprocess.STDOUT)
+        killed = _kill_at(process, out / "missions.plant", moment_s)
+    ended = None
+    if killed:
+        again = [*command, "resume", "--store", str(out / "missions.sqlite"), "--quiet", "--json"]
+        ended = subprocess.run(again, capture_output=True, text=True, check=False)
+        (out / "second.txt").write_text(ended.stdout + ended.stderr)
+    text = (out / "first.txt").read_text() if ended is None else ended.stdout + ended.stderr
+    report = _report(text)
+    lifts = sum(" lifted the " in line and line.startswith("  ") for line in text.splitlines())
+    right = report.get("outcome") == "success" and bool(report["referee"]["success"]) and lifts == 1
+    message = f"{report.get('message', 'no report')} / {report.get('referee', {}).get('why', '')}"
+    wall_s = time.perf_counter() - begun
+    return Trial(number, sentence, moment_s, seed, killed, right and not _done_twice(out), lifts, wall_s, message)
+
+
+def _kill_at(process: subprocess.Popen[bytes], plant: Path, moment_s: float) -> bool:
+    """Kill the process when its plant's clock has come to the moment; False when it ended before."""
+    while process.poll() is None:
+        try:
+            now_s = read_snapshot(plant).values["engine"]["steps"] * STEP_S
+        except SnapshotError:
+            now_s = 0.0
+        if now_s >= moment_s:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            return True
+        time.sleep(0.01)
+    return False
+
+
+def _report(text: str) -> dict[str, Any]:
+    lines = [line for line in text.splitlines() if line.startswith("{")]
+    return dict(json.loads(lines[-1])) if lines else {}
+
+
+def _done_twice(out: Path) -> bool:
+    """Whether both logs tell that one leaf which changes the world did its work to the end."""
+    done: list[str] = []
+    for log in sorted(out.glob("log*.mcap")):
+        for event in read_events(log):
+            told = event.data
+            work = (
+                event.topic == "transitions" and told["to"] == "SUCCESS" and "before the restart" not in told["message"]
+            )
+            if work and told["node"].rsplit("/", 1)[-1] in ("grasp", "place"):
+                done.append(told["node"].rsplit("/", 1)[-1])
+    return len(done) > len(set(done))
+
+
+def main() -> None:
+    """All trials, and a table of them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--moments", type=int, default=30)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=None)
+    options = parser.parse_args()
+    rng = np.random.default_rng(options.seed)
+    folder = options.out or Path(tempfile.mkdtemp(prefix="errand-kills-"))
+    right = 0
+    for number in range(1, options.moments + 1):
+        sentence, length_s = MISSIONS[number % len(MISSIONS)]
+        moment_s = float(rng.uniform(0.2, length_s))
+        if number < options.first:
+            continue
+        out = folder / f"{number:02d}"
+        out.mkdir(parents=True, exist_ok=True)
+        done = trial(number, sentence, moment_s, number, out)
+        right += done.right
+        verdict = "right" if done.right else "WRONG"
+        when = f"killed at {moment_s:5.1f} s" if done.killed else "ended before the kill"
+        line = f"{number:3d}  {when}  {verdict}  {done.lifts} lifts  {done.wall_s:5.1f} s"
+        sys.stdout.write(f"{line}  {sentence[-30:]}: {done.message}\n")
+        sys.stdout.flush()
+    sys.stdout.write(f"{right} of {options.moments - options.first + 1} right\n")
+
+
+if __name__ == "__main__":
+    main()

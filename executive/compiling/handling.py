@@ -69,8 +69,8 @@ def pick_up_plan(
     """Find (`search`, which writes `key`), approach and grasp, with remedies; the arm is tucked in after a failure."""
     near, tried = f"{shop.path_id}/near-sighting", f"{shop.path_id}/tried-grasps"
     approach = shop.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
-    grasp, tries = _grasp_plan(shop, near, tried)
-    attempt = shop.at("pick-up").sequence(f"pick up {thing}", search, approach, tries)
+    grasp = _grasp_plan(shop, near, tried)
+    attempt = shop.at("pick-up").sequence(f"pick up {thing}", search, approach, grasp)
     look = PausePlan(
         path_id=f"{shop.path_id}/look-again", name="look again", source=shop.source, duration_s=LOOK_AGAIN_S
     )
@@ -98,17 +98,11 @@ def pick_up_plan(
     return tidied(shop.at("tidy"), attempts, only_after_failure=True)
 
 
-def _grasp_plan(shop: Workshop, near: str, tried: str) -> tuple[NodePlan, NodePlan]:
-    """The grasp, and the same with the arm drawn in when the thing is held though the grasp did not end well."""
+def _grasp_plan(shop: Workshop, near: str, tried: str) -> NodePlan:
+    """The grasp, told of those that were tried where the skill can be told."""
     memory = shop.has_ports("grasp", ("avoid",), ("tried",))
     inputs = {"observation": FromBoard(near), **({"avoid": FromBoardOr(tried, ())} if memory else {})}
-    grasp = shop.skill("grasp", inputs, {"tried": tried} if memory else {})
-    held = shop.at("held")
-    anyway = OnlyIfHoldingPlan(
-        path_id=held.path_id, name="held all the same", source=shop.source, child=held.skill("stow")
-    )
-    name = "take it"
-    return grasp, SelectorPlan(path_id=shop.at("take").path_id, name=name, source=shop.source, steps=(grasp, anyway))
+    return shop.skill("grasp", inputs, {"tried": tried} if memory else {})
 
 
 def tuck_plan(shop: Workshop) -> NodePlan:

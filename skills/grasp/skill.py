@@ -33,6 +33,7 @@ _SURFACE_AROUND_M = 0.2
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
 _LIFT_AGAIN_M = 0.1
+_DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 
 @dataclass(frozen=True)
@@ -243,8 +244,16 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.move_gripper(0.9 * self.open_rad, JAW_FORCE_N, "opening the jaw after the failure")
 
     def _draw_back(self) -> Routine[None]:
+        """Out of the thing's reach, since the closing jaw must not catch it."""
         ahead = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
-        yield from self.shift_hand(-PREGRASPS_M[-1] * ahead, "drawing back after the failure")
+        for distance_m in _DRAW_BACK_M:
+            try:
+                yield from self.shift_hand(-distance_m * ahead, "drawing back after the failure")
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING:
+                    raise
+            else:
+                break
         yield from self.move_gripper(0.0, JAW_FORCE_N, "closing the empty jaw")
 
     def _stand_down(self) -> Routine[None]:

@@ -171,16 +171,6 @@ def test_all_remedies_together_are_bounded(compiled, run_tree, script, fails):
     assert script.begun.count("grasp") == 4
 
 
-def test_a_thing_that_is_held_though_the_grasp_failed_is_taken_along(compiled, run_tree, script, fails):
-    def half(skill):
-        held(skill)
-        return Failed(Cause.PLANNING, "no way to carry it")
-
-    fails("grasp", then=half)
-    assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS
-    assert script.begun.count("grasp") == 1
-
-
 def test_a_failed_stow_after_a_good_grasp_is_tried_once_more(compiled, run_tree, script, fails):
     fails("stow", Cause.PLANNING)
     assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS

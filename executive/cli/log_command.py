@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -22,7 +23,7 @@ from executive.view.text import printable
 def log(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
     as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
-    every_node: Annotated[bool, typer.Option("--all", help="Also the inner nodes that did not fail.")] = False,
+    every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
 ) -> None:
     """Print what happened in a run: what each node did and why, commands, detections, overruns, the outcome."""
     with refusals():
@@ -38,14 +39,23 @@ def _table(history: History, every_node: bool) -> Table:
     table.columns[0].justify = "right"
     for column, share in ((2, 2), (3, 3)):
         table.columns[column].ratio, table.columns[column].overflow = share, "fold"
-    for entry in timeline(history.events, leaves_only=not every_node):
-        table.add_row(*_row(entry))
+    entries = list(timeline(history.events, leaves_only=not every_node))
+    prefix = _common([entry.about for entry in entries if entry.state is not None])
+    for entry in entries:
+        table.add_row(*_row(entry, prefix))
     return table
 
 
-def _row(entry: Entry) -> tuple[str | Text, ...]:
+def _common(path_ids: Sequence[str]) -> str:
+    """The parts, robot and mission, with which all path ids begin; empty where they differ."""
+    starts = {"/".join(path_id.split("/")[:2]) + "/" for path_id in path_ids}
+    return starts.pop() if len(starts) == 1 else ""
+
+
+def _row(entry: Entry, prefix: str) -> tuple[str | Text, ...]:
     if entry.state is None:
         return f"{entry.t:.2f}", "·", Text(entry.about, style="cyan"), Text(printable(entry.text))
     look = look_of(entry.state)
     symbol = Text(f"{look.symbol} {look.word}", style=look.style)
-    return f"{entry.t:.2f}", symbol, Text(printable(entry.about)), Text(printable(entry.text), style=look.style)
+    about = entry.about.removeprefix(prefix)
+    return f"{entry.t:.2f}", symbol, Text(printable(about)), Text(printable(entry.text), style=look.style)

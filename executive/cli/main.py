@@ -21,7 +21,7 @@ from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.new_skill_command import new_skill
 from executive.cli.output import BAD_INPUT, NOT_ACHIEVED, console_for, print_json, refusals
-from executive.cli.page_view import PageView
+from executive.cli.page_view import PageView, queueing
 from executive.cli.queue_command import queue
 from executive.cli.replay_command import replay
 from executive.cli.requests import Request
@@ -109,16 +109,22 @@ def run(
     """Run a sentence or a mission file in the simulated world."""
     console = console_for(as_json)
     wants_page = view or view_for is not None
+    kept_in = store or out / STORE
+
+    def page_of(request: Request) -> PageView | None:
+        later = queueing(request, world=world, store=kept_in, out=out, seed=seed)
+        return PageView(request, console, port=view_port, later=later) if wants_page else None
+
     with refusals():
         finished, page = _run_kept(
             Asked(file, say, world, not no_wake),
             seed,
             out,
-            store or out / STORE,
+            kept_in,
             record=not no_record,
             quiet=quiet,
             console=console,
-            page=lambda request: PageView(request, console, port=view_port) if wants_page else None,
+            page=page_of,
         )
     if as_json:
         print_json(finished.report.to_json())

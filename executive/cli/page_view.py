@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from executive.cli.durable import Asked
 from executive.cli.replay_command import served, wait
 from executive.cli.requests import Request
 from executive.compiler import compile_mission
@@ -22,6 +23,7 @@ from executive.record.schemas import MAP
 from executive.record.surroundings import map_message
 from executive.registry import built_in_skills
 from executive.runner import Progress
+from executive.store.missions import MissionStore
 from executive.view.actions import Action, RefusedError, control_actions, text_of
 from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer
@@ -34,8 +36,11 @@ from skills.estimate.grid_map import load_grid_map
 class PageView:
     """The page of one run: `begin` before it, called as an observer while it runs, `end` and `stay` after it."""
 
-    def __init__(self, request: Request, console: Console, *, port: int = 0) -> None:
-        self._request, self._console, self._port = request, console, port
+    def __init__(
+        self, request: Request, console: Console, *, port: int = 0, later: Callable[[str], str] | None = None
+    ) -> None:
+        """`later` queues a sentence and says so; without it the page offers no queue."""
+        self._request, self._console, self._port, self._later = request, console, port, later
         self.control = Control(attended=True)
         self._feed = Feed()
         self._threads = ThreadPoolExecutor(1, thread_name_prefix="errand-parser")
@@ -49,7 +54,8 @@ class PageView:
         log.listen(self._feed)
         self._parser = self._threads.submit(load_parser)
         scene = simulation.show_live()
-        actions = {**control_actions(self.control), "say": self._say(), "ease": easing(scene)}
+        sentences = {"say": said(self._preempt), **({} if self._later is None else {"queue": said(self._later)})}
+        actions = {**control_actions(self.control), **sentences, "ease": easing(scene)}
         content = PageContent(self._feed, actions, scene_url=scene.url)
         self._server = served(content, self._port)
         self._watch = ControlWatch(self.control, self._feed)
@@ -83,19 +89,8 @@ class PageView:
         if self._server is not None:
             self._server.close()
 
-    def _say(self) -> Action:
-        """An action that has a sentence done before all else."""
-
-        def say(values: Mapping[str, Any]) -> str:
-            sentence = text_of(values, "text")
-            try:
-                return f"first: {self._preempt(sentence)}"
-            except (InputError, ValueError) as error:
-                raise RefusedError(str(error)) from error
-
-        return say
-
     def _preempt(self, sentence: str) -> str:
+        """Have a sentence done before all else; says what it was understood as."""
         request = self._request
         mission = mission_from_sentence(
             sentence,
@@ -106,7 +101,34 @@ class PageView:
         )
         tree = compile_mission(mission, knowledge=request.knowledge, registry=built_in_skills())
         self.control.preempt(tree)
-        return "; ".join(map(str, mission.commands))
+        return f"first: {'; '.join(map(str, mission.commands))}"
+
+
+def said(do: Callable[[str], str]) -> Action:
+    """An action that does something with the sentence that was typed."""
+
+    def say(values: Mapping[str, Any]) -> str:
+        sentence = text_of(values, "text")
+        try:
+            return do(sentence)
+        except (InputError, ValueError) as error:
+            raise RefusedError(str(error)) from error
+
+    return say
+
+
+def queueing(request: Request, *, world: str | None, store: Path, out: Path, seed: int) -> Callable[[str], str]:
+    """Keeps a sentence in a store, as `errand queue add` does, in the world of a request (named `world` if it was)."""
+
+    def later(sentence: str) -> str:
+        asked = Asked(say=sentence, world=world or request.world.name)
+        understood = asked.request()
+        order = asked.order(understood, understood.compile(), seed=seed, out=out, record=True)
+        with MissionStore(store) as missions:
+            number = missions.add(order, queued=True).id
+        return f"queued as mission {number}: {'; '.join(order.commands)} (errand queue run --out {out})"
+
+    return later
 
 
 def easing(scene: LiveScene) -> Action:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
@@ -10,7 +10,7 @@ from typing import Any, Final
 from executive.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
 from executive.record.history import logged_state
 from executive.record.reader import Event
-from executive.record.schemas import ERRORS, OUTCOME, RUN, TRANSITIONS, TREE, WALL
+from executive.record.schemas import CONTROL, ERRORS, OUTCOME, RUN, TRANSITIONS, TREE, WALL
 from executive.snapshot import NodeState
 
 
@@ -25,16 +25,24 @@ class Entry:
 
 
 def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[Entry]:
-    """The entries of a log in order; `leaves_only` leaves the changes of inner nodes out that did not fail."""
+    """The entries of a log in order.
+
+    `leaves_only` leaves out the changes of inner nodes that did not fail, and single late ticks.
+    """
     inner: set[str] = set()
+    commands: Sequence[str] = ()
     for event in events:
+        if event.topic == RUN:
+            commands = event.data.get("commands", ())
         if event.topic == TREE:
             inner |= _inner_nodes(event.data["root"])
         if event.topic == TRANSITIONS:
             entry = _transition(event)
             if not leaves_only or entry.about not in inner or (entry.state is not None and entry.state.cause):
                 yield entry
-        elif event.topic in _TEXTS:
+        elif event.topic == TASK_TOPIC:
+            yield Entry(event.stamp_s, event.topic, _task(event.data, commands))
+        elif event.topic in _TEXTS and not (leaves_only and event.topic == WALL and "wall_time_s" not in event.data):
             text = _TEXTS[event.topic](event.data)
             if text:
                 yield Entry(event.stamp_s, event.topic, text)
@@ -62,9 +70,10 @@ def _outcome(data: Mapping[str, Any]) -> str:
     return f"{data.get('robot')}: {data.get('outcome')}{cause}: {data.get('message')}"
 
 
-def _task(data: Mapping[str, Any]) -> str:
-    count = f"command {data.get('task_count')} of {data.get('mission_count')}"
-    return f"{count} for {data.get('robot_name')}: {data.get('text') or 'objects ' + str(data.get('obj_type'))}"
+def _task(data: Mapping[str, Any], commands: Sequence[str]) -> str:
+    number = int(data.get("task_count", 0))
+    text = commands[number - 1] if 1 <= number <= len(commands) else f"objects {data.get('obj_type')}"
+    return f"command {number} of {data.get('mission_count')} for {data.get('robot_name')}: {text}"
 
 
 def _seen(data: Mapping[str, Any]) -> str:
@@ -84,7 +93,7 @@ _TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = MappingProxyTy
     {
         RUN: _run,
         OUTCOME: _outcome,
-        TASK_TOPIC: _task,
+        CONTROL: lambda data: f"{data.get('what')}: {data.get('message')}",
         DETECT_TOPIC: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
         DESTINATION_TOPIC: _seen,
         ERRORS: lambda data: str(data.get("traceback", "")).strip().splitlines()[-1:][0] if data else "",

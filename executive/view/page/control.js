@@ -12,7 +12,8 @@
       byId("step").addEventListener("click", () => this.do("step"));
       byId("cancel").addEventListener("click", () => this.do("cancel"));
       byId("stop").addEventListener("click", () => this.do(this.state && this.state.mode === "stopped" ? "release" : "stop"));
-      byId("say").addEventListener("submit", (event) => { event.preventDefault(); this.say(); });
+      byId("say").addEventListener("submit", (event) => { event.preventDefault(); this.say("say"); });
+      byId("after").addEventListener("click", () => this.say("queue"));
       document.addEventListener("keydown", (event) => this.key(event));
     }
 
@@ -20,6 +21,7 @@
       this.actions = new Set(actions);
       byId("controls").hidden = !this.actions.has("pause");
       byId("say").hidden = !this.actions.has("say");
+      byId("after").hidden = !this.actions.has("queue");
     }
 
     async do(name, values = {}) {
@@ -48,12 +50,12 @@
       }
     }
 
-    async say() {
+    async say(action) {
       const input = byId("sentence"), text = input.value.trim();
       if (!text) return;
       this.saying = true;
       this.tell("…", false);
-      if (await this.do("say", { text })) input.value = "";
+      if (await this.do(action, { text })) input.value = "";
       this.saying = false;
     }
 
@@ -67,13 +69,13 @@
       byId("stop").querySelector("span").textContent = stopped ? "Release" : "Stop";
       byId("stop").setAttribute("aria-pressed", stopped);
       for (const id of ["pause", "step", "cancel", "stop"]) byId(id).disabled = over;
-      byId("say").querySelectorAll("input, button").forEach((each) => { each.disabled = over; });
+      byId("say").querySelector("[type=submit]").disabled = over;
     }
 
     key(event) {
       const typing = event.target.closest("input[type=text], select, textarea");
       if (typing || event.ctrlKey || event.metaKey || event.altKey || byId("controls").hidden) return;
-      const button = { p: "pause", s: "step", c: "cancel", x: "stop" }[event.key];
+      const button = { p: "pause", s: "step", c: "cancel", x: "stop", " ": event.target === document.body && "pause" }[event.key];
       if (button && !byId(button).disabled) {
         byId(button).click();
         event.preventDefault();

@@ -127,7 +127,7 @@
     setTheme(chosen);
   });
   document.addEventListener("keydown", (event) => {
-    if (event.key === " " && event.target === document.body) { timeline.toggle(); event.preventDefault(); }
+    if (event.key === " " && event.target === document.body && !event.defaultPrevented) { timeline.toggle(); event.preventDefault(); }
   });
 
   if (recorded) {

@@ -29,8 +29,12 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
         skill.context.robot._robot.holding = False
         return Succeeded("put down")
 
+    def hold(skill):
+        skill.context.robot._robot.holding = True
+        return Succeeded("held", dict.fromkeys(skills["grasp"].outputs, ()))
+
     script.seen_on = SURFACES_WITH_THINGS
-    script.ends["place"] = put_down
+    script.ends |= {"place": put_down, "grasp": hold}
     registry = {name: make.scripted_skill(script, name, one.Inputs, one.outputs) for name, one in skills.items()}
 
     def run_file(name):

@@ -1,0 +1,175 @@
+"""The store: states, claims, and files that cannot be used."""
+
+import multiprocessing
+import sqlite3
+
+import pytest
+from py_trees.common import Status
+
+from executive.errors import InputError
+from executive.journal import TickNote
+from executive.snapshot import NodeState, Transition
+from executive.store.missions import MissionState, MissionStore, Order
+from skills.api import Cause
+from skills.robot import Pose2D
+
+ORDER = Order("fetch drink", "flat", "Alice", 3, "out", ("Take ...",), "print", sentence="fetch me a drink")
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "deep" / "missions.sqlite"
+
+
+def changed(path_id, status, cause=None, message=""):
+    return Transition(path_id, NodeState(), NodeState(status, cause, message))
+
+
+def note(*changes, now_s=1.0, board=None, pose=None, checkpoints=None):
+    return TickNote(now_s, changes, board or {}, pose, checkpoints or {})
+
+
+def test_missions_keep_their_order_and_states(path):
+    with MissionStore(path) as store:
+        first, second = (store.add(ORDER, queued=queued) for queued in (True, False))
+        store.begin(first.id)
+        store.finish(first.id, MissionState.FAILURE, "no drink")
+    with MissionStore(path, create=False) as store:
+        done, waiting = store.missions()
+        assert (done.id, done.state, done.message, done.starts) == (first.id, MissionState.FAILURE, "no drink", 1)
+        assert waiting == second
+        assert store.missions(MissionState.QUEUED) == (second,)
+        assert done.order == ORDER
+
+
+def test_notes_are_there_for_another_process_after_each_tick(path):
+    with MissionStore(path) as store:
+        journal = store.journal(store.add(ORDER, queued=False).id)
+        pose = Pose2D(1.0, 2.0, 0.5)
+        journal.note(note(changed("a/b", Status.RUNNING), board={"alice/x": pose}, pose=pose))
+        journal.note(note(now_s=2.0, checkpoints={"a/b": {"spot": [1.0, 2.0]}}))
+        with MissionStore(path) as other:
+            memory = other.memory(1)
+            assert memory.steps["a/b"].checkpoint == {"spot": [1.0, 2.0]}
+            assert (memory.board, memory.pose) == ({"alice/x": pose}, pose)
+        journal.note(note(changed("a/b", Status.FAILURE, Cause.PLANNING, "no way"), now_s=3.0))
+        step = store.memory(1).steps["a/b"]
+        assert (step.status, step.cause, step.message, step.clock_s) == (Status.FAILURE, Cause.PLANNING, "no way", 3.0)
+        assert step.checkpoint == {}
+
+
+def test_a_store_that_is_locked_for_a_while_loses_no_note(path):
+    with MissionStore(path) as store:
+        journal = store.journal(store.add(ORDER, queued=False).id)
+        store._connection.execute("PRAGMA busy_timeout = 10")
+        other = sqlite3.connect(path, isolation_level=None)
+        other.execute("BEGIN IMMEDIATE")
+        journal.note(note(changed("a", Status.SUCCESS)))
+        assert "locked" in journal.troubles[0]
+        other.execute("COMMIT")
+        other.close()
+        journal.note(note(changed("b", Status.RUNNING)))
+        assert set(store.memory(1).steps) == {"a", "b"}
+
+
+def test_values_that_cannot_be_kept_are_told_and_left_out(path):
+    with MissionStore(path) as store:
+        journal = store.journal(store.add(ORDER, queued=False).id)
+        journal.note(note(changed("a", Status.SUCCESS), board={"alice/f": print}))
+        assert store.memory(1).board == {}
+        assert "alice/f" in journal.troubles[0]
+
+
+def test_an_unknown_mission_is_refused_with_those_known(path):
+    with MissionStore(path) as store:
+        with pytest.raises(InputError, match="no mission 7; the store is empty"):
+            store.mission(7)
+        store.add(ORDER, queued=True)
+        with pytest.raises(InputError, match="no mission 7; known are 1"):
+            store.remove(7)
+
+
+def test_removing_a_mission_forgets_its_steps(path):
+    with MissionStore(path) as store:
+        store.journal(store.add(ORDER, queued=True).id).note(note(changed("a", Status.SUCCESS)))
+        store.remove(1)
+        assert store._connection.execute("SELECT count(*) FROM step").fetchone() == (0,)
+
+
+def test_a_missing_store_is_refused(path):
+    with pytest.raises(InputError, match="there is no store; run or queue a mission first"):
+        MissionStore(path, create=False)
+
+
+def test_a_damaged_store_is_refused(path):
+    path.parent.mkdir()
+    path.write_bytes(b"no database at all" * 100)
+    with pytest.raises(InputError, match=r"the store is damaged .* move it away"):
+        MissionStore(path)
+
+
+def test_a_store_cut_off_in_the_middle_is_refused(path):
+    with MissionStore(path) as store:
+        for _ in range(200):
+            store.add(ORDER, queued=True)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2] + b"\0" * 100)
+    with pytest.raises(InputError, match="damaged"), MissionStore(path, create=False) as store:
+        store.missions()
+
+
+def test_another_programs_database_is_refused(path):
+    path.parent.mkdir()
+    with sqlite3.connect(path) as other:
+        other.execute("CREATE TABLE recipes (name)")
+    other.close()
+    with pytest.raises(InputError, match="no store of missions; name another file"):
+        MissionStore(path)
+
+
+def test_a_store_of_another_version_is_refused(path):
+    MissionStore(path).close()
+    with sqlite3.connect(path) as other:
+        other.execute("PRAGMA user_version = 9")
+    other.close()
+    with pytest.raises(InputError, match="version 9, and this errand reads 1"):
+        MissionStore(path)
+
+
+def test_a_folder_in_place_of_the_store_is_refused(tmp_path):
+    with pytest.raises(InputError, match="cannot use the store"):
+        MissionStore(tmp_path)
+
+
+def test_a_value_that_cannot_be_read_names_the_mend(path):
+    with MissionStore(path) as store:
+        store.add(ORDER, queued=True)
+        store._connection.execute("INSERT INTO value VALUES (1, 'alice/x', '{')")
+        with pytest.raises(InputError, match=r"mission 1 cannot be taken up.*queue remove 1"):
+            store.memory(1)
+
+
+def _hold(path, held, release):
+    with MissionStore(path) as store, store.claimed():
+        held.set()
+        release.wait(10)
+
+
+def test_two_processes_do_not_run_missions_of_one_store(path):
+    context = multiprocessing.get_context("spawn")
+    held, release = context.Event(), context.Event()
+    process = context.Process(target=_hold, args=(path, held, release))
+    process.start()
+    try:
+        assert held.wait(30)
+        with (
+            MissionStore(path) as store,
+            pytest.raises(InputError, match=f"process {process.pid} runs a mission"),
+            store.claimed(),
+        ):
+            pass
+    finally:
+        process.kill()
+        process.join()
+    with MissionStore(path) as store, store.claimed():
+        pass

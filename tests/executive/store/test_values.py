@@ -1,0 +1,89 @@
+"""Blackboard values come back from the store equal and of the same type."""
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from executive.store.values import from_text, to_text
+from skills.api import ObjectObservation, Surface, Thing
+from skills.robot import CommandState, Pose2D
+
+SEEN = ObjectObservation(12.5, Thing("coke", ("red",)), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.3, 0.9, "counter")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        True,
+        3,
+        0.1 + 0.2,
+        float("inf"),
+        "a [bracket] and \N{DEGREE SIGN}",
+        SEEN,
+        Pose2D(1.0, -2.0, 0.1),
+        (Surface("shelf", ((0.0, 1.0), (2.0, 3.0)), 1.0), "x"),
+        ["a", (1, 2)],
+        {"a": (1, 2), (1, 2): "b"},
+        frozenset({"a", "b"}),
+        CommandState.DONE,
+    ],
+    ids=repr,
+)
+def test_values_come_back_equal(value):
+    again = from_text(to_text(value))
+    assert again == value
+    assert type(again) is type(value)
+
+
+def test_arrays_keep_shape_and_type():
+    array = np.arange(6, dtype=np.float32).reshape(2, 3)
+    again = from_text(to_text(array))
+    assert np.array_equal(again, array)
+    assert again.dtype == array.dtype
+
+
+def test_transforms_come_back_to_the_last_bit():
+    X = Pose2D(0.1, 0.2, 0.3).transform(0.4)
+    again = from_text(to_text(X))
+    assert isinstance(again, RigidTransform)
+    assert np.array_equal(again.GetAsMatrix34(), X.GetAsMatrix34())
+
+
+def test_what_cannot_be_kept_is_refused():
+    with pytest.raises(TypeError, match="function cannot be kept"):
+        to_text((1, lambda: 0))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{",
+        "[1]",
+        '{"$kind": "spell"}',
+        '{"a": 1}',
+        '{"$kind": "dataclass", "class": "gone.away:Thing", "fields": {}}',
+        '{"$kind": "dataclass", "class": "skills.api:Thing", "fields": {"colour": "red"}}',
+        '{"$kind": "dataclass", "class": "os:system", "fields": {}}',
+        '{"$kind": "enum", "class": "skills.api:Thing", "name": "A"}',
+    ],
+)
+def test_damaged_text_and_classes_that_are_gone_are_refused(text):
+    with pytest.raises(ValueError, match=r".+"):
+        from_text(text)
+
+
+def test_classes_inside_functions_are_refused_when_read():
+    @dataclass(frozen=True)
+    class Local:
+        n: int
+
+    class Colour(enum.Enum):
+        RED = 1
+
+    for value in (Local(1), Colour.RED):
+        with pytest.raises(ValueError, match="no class"):
+            from_text(to_text(value))

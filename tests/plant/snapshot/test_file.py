@@ -1,0 +1,62 @@
+"""The snapshot's files: whole after a kill at any byte, refused when damaged."""
+
+import numpy as np
+import pytest
+
+from plant.snapshot.file import SnapshotError, SnapshotFile, encoded, read_snapshot
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "kept.plant"
+
+
+def content(number, value):
+    array = np.full((2, 3), float(value))
+    return encoded(number, {"value": value}, {"x": (array.shape, array.tobytes())})
+
+
+def test_the_newest_is_read(path):
+    file = SnapshotFile(path)
+    for value in (1, 2, 3):
+        file.write(content(file.next_number, value))
+    snapshot = read_snapshot(path)
+    assert (snapshot.number, snapshot.values, snapshot.arrays["x"].tolist()) == (3, {"value": 3}, [[3.0] * 3] * 2)
+
+
+def test_a_write_that_was_cut_off_leaves_the_one_before(path):
+    file = SnapshotFile(path)
+    for value in (1, 2):
+        file.write(content(file.next_number, value))
+    third = content(file.next_number, 3)
+    for size in range(0, len(third), 7):
+        slot = path.with_name("kept.plant.a")
+        slot.write_bytes(third[:size] + slot.read_bytes()[size:])
+        assert read_snapshot(path).values["value"] == 2
+
+
+def test_a_shorter_one_over_a_longer_one_is_read(path):
+    file = SnapshotFile(path)
+    file.write(encoded(file.next_number, {"value": "long" * 99}, {}))
+    file.write(content(file.next_number, 2))
+    file.write(content(file.next_number, 3))
+    assert read_snapshot(path).values["value"] == 3
+
+
+def test_another_process_goes_on_counting_and_spares_the_newest(path):
+    file = SnapshotFile(path)
+    for value in (1, 2, 3):
+        file.write(content(file.next_number, value))
+    file.close()
+    again = SnapshotFile(path)
+    again.write(content(again.next_number, 4)[:30])
+    assert read_snapshot(path).values["value"] == 3
+
+
+def test_nothing_damaged_or_foreign_is_read(path):
+    with pytest.raises(SnapshotError, match=r"No such file.*run the mission again"):
+        read_snapshot(path)
+    for slot in ("a", "b"):
+        path.with_name(f"kept.plant.{slot}").write_bytes(b"something else")
+    with pytest.raises(SnapshotError, match="no snapshot that this errand reads"):
+        read_snapshot(path)

@@ -1,0 +1,107 @@
+"""A plant goes on from the state that another plant kept."""
+
+import time
+
+import numpy as np
+import pytest
+
+from plant.simulation import Simulation
+from plant.snapshot.file import SnapshotError, read_snapshot
+from plant.snapshot.keeper import SnapshotKeeper
+from plant.worlds.world import load_world
+from skills.robot import LeaseError
+
+WORLD = load_world("flat")
+
+
+def make(seed=3):
+    return Simulation(WORLD, seed=seed, looks=False)
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """A plant that was given up while its robot walked, and where it kept its state."""
+    simulation, path = make(), tmp_path_factory.mktemp("kept") / "flat.plant"
+    simulation.keep_in(path, label="7")
+    robot = simulation.robots["Alice"]
+    lease = robot.acquire_lease("test")
+    for _ in range(30):
+        robot.drive(0.6, 0.0, 0.4, until_s=simulation.clock.now() + 0.5, lease=lease)
+        robot.set_gripper(0.6, 30.0, until_s=simulation.clock.now() + 0.5, lease=lease)
+        simulation.clock.advance(0.05)
+    return simulation, path
+
+
+@pytest.fixture(scope="module")
+def restored(kept):
+    simulation = make()
+    simulation.restore(kept[1], label="7")
+    return simulation
+
+
+def positions(simulation):
+    engine = simulation.engine
+    return engine.world.plant.GetPositions(engine.context)
+
+
+def test_the_robot_stops_where_it_was_and_nobody_has_its_lease(kept, restored):
+    before, robot = kept[0], restored.robots["Alice"]
+    assert restored.clock.now() == pytest.approx(before.clock.now() + 1.5)
+    pose, was = robot.odometry().pose, before.robots["Alice"].odometry().pose
+    assert np.hypot(pose.x_m - was.x_m, pose.y_m - was.y_m) < 0.15
+    assert np.linalg.norm(robot.odometry().velocity) < 0.05
+    robot.return_lease(robot.acquire_lease("somebody else"))
+    with pytest.raises(LeaseError):
+        before.robots["Alice"].acquire_lease("somebody else")
+
+
+def test_things_stay_where_they_were(kept, restored):
+    for name in restored.referee._stories:
+        was, now = (each.referee._stories[name].last.p_WO for each in (kept[0], restored))
+        assert np.linalg.norm(now - was) < 0.002
+
+
+def test_sensors_go_on_with_their_errors(kept, restored):
+    was, now = (each.robots["Alice"] for each in (kept[0], restored))
+    assert now.battery().charge == pytest.approx(was.battery().charge, abs=0.01)
+    assert now.gripper().opening_rad == pytest.approx(was.gripper().opening_rad, abs=0.1)
+    assert now.scan() is not None
+
+
+def test_the_referees_record_goes_on(kept, restored):
+    way_before, way_after = (each.referee.path("Alice") for each in (kept[0], restored))
+    assert np.array_equal(way_after[: len(way_before)], way_before)
+
+
+def test_two_plants_go_on_alike(kept, restored):
+    other = make()
+    other.restore(kept[1], label="7")
+    assert np.array_equal(positions(other), positions(restored))
+    assert other.robots["Alice"].odometry() is not restored.robots["Alice"].odometry()
+    assert str(other.robots["Alice"].odometry().pose) == str(restored.robots["Alice"].odometry().pose)
+
+
+def test_a_state_of_another_simulation_is_refused(kept):
+    with pytest.raises(SnapshotError, match=r"another simulation \(seed\)"):
+        make(seed=4).restore(kept[1], label="7")
+    with pytest.raises(SnapshotError, match=r"another simulation \(label\)"):
+        make().restore(kept[1], label="8")
+
+
+def test_another_mission_begins_a_new_chapter_in_the_same_world(kept):
+    simulation = make()
+    simulation.restore(kept[1], label=None)
+    assert len(simulation.referee.path("Alice")) < 20
+    assert simulation.referee.drops == 0
+
+
+def test_keeping_the_state_takes_less_than_a_millisecond(kept, tmp_path):
+    simulation, _ = kept
+    keeper = SnapshotKeeper(tmp_path / "timed.plant", simulation.engine, simulation.referee, {}, ["Alice"])
+    times = []
+    for _ in range(100):
+        begun = time.perf_counter()
+        keeper()
+        times.append(time.perf_counter() - begun)
+    assert np.median(times) < 1e-3
+    assert read_snapshot(tmp_path / "timed.plant").number == 100

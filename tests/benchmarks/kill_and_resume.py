@@ -22,8 +22,8 @@ import numpy as np
 from executive.record.reader import read_events
 from plant.snapshot.file import SnapshotError, read_snapshot
 
-FETCH = ("Hey Alice, can you fetch me a drink from the kitchen", 60.0)
-TIDY = ("Hey Alice, take a drink from the kitchen to the sideboard", 75.0)
+FETCH = ("Hey Alice, can you fetch me a drink from the kitchen", 50.0)
+TIDY = ("Hey Alice, take a drink from the kitchen to the sideboard", 60.0)
 MISSIONS = (FETCH, TIDY)
 STEP_S = 0.01
 
@@ -36,7 +36,6 @@ class Trial:
     sentence: str
     moment_s: float
     seed: int
-    killed: bool
     right: bool
     lifts: int
     wall_s: float
@@ -44,25 +43,26 @@ class Trial:
 
 
 def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path) -> Trial:
-    """Run, kill, resume."""
+    """Run, kill, resume; a mission that has ended before the moment is killed at an earlier one."""
+    out.mkdir(parents=True, exist_ok=True)
     begun = time.perf_counter()
     command = [sys.executable, "-m", "executive.cli"]
     asked = ["run", "--say", sentence, "--seed", str(seed), "--out", str(out), "--no-record", "--quiet", "--json"]
     with (out / "first.txt").open("wb") as told:
         process = subprocess.Popen([*command, *asked], stdout=told, stderr=subprocess.STDOUT)
         killed = _kill_at(process, out / "missions.plant", moment_s)
-    ended = None
-    if killed:
-        again = [*command, "resume", "--store", str(out / "missions.sqlite"), "--quiet", "--json"]
-        ended = subprocess.run(again, capture_output=True, text=True, check=False)
-        (out / "second.txt").write_text(ended.stdout + ended.stderr)
-    text = (out / "first.txt").read_text() if ended is None else ended.stdout + ended.stderr
+    if not killed:
+        return trial(number, sentence, 0.7 * moment_s, seed, out / "earlier")
+    again = [*command, "resume", "--store", str(out / "missions.sqlite"), "--quiet", "--json"]
+    ended = subprocess.run(again, capture_output=True, text=True, check=False)
+    text = ended.stdout + ended.stderr
+    (out / "second.txt").write_text(text)
     report = _report(text)
     lifts = sum(" lifted the " in line and line.startswith("  ") for line in text.splitlines())
     right = report.get("outcome") == "success" and bool(report["referee"]["success"]) and lifts == 1
     message = f"{report.get('message', 'no report')} / {report.get('referee', {}).get('why', '')}"
     wall_s = time.perf_counter() - begun
-    return Trial(number, sentence, moment_s, seed, killed, right and not _done_twice(out), lifts, wall_s, message)
+    return Trial(number, sentence, moment_s, seed, right and not _done_twice(out), lifts, wall_s, message)
 
 
 def _kill_at(process: subprocess.Popen[bytes], plant: Path, moment_s: float) -> bool:
@@ -115,13 +115,11 @@ def main() -> None:
         moment_s = float(rng.uniform(0.2, length_s))
         if number < options.first:
             continue
-        out = folder / f"{number:02d}"
-        out.mkdir(parents=True, exist_ok=True)
-        done = trial(number, sentence, moment_s, number, out)
+
+        done = trial(number, sentence, moment_s, number, folder / f"{number:02d}")
         right += done.right
         verdict = "right" if done.right else "WRONG"
-        when = f"killed at {moment_s:5.1f} s" if done.killed else "ended before the kill"
-        line = f"{number:3d}  {when}  {verdict}  {done.lifts} lifts  {done.wall_s:5.1f} s"
+        line = f"{number:3d}  killed at {done.moment_s:5.1f} s  {verdict}  {done.lifts} lifts  {done.wall_s:5.1f} s"
         sys.stdout.write(f"{line}  {sentence[-30:]}: {done.message}\n")
         sys.stdout.flush()
     sys.stdout.write(f"{right} of {options.moments - options.first + 1} right\n")

@@ -17,7 +17,7 @@ from plant.models.catalogue import load_catalogue
 from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
-from plant.spot.robot import spot_capabilities
+from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
 from skills.detect.appearance import load_appearance
 from skills.estimate.costmap import LayeredCostmap

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +11,15 @@ from pydrake.systems.framework import Context
 
 from plant.locomotion.carrier import Velocity
 from plant.locomotion.trot import BodyMotion, Trot
-from plant.models.spot.description import LEGS, spot_facts, spot_urdf
+from plant.models.spot.description import spot_facts
 from plant.snapshot.values import State, array_of
+from plant.spot.capabilities import nominal_footholds, spot_capabilities
 from plant.spot.commands import CommandBook, Part
 from plant.spot.leases import LeaseDesk
-from plant.spot.model import JAW, SpotModel
+from plant.spot.model import SpotModel
 from plant.spot.sensing import SpotSensors
 from plant.spot.servos import JawGoal, LegServos, arm_set_point, jaw_set_point
 from skills.robot import (
-    ArmCapabilities,
     ArmTrajectory,
     Battery,
     Capabilities,
@@ -28,7 +27,6 @@ from skills.robot import (
     CommandState,
     CommandStatus,
     Gripper,
-    GripperCapabilities,
     Image,
     Imu,
     Joints,
@@ -397,33 +395,3 @@ def _moved(X_WB: RigidTransform, before: BodyMotion, after: BodyMotion) -> Rigid
 def _planar(motion: BodyMotion) -> RigidTransform:
     c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
     return RigidTransform(np.array([[c, -s, 0, motion.x_m], [s, c, 0, motion.y_m], [0, 0, 1, 0], [0, 0, 0, 1]]))
-
-
-def nominal_footholds() -> FloatArray:
-    """Resting places of the feet in the body frame, (4, 2), ordered as LEGS."""
-    facts = spot_facts()["legs"]
-    x = facts["hip"]["offset"][0]
-    y = facts["hip"]["offset"][1] + facts["upper_leg"]["offset"][1]
-    signs: dict[str, Any] = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
-    return np.array([[sx * x, sy * y] for sx, sy in (signs[leg] for leg in LEGS)], dtype=np.float64)
-
-
-def spot_capabilities() -> Capabilities:
-    """Spot's capabilities, from the facts."""
-    facts = spot_facts()
-    body, gripper = facts["capabilities"], facts["gripper"]
-    arm_names = tuple(part["link"] for part in facts["arm"][:-1])
-    return Capabilities(
-        footprint_m=tuple((float(x), float(y)) for x, y in body["footprint"]),
-        max_speed_m_s=body["max_speed"],
-        max_turn_rate_rad_s=body["max_turn_rate"],
-        standing_height_m=body["standing_height"],
-        height_range_m=tuple(body["height_range"]),
-        pitch_range_rad=tuple(body["pitch_range"]),
-        arm=ArmCapabilities(arm_names, body["max_reach"], tuple(facts["stowed"][name] for name in arm_names)),
-        gripper=GripperCapabilities(
-            JAW, gripper["open"], gripper["max_opening"], gripper["max_force"], gripper["depth"]
-        ),
-        camera_sources=("hand", "frontleft", "frontright", "left", "right", "back"),
-        description=spot_urdf(),
-    )

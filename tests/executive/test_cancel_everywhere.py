@@ -11,7 +11,7 @@ from executive.control import Control
 from executive.outcome import Outcome
 from executive.runner import RunEntry, RunSettings, run
 from executive.worker import LockStepWorker
-from plant.spot.robot import spot_capabilities
+from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, ObjectObservation, Running, Skill, Succeeded, Thing
 from skills.robot import ArmTrajectory
 from skills.testing.clock import VirtualClock

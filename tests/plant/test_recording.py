@@ -33,5 +33,5 @@ def test_the_animation_is_one_html_file_with_the_robot_in_it(engine, tmp_path):
     path = tmp_path / "recording.html"
     save_html(engine.world, recorder.frames, path)
     text = path.read_text()
-    assert "<html" in text and "src=\"http" not in text
+    assert "<html" in text and 'src="http' not in text
     assert len(text) > 100_000

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from executive.worker import LockStepWorker
-from plant.spot.robot import spot_capabilities
+from plant.spot.capabilities import spot_capabilities
 from skills.api import Failed, LocalisationEstimate, Running, SkillContext
 from skills.arm.kinematics import arm_model
 from skills.robot import (

@@ -49,7 +49,10 @@ def _settings(config: pytest.Config) -> SkillTestSettings:
             "scripted": import_module("executive.testing.trial").scripted_maker(capabilities),
             "plant": _plant_maker,
         }
-        skills = import_module("executive.registry").installed_skills()
+        try:
+            skills = import_module("executive.registry").installed_skills()
+        except import_module("executive.errors").InputError as error:
+            raise pytest.UsageError(str(error)) from error
         settings = import_module("executive.testing.collect").SkillTestSettings(skills, makers, capabilities)
         config.stash[_SETTINGS] = settings
         config.hook.pytest_errand_skill_tests(settings=settings)
@@ -66,7 +69,7 @@ def _plant_maker(robot: Any, world: Any) -> SkillBench:
 
 def _spot() -> Capabilities:
     import_module("logging").getLogger(_QUIET).setLevel("WARNING")
-    capabilities: Capabilities = import_module("plant.spot.robot").spot_capabilities()
+    capabilities: Capabilities = import_module("plant.spot.capabilities").spot_capabilities()
     return capabilities
 
 

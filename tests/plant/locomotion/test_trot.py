@@ -3,7 +3,7 @@ import math
 import numpy as np
 
 from plant.locomotion.trot import BodyMotion, Trot
-from plant.spot.robot import nominal_footholds
+from plant.spot.capabilities import nominal_footholds
 
 DT_S = 0.01
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.spot.robot import spot_capabilities
+from plant.spot.capabilities import spot_capabilities
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
 from skills.arm.motion import plan_joint_path, plan_line, time_path

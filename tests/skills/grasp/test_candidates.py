@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant.spot.robot import spot_capabilities
+from plant.spot.capabilities import spot_capabilities
 from skills.arm.kinematics import arm_model
 from skills.grasp.candidates import JawGeometry, Target, grasp_candidates
 from skills.grasp.planning import within_reach

@@ -1,0 +1,44 @@
+"""What the simulated Spot is and can do, from the facts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.models.spot.description import LEGS, spot_facts, spot_urdf
+from plant.spot.model import JAW
+from skills.robot import ArmCapabilities, Capabilities, GripperCapabilities
+
+FloatArray = NDArray[np.float64]
+
+
+def nominal_footholds() -> FloatArray:
+    """Resting places of the feet in the body frame, (4, 2), ordered as LEGS."""
+    facts = spot_facts()["legs"]
+    x = facts["hip"]["offset"][0]
+    y = facts["hip"]["offset"][1] + facts["upper_leg"]["offset"][1]
+    signs: dict[str, Any] = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
+    return np.array([[sx * x, sy * y] for sx, sy in (signs[leg] for leg in LEGS)], dtype=np.float64)
+
+
+def spot_capabilities() -> Capabilities:
+    """Spot's capabilities, from the facts."""
+    facts = spot_facts()
+    body, gripper = facts["capabilities"], facts["gripper"]
+    arm_names = tuple(part["link"] for part in facts["arm"][:-1])
+    return Capabilities(
+        footprint_m=tuple((float(x), float(y)) for x, y in body["footprint"]),
+        max_speed_m_s=body["max_speed"],
+        max_turn_rate_rad_s=body["max_turn_rate"],
+        standing_height_m=body["standing_height"],
+        height_range_m=tuple(body["height_range"]),
+        pitch_range_rad=tuple(body["pitch_range"]),
+        arm=ArmCapabilities(arm_names, body["max_reach"], tuple(facts["stowed"][name] for name in arm_names)),
+        gripper=GripperCapabilities(
+            JAW, gripper["open"], gripper["max_opening"], gripper["max_force"], gripper["depth"]
+        ),
+        camera_sources=("hand", "frontleft", "frontright", "left", "right", "back"),
+        description=spot_urdf(),
+    )

@@ -1,0 +1,77 @@
+"""`errand run --view`: sentences from the page are done first or queued; a whole mission is told while it runs."""
+
+import io
+import json
+import re
+import subprocess
+import sys
+from contextlib import suppress
+
+import pytest
+from rich.console import Console
+from websockets.exceptions import WebSocketException
+from websockets.sync.client import connect
+
+from executive.cli.durable import Asked
+from executive.cli.page_view import PageView, queueing
+from executive.cli.page_view import said as sentence_action
+from executive.store.missions import MissionState, MissionStore
+from executive.view.actions import RefusedError
+
+
+@pytest.fixture(scope="module")
+def request_():
+    return Asked(say="go to the kitchen").request()
+
+
+@pytest.fixture
+def page(request_):
+    page = PageView(request_, Console(file=io.StringIO()))
+    page.control.begin({"Alice": request_.compile()})
+    yield page
+    page.close()
+
+
+def test_a_sentence_becomes_a_mission_that_is_done_first(page):
+    say = sentence_action(page._preempt)
+    assert "[bathroom]" in say({"text": "go to the bathroom"})
+    (tree,) = page.control.heed().preempts
+    assert [command.goal for command in tree.commands] == ["bathroom"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("go to the moon", "moon"), ("what time is it", "understand"), ("  ", "needs a text"), (3, "needs a text")],
+)
+def test_a_sentence_that_is_not_understood_is_refused_with_the_reason(page, text, words):
+    with pytest.raises(RefusedError, match=words):
+        sentence_action(page._preempt)({"text": text})
+    assert page.control.heed().preempts == ()
+
+
+def test_a_sentence_is_queued_for_later(request_, tmp_path):
+    later = queueing(request_, world=None, store=tmp_path / "missions.sqlite", out=tmp_path, seed=5)
+    assert later("go to the bathroom").startswith("queued as mission 1")
+    with MissionStore(tmp_path / "missions.sqlite", create=False) as missions:
+        (mission,) = missions.missions(MissionState.QUEUED)
+    assert (mission.order.sentence, mission.order.seed, mission.order.world_name) == ("go to the bathroom", 5, "flat")
+
+
+@pytest.mark.mission
+def test_a_mission_is_told_to_the_page_while_it_runs_and_after(tmp_path):
+    said = ["--say", "go to the hall", "--no-wake", "--quiet", "--no-record", "--json"]
+    command = [sys.executable, "-m", "executive.cli", "run", *said, "--view-for", "2", "--out", str(tmp_path)]
+    told: list[dict] = []
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None and process.stdout is not None
+        lines = iter(process.stderr.readline, "")
+        address = next(match for line in lines if (match := re.search(r"http://([\d.:]+)/\?(token=[\w-]+)", line)))
+        with connect(f"ws://{address[1]}/feed?{address[2]}", proxy=None) as socket, suppress(WebSocketException):
+            while True:
+                told.extend(json.loads(socket.recv(timeout=60)))
+        process.stderr.read()
+        report = json.loads(process.stdout.read().splitlines()[-1])
+    topics = {message.get("topic") or message.get("live") for message in told}
+    assert report["outcome"] == "success"
+    assert {"hello", "map", "run", "tree", "transitions", "pose", "path", "progress", "control", "outcome"} <= topics
+    assert next(message["data"]["outcome"] for message in told if message.get("topic") == "outcome") == "success"

@@ -39,6 +39,7 @@ _ACCELERATION_M_S2 = 2.5
 _BRAKING_M_S2 = 8.0
 _RISE_M_S = 0.4
 _JAW_RAD_S = 3.0
+_ARM_RAD_S = 4.0
 _SCAN_PERIOD_S = 0.1
 _TRAJECTORY_START_RAD = 0.25
 _BATTERY_RUNTIME_S = 5400.0
@@ -102,8 +103,7 @@ class ScriptedRobot:
         self.velocity: FloatArray = np.zeros(3)
         self.odometry_scale, self.yaw_drift_rad_per_m = 1.0, 0.0
         self.height_m, self.pitch_rad = capabilities.standing_height_m, 0.0
-        self.q_rad, self.arm_rate_rad_s = self._first_angles(start), 0.0
-        self.in_jaw_rad = start.in_jaw_rad
+        self.q_rad = self._first_angles(start)
         self.opening_rad = (start.in_jaw_rad or 0.3) if start.holding else 0.0
         self.in_jaw_rad = self.opening_rad if start.holding else start.in_jaw_rad
         self.jaw_force_n = 20.0 if start.holding else 0.0
@@ -125,8 +125,6 @@ class ScriptedRobot:
         if arm is None:
             return np.zeros(0)
         return np.array(start.arm_rad or arm.stowed_rad[: len(arm.joint_names)], dtype=np.float64)
-
-    # -- know and sense -------------------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
@@ -202,8 +200,6 @@ class ScriptedRobot:
         self.calls.append("faults")
         return self.present_faults
 
-    # -- act ------------------------------------------------------------------------------------------------------
-
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Walk at a body-frame velocity until the clock reads until_s."""
         fault = "" if all(map(math.isfinite, (vx, vy, wz))) else f"velocity ({vx}, {vy}, {wz}) is not finite"
@@ -221,16 +217,18 @@ class ScriptedRobot:
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follow a joint trajectory from about where the arm is."""
-        fault = ""
-        if self._capabilities.arm is None:
-            fault = "there is no arm"
-        elif trajectory.positions_rad.shape[1] != len(self.q_rad):
-            fault = f"the arm has {len(self.q_rad)} joints, not {trajectory.positions_rad.shape[1]}"
-        elif float(np.max(np.abs(trajectory.positions_rad[0] - self.q_rad))) > _TRAJECTORY_START_RAD + 4.0 * float(
-            trajectory.times_s[0]
-        ):
-            fault = "the trajectory does not begin where the arm is"
+        fault = self._arm_fault(trajectory)
         return self._begin("move_arm", (trajectory, self.q_rad.copy()), until_s, lease, fault)
+
+    def _arm_fault(self, trajectory: ArmTrajectory) -> str:
+        """Why the arm cannot follow a trajectory; empty when it can."""
+        if self._capabilities.arm is None:
+            return "there is no arm"
+        if trajectory.positions_rad.shape[1] != len(self.q_rad):
+            return f"the arm has {len(self.q_rad)} joints, not {trajectory.positions_rad.shape[1]}"
+        off = float(np.max(np.abs(trajectory.positions_rad[0] - self.q_rad)))
+        near = off <= _TRAJECTORY_START_RAD + _ARM_RAD_S * float(trajectory.times_s[0])
+        return "" if near else "the trajectory does not begin where the arm is"
 
     def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Move the jaw; it stops where something lies between its fingers."""
@@ -249,8 +247,6 @@ class ScriptedRobot:
         """What became of a command. Raises KeyError for an id never given."""
         self.calls.append("command_status")
         return self._commands.status(command)
-
-    # -- own ------------------------------------------------------------------------------------------------------
 
     def acquire_lease(self, holder: str) -> Lease:
         """Take a free lease. Raises LeaseError when another holds it."""
@@ -276,8 +272,6 @@ class ScriptedRobot:
         """The lease that counts now; None while it is free."""
         return self._lease
 
-    # -- the test's side ------------------------------------------------------------------------------------------
-
     @property
     def moving_parts(self) -> tuple[str, ...]:
         """What truly moves now: "drive", "stand", "move_arm", "set_gripper"."""
@@ -299,12 +293,13 @@ class ScriptedRobot:
         return self._commands.begin(part, goal, self._clock.now(), until_s)
 
     def _X_WB(self) -> RigidTransform:
-        return self.pose.transform(self.height_m) @ RigidTransform(RollPitchYaw(0.0, self.pitch_rad, 0.0), [0, 0, 0])
+        return self.pose.transform(self.height_m) @ self._tilt()
 
     def _X_OB(self) -> RigidTransform:
-        return self.odometry_pose.transform(self.height_m) @ RigidTransform(
-            RollPitchYaw(0.0, self.pitch_rad, 0.0), [0, 0, 0]
-        )
+        return self.odometry_pose.transform(self.height_m) @ self._tilt()
+
+    def _tilt(self) -> RigidTransform:
+        return RigidTransform(RollPitchYaw(0.0, self.pitch_rad, 0.0), [0.0, 0.0, 0.0])
 
     def _pass_time(self, dt_s: float) -> None:
         self._commands.expire(self._clock.now())

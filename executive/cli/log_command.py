@@ -15,6 +15,7 @@ from rich.text import Text
 
 from executive.cli.output import refusals
 from executive.record.history import History, read_history
+from executive.record.ros2 import write_ros2
 from executive.record.timeline import Entry, timeline
 from executive.view.looks import look_of
 from executive.view.text import printable
@@ -23,11 +24,15 @@ from executive.view.text import printable
 def log(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
     as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
+    ros2: Annotated[Path | None, typer.Option(help="Write it anew as a ROS 2 bag (MCAP), and end.")] = None,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
 ) -> None:
     """Print what happened in a run: what each node did and why, commands, detections, overruns, the outcome."""
     with refusals():
         history = read_history(file)
+        if ros2 is not None:
+            typer.echo(f"{write_ros2(history.events, ros2)} messages in {ros2}", err=True)
+            return
         if as_json:
             sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
             return

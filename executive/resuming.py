@@ -193,8 +193,13 @@ def _applies_as_before(node: Any, applied: bool) -> None:
     vars(node)["applies"] = lambda: answers.pop() if answers else asked()
 
 
+def told_before(message: str) -> bool:
+    """Whether a node's sentence is that of a result from before a restart."""
+    return message.endswith(f"({BEFORE})")
+
+
 def _before(message: str) -> str:
-    return message if message.endswith(f"({BEFORE})") else f"{message} ({BEFORE})"
+    return message if told_before(message) else f"{message} ({BEFORE})"
 
 
 def resumed_skill(

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 
+from executive.behaviours.skill_leaf import ERROR_TOPIC
 from executive.cli.assembly import judge, run_entry, simulate
 from executive.cli.durable import Durable
 from executive.cli.page_view import PageView, log_map
@@ -78,6 +79,8 @@ def run_request(
                 control=heeded,
                 observer=both(observer, page),
             )
+        for trouble in () if durable is None else durable.journal.troubles:
+            log(ERROR_TOPIC, {"node": tree.robot_name, "what": "keep the mission's state", "traceback": trouble})
     finally:
         log.close()
     verdict = judge(simulation, tree, request.knowledge, result.worst)

@@ -11,6 +11,7 @@ import numpy as np
 
 from executive.messages import DESTINATION_TOPIC
 from executive.record.schemas import TRANSITIONS
+from executive.resuming import told_before
 from plant.pictures import Bounds, Picture, best_view, draw_detection, draw_map, render_view, save_png, top_view
 from plant.simulation import Simulation
 from skills.api import Publish
@@ -35,7 +36,7 @@ class Souvenirs:
             self._seen = message
         if topic == DESTINATION_TOPIC and self.detection is None:
             self.detection = self._seen
-        if topic == TRANSITIONS and message["to"] == "SUCCESS":
+        if topic == TRANSITIONS and message["to"] == "SUCCESS" and not told_before(str(message["message"])):
             self._note(str(message["node"]), float(message["t"]))
         self._publish(topic, message)
 
@@ -46,11 +47,16 @@ class Souvenirs:
 
 
 def draw_souvenirs(souvenirs: Souvenirs, simulation: Simulation, robot_name: str, folder: Path) -> Sequence[Path]:
-    """Write the pictures of a recorded run into `folder` as PNG; gives their paths."""
+    """Write the pictures of a recorded run into `folder` as PNG; gives their paths.
+
+    What happened before a restart was not recorded by this process, and is left out.
+    """
     pictures = {"map": _map(simulation, robot_name)}
     if souvenirs.detection is not None:
         pictures["detection"] = _detection(souvenirs.detection)
-    lifts = [("grasp", lift.time_s) for lift in simulation.referee.lifts(robot_name)[-1:]]
+    begun_s = simulation.recorder.at(0.0).time_s if simulation.recorder is not None else 0.0
+    last = simulation.referee.lifts(robot_name)[-1:]
+    lifts = [("grasp", lift.time_s) for lift in last if lift.time_s >= begun_s]
     for name, time_s in (*lifts, *souvenirs.moments.items()):
         pictures[name] = _view(simulation, robot_name, time_s)
     paths = [folder / f"{name}.png" for name in pictures]

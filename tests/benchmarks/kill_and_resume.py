@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from executive.record.reader import read_events
+from executive.resuming import told_before
 from plant.snapshot.file import SnapshotError, read_snapshot
 
 FETCH = ("Hey Alice, can you fetch me a drink from the kitchen", 50.0)
@@ -115,7 +116,6 @@ def main() -> None:
         moment_s = float(rng.uniform(0.2, length_s))
         if number < options.first:
             continue
-
         done = trial(number, sentence, moment_s, number, folder / f"{number:02d}")
         right += done.right
         verdict = "right" if done.right else "WRONG"

@@ -1,0 +1,216 @@
+"""Queue and resume on the command line, without a plant: what is kept, in which order it is run, what is refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+from py_trees.common import Status
+from typer.testing import CliRunner
+
+from executive.cli import main, queue_run, requests, resume_command
+from executive.cli.mission_run import Finished
+from executive.cli.report import RefereeReport, RunReport
+from executive.journal import TickNote
+from executive.snapshot import NodeState, Transition
+from executive.store.missions import MissionStore
+from executive.view.model import node_view
+
+
+class GoneError(BaseException):
+    """The process is killed."""
+
+
+class Plant:
+    """Stands in for `run_request`: notes one finished leaf, then ends as the test says."""
+
+    def __init__(self):
+        self.runs = []
+        self.outcomes = []
+
+    def __call__(self, request, tree, *, seed, out, record, durable, observer=None, control=None, page=None):
+        out.mkdir(parents=True, exist_ok=True)
+        durable.plant.with_name(f"{durable.plant.name}.a").touch()
+        self.runs.append((request.mission.name, seed, out.name, durable))
+        leaf = next(node.path_id for node in tree.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id)
+        done = Transition(leaf, NodeState(), NodeState(Status.SUCCESS, None, "done"))
+        durable.journal.note(TickNote(1.0, (done,), {}, None, {}))
+        outcome = self.outcomes.pop(0) if self.outcomes else "success"
+        if outcome == "killed":
+            raise GoneError
+        return Finished(report(outcome), node_view(tree.root))
+
+
+def report(outcome):
+    referee = RefereeReport(outcome == "success", "seen", 0, 0)
+    return RunReport(outcome, None, "done", referee, (), "flat", 1, 1.0, 1.0, 1.0, 20, "log.mcap")
+
+
+@pytest.fixture
+def plant(monkeypatch):
+    stand_in = Plant()
+    for module in (main, queue_run, resume_command):
+        monkeypatch.setattr(module, "run_request", stand_in)
+    monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
+    return stand_in
+
+
+@pytest.fixture
+def mission(tmp_path: Path):
+    def write(name, place="kitchen"):
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(f"name: {name}\nsteps:\n  - {{to: {place}}}\n  - {{to: bedroom}}\n")
+        return str(path)
+
+    return write
+
+
+@pytest.fixture
+def errand(tmp_path):
+    def invoke(*arguments):
+        where = ("--store", str(tmp_path / "out" / "missions.sqlite"))
+        out = () if arguments[0] == "resume" else ("--out", str(tmp_path / "out"))
+        return CliRunner().invoke(main.app, [*arguments, *where, *out])
+
+    return invoke
+
+
+@pytest.fixture
+def states(tmp_path):
+    def read():
+        with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+            return [mission.state.value for mission in store.missions()]
+
+    return read
+
+
+def test_missions_are_run_in_the_order_in_which_they_came(errand, mission, plant, states):
+    for name in ("first", "second"):
+        assert errand("queue", "add", mission(name), "--seed", "4").exit_code == 0
+    assert errand("queue", "run", "--quiet").exit_code == 0
+    assert [run[:3] for run in plant.runs] == [("first", 4, "001-first"), ("second", 4, "002-second")]
+    assert [run[3].take_up for run in plant.runs] == [False, True]
+    assert states() == ["success", "success"]
+
+
+def test_a_mission_with_another_seed_begins_in_a_fresh_world(errand, mission, plant):
+    errand("queue", "add", mission("first"), "--seed", "4")
+    errand("queue", "add", mission("second"), "--seed", "5")
+    errand("queue", "run", "--quiet")
+    assert [run[3].take_up for run in plant.runs] == [False, False]
+
+
+def test_one_that_fails_does_not_keep_the_next_from_being_run(errand, mission, plant, states):
+    plant.outcomes = ["failure"]
+    errand("queue", "add", mission("first"))
+    errand("queue", "add", mission("second"))
+    result = errand("queue", "run", "--quiet", "--json")
+    assert result.exit_code == 1
+    assert [each["achieved"] for each in json.loads(result.stdout.splitlines()[-1])["missions"]] == [False, True]
+    assert states() == ["failure", "success"]
+
+
+def test_a_cancelled_one_ends_the_run_of_the_queue(errand, mission, plant, states):
+    plant.outcomes = ["cancelled"]
+    errand("queue", "add", mission("first"))
+    errand("queue", "add", mission("second"))
+    assert errand("queue", "run", "--quiet").exit_code == 1
+    assert states() == ["cancelled", "queued"]
+
+
+def test_the_list_tells_states_and_numbers(errand, mission, plant):
+    errand("queue", "add", mission("first"))
+    errand("queue", "add", mission("second"))
+    assert errand("queue", "remove", "1").exit_code == 0
+    told = json.loads(errand("queue", "list", "--json").stdout.splitlines()[-1])
+    assert [(each["mission"], each["state"], each["name"]) for each in told["missions"]] == [(2, "queued", "second")]
+
+
+def test_a_bad_mission_is_not_queued(errand, mission, states):
+    result = errand("queue", "add", mission("bad", place="kitschen"))
+    assert result.exit_code == 2
+    assert "did you mean 'kitchen'" in result.output
+
+
+def test_resume_goes_on_with_what_was_killed_and_then_with_the_queue(errand, mission, plant, states):
+    plant.outcomes = ["killed"]
+    errand("queue", "add", mission("first"))
+    errand("queue", "add", mission("second"))
+    with pytest.raises(GoneError):
+        errand("queue", "run", "--quiet")
+    assert states() == ["running", "queued"]
+    result = errand("queue", "run", "--quiet")
+    assert (result.exit_code, "`errand resume` goes on with it" in result.output) == (2, True)
+    result = errand("resume", "--quiet", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout.splitlines()[-1])
+    assert (told["mission"], [each["mission"] for each in told["then"]]) == (1, [2])
+    assert [(run[0], run[3].log, run[3].take_up_label) for run in plant.runs[1:]] == [
+        ("first", "log-2.mcap", "1"),
+        ("second", "log.mcap", None),
+    ]
+    assert states() == ["success", "success"]
+
+
+def test_a_killed_run_is_resumed_with_its_own_seed_and_folder(errand, mission, plant, states):
+    plant.outcomes = ["killed"]
+    with pytest.raises(GoneError):
+        errand("run", mission("alone"), "--seed", "9", "--quiet", "--no-record")
+    assert states() == ["running"]
+    assert errand("resume", "--quiet").exit_code == 0
+    assert [run[:3] for run in plant.runs] == [("alone", 9, "out")] * 2
+
+
+def test_a_mission_file_that_was_changed_is_taken_as_it_was(errand, mission, plant, tmp_path):
+    plant.outcomes = ["killed"]
+    with pytest.raises(GoneError):
+        errand("run", mission("alone"), "--quiet")
+    mission("alone", place="sideboard")
+    assert errand("resume", "--quiet").exit_code == 0
+    assert (tmp_path / ".alone.mission-1.yaml").read_text().splitlines()[2] == "  - {to: kitchen}"
+
+
+def test_another_run_gives_up_what_was_broken_off(errand, mission, plant, states):
+    plant.outcomes = ["killed"]
+    with pytest.raises(GoneError):
+        errand("run", mission("alone"), "--quiet")
+    result = errand("run", mission("other"), "--quiet")
+    assert "Mission 1 (alone) had been broken off; it is given up." in result.output
+    assert states() == ["cancelled", "success"]
+
+
+def test_nothing_to_resume_is_refused_with_the_mend(errand, mission, plant):
+    result = errand("resume")
+    assert (result.exit_code, "there is no store; run or queue a mission first" in result.output) == (2, True)
+    errand("queue", "add", mission("first"))
+    result = errand("resume")
+    assert (result.exit_code, "no mission was broken off; `errand queue run`" in result.output) == (2, True)
+    errand("queue", "run", "--quiet")
+    result = errand("resume", "--mission", "1")
+    assert (result.exit_code, "mission 1 is success; name one that is" in result.output) == (2, True)
+    result = errand("resume", "--mission", "8")
+    assert (result.exit_code, "there is no mission 8; known are 1" in result.output) == (2, True)
+
+
+def test_a_tree_that_is_no_longer_the_same_is_refused(errand, mission, plant, tmp_path):
+    plant.outcomes = ["killed"]
+    with pytest.raises(GoneError):
+        errand("run", mission("alone"), "--quiet")
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+        store._connection.execute("UPDATE mission SET fingerprint = 'other'")
+    result = errand("resume")
+    assert (result.exit_code, "begun with another version" in result.output) == (2, True)
+
+
+def test_a_run_that_cannot_begin_leaves_no_mission_behind(errand, mission, monkeypatch, states):
+    def refuse(*_, **__):
+        raise main.InputError("the world is full")
+
+    monkeypatch.setattr(main, "run_request", refuse)
+    assert errand("run", mission("alone"), "--quiet").exit_code == 2
+    assert states() == []
+
+
+def test_only_one_process_runs_missions_of_a_store(errand, mission, plant, tmp_path):
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store, store.claimed():
+        result = errand("run", mission("alone"), "--quiet")
+    assert (result.exit_code, "runs a mission of this store" in result.output) == (2, True)

@@ -62,7 +62,7 @@ def _broken_off(missions: MissionStore, number: int | None) -> StoredMission:
 def _go_on(missions: MissionStore, mission: StoredMission, console: Console, *, quiet: bool) -> dict[str, Any]:
     """Go on with one mission; its report with what was done with its past."""
     order, out = mission.order, Path(mission.order.out)
-    if not missions.memory(mission.id).steps:
+    if not missions.has_steps(mission.id):
         console.print(f"Mission {mission.id} ({order.name}) had not begun; it begins now.", markup=False)
         return start_of(missions, mission, console, quiet=quiet)
     taken = take_up(missions, mission)

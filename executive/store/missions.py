@@ -131,8 +131,16 @@ class MissionStore:
             ended = (state.value, message, number)
             self._connection.execute("UPDATE mission SET state = ?, message = ? WHERE id = ?", ended)
 
+    def has_steps(self, number: int) -> bool:
+        """Whether anything was done of a mission."""
+        return bool(self._rows("SELECT 1 FROM step WHERE mission = ? LIMIT 1", number))
+
     def memory(self, number: int) -> Memory:
-        """All that is known of how far a mission has come. Raises InputError when it cannot be read."""
+        """All that is known of how far a mission has come, once the skills are loaded that it was done with.
+
+        Raises:
+            InputError: it cannot be read.
+        """
         steps = self._rows("SELECT * FROM step WHERE mission = ?", number)
         values = self._rows("SELECT key, text FROM value WHERE mission = ?", number)
         try:

@@ -92,9 +92,7 @@ def _done_twice(out: Path) -> bool:
     for log in sorted(out.glob("log*.mcap")):
         for event in read_events(log):
             told = event.data
-            work = (
-                event.topic == "transitions" and told["to"] == "SUCCESS" and "before the restart" not in told["message"]
-            )
+            work = event.topic == "transitions" and told["to"] == "SUCCESS" and not told_before(told["message"])
             if work and told["node"].rsplit("/", 1)[-1] in ("grasp", "place"):
                 done.append(told["node"].rsplit("/", 1)[-1])
     return len(done) > len(set(done))

@@ -17,6 +17,7 @@ from executive.cli.page_view import PageView, log_map
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Request
 from executive.cli.souvenirs import Souvenirs, draw_souvenirs
+from executive.cli.warm_up import warm_up
 from executive.compiler import CompiledTree
 from executive.control import Control
 from executive.outcome import RunResult
@@ -61,6 +62,7 @@ def run_request(
     if durable is not None:
         entry = replace(entry, journal=durable.journal)
         durable.begin(simulation)
+    warm_up(entry)
     clock = simulation.clock
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     souvenirs = Souvenirs(log)

@@ -1,0 +1,22 @@
+"""Lets the numeric code be compiled, or read from its cache, before the clock runs."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from executive.runner import RunEntry
+from skills.navigate.footprint import Footprint
+from skills.navigate.planner import PlanningError, plan_path
+from skills.robot import Pose2D
+
+
+def warm_up(entry: RunEntry) -> None:
+    """Take in the robot's first scan and plan a short way; the first time on a machine this takes some seconds."""
+    robot, localiser, costmap = entry.robot, entry.localiser, entry.costmap
+    localiser.update(robot)
+    estimate = localiser.estimate()
+    costmap.update(robot, estimate)
+    here = Pose2D.from_transform(estimate.X_WO @ robot.odometry().X_OB)
+    there = Pose2D(here.x_m, here.y_m, here.yaw_rad + 0.5)
+    with suppress(PlanningError):
+        plan_path(costmap, Footprint.of(robot.capabilities()), here, there)

@@ -45,7 +45,11 @@ _FORMS: Final[Mapping[TreeFormat, Callable[[NodeView, bool], str]]] = MappingPro
         TreeFormat.JSON: lambda view, _: json.dumps(to_json(view), ensure_ascii=False) + "\n",
     }
 )
-_WHOLE: Final = frozenset({TreeFormat.XML, TreeFormat.JSON})  # for programs, which do not mind a large tree
+_MOST: Final[Mapping[TreeFormat, int]] = (
+    MappingProxyType(  # programs, which read the other forms, do not mind a large tree
+        {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: MANY_NODES // 2, TreeFormat.MERMAID: MANY_NODES // 2}
+    )
+)
 
 
 def tree(
@@ -54,7 +58,7 @@ def tree(
     world: Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")] = None,
     form: Annotated[TreeFormat, typer.Option("--format", help="How to show it.")] = TreeFormat.TEXT,
     depth: Annotated[int | None, typer.Option(min=0, help="Show only so many levels below the root.")] = None,
-    most: Annotated[int, typer.Option(min=1, help="Fold what is done or not begun above so many nodes.")] = MANY_NODES,
+    most: Annotated[int | None, typer.Option(min=1, help="Fold what is done or not begun above so many nodes.")] = None,
     at: Annotated[float | None, typer.Option(min=0.0, help="Of a log: at this time (s), not at its end.")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Write it to this file.")] = None,
     ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
@@ -63,7 +67,8 @@ def tree(
     with refusals():
         whole = _view(file, say, world, at)
         shown = whole if depth is None else folded_below(whole, depth)
-        text = _FORMS[form](shown if form in _WHOLE else folded_to(shown, most), ascii_only)
+        few = most or _MOST.get(form)
+        text = _FORMS[form](shown if few is None else folded_to(shown, few), ascii_only)
         if output is None:
             sys.stdout.write(text)
         else:

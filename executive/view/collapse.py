@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+
+from py_trees.common import Status
 
 from executive.view.model import NodeView
 from executive.view.text import closed
@@ -26,20 +29,25 @@ def folded_below(root: NodeView, depth: int) -> NodeView:
 def folded_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
     """The tree with at most about `most` nodes in sight.
 
-    Subtrees that succeeded or have not begun are folded, the deepest first, until few enough are left; the way to
-    what runs, failed or was cancelled always stays in sight, and so do the root and its children.
+    Subtrees that have not begun are folded first, then those that succeeded, the deepest first, until few enough are
+    left. The way to what runs, failed or was cancelled always stays in sight, and so do the root and its children.
     """
     deepest = max(depth for depth, _ in root.walk())
     shown = root
-    for level in range(deepest, 0, -1):
-        if sum(1 for _ in shown.walk()) <= most:
-            break
-        shown = _folded_closed(root, level, 0)
+    for foldable in (_idle, closed):
+        for level in range(deepest, 0, -1):
+            if sum(1 for _ in shown.walk()) <= most:
+                return shown
+            shown = _folded(shown, foldable, level, 0)
     return shown
 
 
-def _folded_closed(node: NodeView, level: int, depth: int) -> NodeView:
-    """The node with all closed nodes at `level` or deeper folded."""
-    if depth >= level and closed(node) and all(closed(below) for _, below in node.walk()):
+def _folded(node: NodeView, foldable: Callable[[NodeView], bool], level: int, depth: int) -> NodeView:
+    """The node with every subtree at `level` or deeper folded whose nodes are all foldable."""
+    if depth >= level and all(foldable(below) for _, below in node.walk()):
         return replace(node, children=(), hidden=node.below)
-    return replace(node, children=tuple(_folded_closed(child, level, depth + 1) for child in node.children))
+    return replace(node, children=tuple(_folded(child, foldable, level, depth + 1) for child in node.children))
+
+
+def _idle(node: NodeView) -> bool:
+    return closed(node) and node.state.status is Status.INVALID

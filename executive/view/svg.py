@@ -21,7 +21,7 @@ ROW_GAP: Final = 10
 MARGIN: Final = 20
 TITLE_H: Final = 34
 LEGEND_H: Final = 34
-NOTE_CHARS: Final = 36
+NOTE_CHARS: Final = 33
 NOTE_LINES: Final = 3
 NAME_CHARS: Final = 30
 FONT: Final = "DejaVu Sans, Helvetica, Arial, sans-serif"
@@ -110,11 +110,13 @@ def _drawn(box: _Box) -> str:
         f'<text x="12" y="{BOX_H + 8 + n * NOTE_LINE_H}" font-size="10.5" fill="{look.ink}">{escape(row)}</text>'
         for n, row in enumerate(box.note)
     )
+    below = f"+ {node.hidden} nodes" if node.hidden else ""
     return (
         f'<g transform="translate({box.x:g},{box.y:g})" data-id="{_safe(node.path_id)}">'
         f"<title>{escape(tooltip)}</title>{_frame(look, box.height)}{_symbol(look, 20, 20)}"
         f'<text x="38" y="15" font-size="9" letter-spacing="0.8" fill="#57606a">{_safe(node.kind.upper())}</text>'
-        f'<text x="38" y="31" font-size="12.5" fill="#1f2328">{escape(name)}</text>{rows}</g>'
+        f'<text x="38" y="31" font-size="12.5" fill="#1f2328">{escape(name)}</text>'
+        f'<text x="{BOX_W - 10}" y="15" font-size="9" text-anchor="end" fill="#57606a">{below}</text>{rows}</g>'
     )
 
 

@@ -6,6 +6,7 @@ from py_trees.common import Status
 from executive.snapshot import NodeState
 from executive.view.collapse import folded_below, folded_to
 from executive.view.model import NodeView
+from executive.view.svg import to_svg
 from executive.view.text import to_text
 from skills.api import Cause
 
@@ -39,6 +40,10 @@ def test_what_runs_or_failed_stays_in_sight_and_the_rest_is_folded():
     assert {"r/1/0", "r/2/0"} <= set(shown(tree))
 
 
+def test_what_has_not_begun_is_folded_before_what_is_done():
+    assert [child.hidden for child in folded_to(mission(DONE, RUNS, IDLE), 30).children] == [0, 0, 10]
+
+
 def test_a_failure_below_what_succeeded_stays_in_sight():
     tree = NodeView("r", "sequence", "m", RUNS, children=(step(0, DONE, FAILED), step(1, DONE), step(2, DONE)))
     assert [child.hidden for child in folded_to(tree, 15).children] == [0, 10, 10]
@@ -63,3 +68,7 @@ def test_a_depth_cuts_and_counts(depth, count):
 def test_a_negative_depth_is_refused():
     with pytest.raises(ValueError, match="at least 0"):
         folded_below(mission(DONE), -1)
+
+
+def test_the_picture_tells_how_many_nodes_are_hidden():
+    assert "+ 10 nodes" in to_svg(folded_to(mission(DONE, RUNS), 15))

@@ -51,7 +51,7 @@ def test_a_slipped_grasp_is_tried_again_after_a_new_look_from_where_it_stands(co
 
 def _hold(skill):
     skill.context.robot._robot.holding = True
-    return Succeeded("held")
+    return Succeeded("held", {"tried": (*skill.inputs.avoid, 1)})
 
 
 def test_grasping_is_given_up_after_three_attempts(compiled, run_tree, make, script):

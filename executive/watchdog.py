@@ -40,7 +40,7 @@ class _Watched:
         value = getattr(self._robot, verb)
         if verb.startswith("_") or not callable(value):
             return value
-        watched = _watched_call(value, verb, self._limits_s.get(verb, self._limit_s))
+        watched = _watched_call(value, verb, self._limits_s.get(verb, self._limit_s), helped=verb != "image")
         self.__dict__[verb] = watched
         return watched
 
@@ -51,18 +51,20 @@ def watched(robot: Robot, *, limit_s: float = VERB_LIMIT_S, image_limit_s: float
     A verb that takes longer than its limit on the wall's clock raises `VerbHung`. Called from the main thread, it is
     broken off by an alarm. Called from another thread, it is done by a helper thread, and waited for no longer.
 
-    What this cannot do: an alarm breaks off compiled code only when that returns to Python; and a helper thread
+    What this cannot do: pictures that are taken outside the main thread are not watched, since what renders them is
+    bound to its thread; an alarm breaks off compiled code only when that returns to Python; and a helper thread
     cannot be broken off, so what hangs in it may still act when it comes back. By then the run has stopped the robot
     and returned the lease, under which such a late command is refused.
     """
     return cast(Robot, _Watched(robot, limit_s, image_limit_s))
 
 
-def _watched_call(call: Callable[..., Any], verb: str, limit_s: float) -> Callable[..., Any]:
+def _watched_call(call: Callable[..., Any], verb: str, limit_s: float, *, helped: bool) -> Callable[..., Any]:
     @functools.wraps(call)
     def guarded(*arguments: Any, **options: Any) -> Any:
         if threading.current_thread() is not threading.main_thread():
-            return _helped(functools.partial(call, *arguments, **options), verb, limit_s)
+            done = functools.partial(call, *arguments, **options)
+            return _helped(done, verb, limit_s) if helped else done()
         with _alarm(limit_s, lambda: _hung(verb, limit_s)):
             return call(*arguments, **options)
 

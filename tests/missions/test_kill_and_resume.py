@@ -1,0 +1,72 @@
+"""A process is killed in the middle of a mission; another takes the mission up and does nothing twice."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from executive.record.reader import read_events
+from executive.resuming import told_before
+from plant.snapshot.file import SnapshotError, read_snapshot
+
+ERRAND = (sys.executable, "-m", "executive.cli")
+FETCH = "Hey Alice, can you fetch me a drink from the kitchen"
+TIDY = "Hey Alice, take a drink from the kitchen to the sideboard"
+
+
+def kill_in(leaf: str, after_s: float, process: subprocess.Popen, out: Path) -> None:
+    """Kill the process when its robot has worked at a leaf of this name for so long."""
+    begun_s = None
+    while begun_s is None or clock_s(out) < begun_s + after_s:
+        assert process.poll() is None, "it ended before it was killed"
+        begun_s = begun_s or began_s(leaf, out)
+        time.sleep(0.05)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+
+
+def clock_s(out: Path) -> float:
+    try:
+        return read_snapshot(out / "missions.plant").values["engine"]["steps"] * 0.01
+    except SnapshotError:
+        return 0.0
+
+
+def began_s(leaf: str, out: Path) -> float | None:
+    log = out / "log.mcap"
+    events = read_events(log) if log.is_file() and log.stat().st_size > 2000 else ()
+    for event in events:
+        if event.topic == "transitions" and event.data["node"].endswith(f"/{leaf}") and event.data["to"] == "RUNNING":
+            return float(event.data["t"])
+    return None
+
+
+def done_leaves(out: Path) -> list[str]:
+    """The leaves that came to a good end by their own work, in both lives."""
+    events = [event.data for log in sorted(out.glob("log*.mcap")) for event in read_events(log) if "node" in event.data]
+    good = [event for event in events if event.get("to") == "SUCCESS" and not told_before(event["message"])]
+    return [event["node"].rsplit("/", 1)[-1] for event in good]
+
+
+@pytest.mark.mission
+@pytest.mark.parametrize(
+    ("sentence", "leaf", "after_s"), [(FETCH, "grasp", 7.0), (TIDY, "place", 6.0)], ids=["in grasp", "in place"]
+)
+def test_a_killed_mission_is_taken_up_and_ends_right(sentence, leaf, after_s, tmp_path):
+    options = ("--seed", "1", "--out", str(tmp_path), "--no-record", "--quiet")
+    with (tmp_path / "told.txt").open("wb") as told:
+        process = subprocess.Popen((*ERRAND, "run", "--say", sentence, *options), stdout=told, stderr=told)
+        kill_in(leaf, after_s, process, tmp_path)
+    command = (*ERRAND, "resume", "--store", str(tmp_path / "missions.sqlite"), "--quiet", "--json")
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    report = json.loads(ended.stdout.splitlines()[-1])
+    assert (report["outcome"], report["referee"]["success"], report["referee"]["drops"]) == ("success", True, 0)
+    assert any(" success before the restart: " in told for told in report["resumed"])
+    assert sum(" lifted the " in line for line in ended.stderr.splitlines() if line.startswith("  Alice")) == 1
+    done = done_leaves(tmp_path)
+    assert (done.count("detect"), done.count("grasp")) == (1, 1)

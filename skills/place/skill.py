@@ -65,12 +65,12 @@ class Place(ArmSkill[PlaceInputs]):
         surface = inputs.surface
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the jaw to put down")
-        carried = self.model.X_BH(self.q_rad()).rotation()
+        carried = self._carried()
         yield from self._go_near(surface)
         view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
         yield from self._go_above(surface, view, carried)
         spot_W = self._below_hand_W()
-        self.checkpoint = {"spot_W": spot_W.tolist()}
+        self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
         yield from self._lower(surface)
         yield from self._let_go()
         yield from self._check(surface, spot_W)
@@ -95,6 +95,13 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self._check(surface, spot_W[:2])
         yield from self.stow()
         return Succeeded(f"the thing stood on the {surface.name} already")
+
+    def _carried(self) -> RotationMatrix:
+        """How the hand was turned as the thing was brought, which an attempt that was broken off has noted."""
+        noted = self.checkpoint.get("carried")
+        rotation = self.model.X_BH(self.q_rad()).rotation() if noted is None else RotationMatrix(np.array(noted))
+        self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
+        return rotation
 
     def _go_near(self, surface: Surface) -> Routine[None]:
         """Drive nearer when the surface is out of the arm's reach."""

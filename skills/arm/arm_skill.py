@@ -43,7 +43,8 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def resume(self, inputs: InputsT) -> None:
         """Go on after a pause or a restart: what stood around may have moved."""
-        self._forget()
+        if not self.can_go_on():
+            self._forget()
         super().resume(inputs)
 
     def _forget(self) -> None:

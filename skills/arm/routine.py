@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
+import numpy as np
+
 from skills.api import Cause, Failed, InputsT, Running, Skill, SkillContext, Step, Succeeded
-from skills.robot import ArmTrajectory, CommandId, CommandState
+from skills.robot import ArmTrajectory, CommandId, CommandState, FloatArray, Pose2D
 
 ResultT = TypeVar("ResultT")
 OtherT = TypeVar("OtherT")
@@ -17,6 +21,11 @@ ARM_EXPIRY_MARGIN_S = 3.0
 GRIPPER_EXPIRY_S = 4.0
 STAND_EXPIRY_S = 5.0
 HEIGHT_TOLERANCE_M = 0.02
+_PAUSE_S = 10.0
+_STAYED_M = 0.15
+_STAYED_RAD = 0.2
+_RESTART_RAD_S = 0.8
+_LEAST_S = 0.05
 
 
 class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program error
@@ -33,13 +42,31 @@ class PlanningError(Exception):
     """No way was found; the message is one plain sentence."""
 
 
+@dataclass(frozen=True)
+class _Stance:
+    """How the robot was when its routine was suspended."""
+
+    since_s: float
+    pose: Pose2D
+    arm_rad: FloatArray
+    holding: bool
+
+
 class RoutineSkill(Skill[InputsT]):
-    """A skill whose attempt is one generator, `run`. Commands given through it are stopped by `end`."""
+    """A skill whose attempt is one generator, `run`. Commands given through it are stopped by `end`.
+
+    After a short pause in which the robot stayed as it was, the routine goes on in its midst, and the motion that was
+    stopped is taken up; else `run_again` looks what is done already.
+    """
 
     def __init__(self, context: SkillContext) -> None:
         super().__init__(context)
         self._routine: Routine[Succeeded] | None = None
         self._commands: list[CommandId] = []
+        self._interrupted: set[CommandId] = set()
+        self._inner: Callable[[], None] | None = None
+        self._inner_skill: Skill[Any] | None = None
+        self._stance: _Stance | None = None
 
     @abstractmethod
     def run(self, inputs: InputsT) -> Routine[Succeeded]:
@@ -54,10 +81,48 @@ class RoutineSkill(Skill[InputsT]):
         """Go on from an attempt that was broken off; looks first what is done already. Raises SkillFailure."""
         return self.run(inputs)
 
+    def suspend(self) -> None:
+        """Stop the motion under way; what was found out and planned so far is kept."""
+        if self._routine is None:
+            return
+        self._stance = self._stance_now()
+        if self._inner_skill is not None:
+            self._inner_skill.suspend()
+        self._stop_commands()
+        stopped = (one for one in self._commands if self._state(one) is CommandState.STOPPED)
+        self._interrupted |= set(stopped)
+
     def resume(self, inputs: InputsT) -> None:
         """Go on after a pause or a restart."""
+        if self.can_go_on():
+            self._stance = None
+            if self._inner is not None:
+                self._inner()
+            return
         self.end()
         self._routine = self.run_again(inputs)
+
+    def can_go_on(self) -> bool:
+        """Whether the routine was suspended not long ago, body and arm are where they were, and nothing was lost."""
+        before = self._stance
+        if self._routine is None or before is None:
+            return False
+        now = self._stance_now()
+        moved_m = math.hypot(now.pose.x_m - before.pose.x_m, now.pose.y_m - before.pose.y_m)
+        turn = now.pose.yaw_rad - before.pose.yaw_rad
+        still = moved_m < _STAYED_M and abs(math.remainder(turn, math.tau)) < _STAYED_RAD
+        arm_off = float(np.max(np.abs(now.arm_rad - before.arm_rad), initial=0.0))
+        fresh = now.since_s - before.since_s < _PAUSE_S
+        return fresh and still and arm_off < _STAYED_RAD and (now.holding or not before.holding)
+
+    def _stance_now(self) -> _Stance:
+        robot = self.context.robot
+        arm, gripper = robot.capabilities().arm, robot.capabilities().gripper
+        positions = {} if arm is None else robot.joints().position_rad
+        q = np.array([positions[name] for name in (() if arm is None else arm.joint_names)], dtype=np.float64)
+        return _Stance(
+            self.context.clock.now(), robot.odometry().pose, q, gripper is not None and robot.gripper().holding
+        )
 
     def step(self) -> Step:
         """Go on to the routine's next yield. Raises RuntimeError before `begin`."""
@@ -75,11 +140,18 @@ class RoutineSkill(Skill[InputsT]):
         """Drop the routine and stop its commands that still run."""
         if self._routine is not None:
             self._routine.close()
-        self._routine = None
+        self._routine = self._stance = None
+        self._stop_commands()
+        self._commands, self._interrupted = [], set()
+
+    def _stop_commands(self) -> None:
+        """Stop this attempt's commands that still run."""
         for command in self._commands:
-            if self.context.robot.command_status(command).state is CommandState.RUNNING:
+            if self._state(command) is CommandState.RUNNING:
                 self.context.robot.stop(lease=self.context.lease, only=command)
-        self._commands = []
+
+    def _state(self, command: CommandId) -> CommandState:
+        return self.context.robot.command_status(command).state
 
     def issue(self, command: CommandId) -> CommandId:
         """Remember a command as this attempt's own."""
@@ -99,47 +171,76 @@ class RoutineSkill(Skill[InputsT]):
     def follow(self, trajectory: ArmTrajectory, message: str) -> Routine[None]:
         """Move the arm along a trajectory. Raises SkillFailure with cause EXECUTION when it does not get there."""
         context = self.context
-        until_s = context.clock.now() + float(trajectory.times_s[-1]) + ARM_EXPIRY_MARGIN_S
-        command = context.robot.move_arm(trajectory, until_s=until_s, lease=context.lease)
-        yield from self.finish(self.issue(command), message, "the arm")
+        while True:
+            begun_s = context.clock.now()
+            until_s = begun_s + float(trajectory.times_s[-1]) + ARM_EXPIRY_MARGIN_S
+            command = self.issue(context.robot.move_arm(trajectory, until_s=until_s, lease=context.lease))
+            stopped_s = yield from self.finish(command, message, "the arm")
+            if stopped_s is None:
+                return
+            trajectory = rest_of(trajectory, stopped_s - begun_s, self._stance_now().arm_rad)
 
     def move_gripper(self, opening_rad: float, force_n: float, message: str) -> Routine[None]:
         """Move the jaw with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
         context = self.context
-        until_s = context.clock.now() + GRIPPER_EXPIRY_S
-        command = context.robot.set_gripper(opening_rad, force_n, until_s=until_s, lease=context.lease)
-        yield from self.finish(self.issue(command), message, "the gripper")
+        stopped_s: float | None = 0.0
+        while stopped_s is not None:
+            until_s = context.clock.now() + GRIPPER_EXPIRY_S
+            command = context.robot.set_gripper(opening_rad, force_n, until_s=until_s, lease=context.lease)
+            stopped_s = yield from self.finish(self.issue(command), message, "the gripper")
 
     def stand_at(self, height_m: float, message: str) -> Routine[None]:
         """Bring the body to a height, level; nothing is done where it is there already."""
         context = self.context
-        if abs(float(context.robot.odometry().X_OB.translation()[2]) - height_m) > HEIGHT_TOLERANCE_M:
+        while abs(float(context.robot.odometry().X_OB.translation()[2]) - height_m) > HEIGHT_TOLERANCE_M:
             until_s = context.clock.now() + STAND_EXPIRY_S
             command = context.robot.stand(height_m, 0.0, until_s=until_s, lease=context.lease)
-            yield from self.finish(self.issue(command), message, "the body")
+            if (yield from self.finish(self.issue(command), message, "the body")) is None:
+                return
 
     def perform(self, skill: Skill[OtherT], inputs: OtherT) -> Routine[Succeeded]:
         """Let another skill do its work as part of this one. Raises SkillFailure with its cause and message."""
         skill.begin(inputs)
+        self._inner_skill, self._inner = skill, lambda: skill.resume(inputs)
         try:
             while isinstance(step := skill.step(), Running):
                 yield step
         finally:
+            self._inner_skill = self._inner = None
             skill.end()
         if isinstance(step, Failed):
             raise SkillFailure(step.cause, step.message)
         return step
 
-    def finish(self, command: CommandId, message: str, what: str) -> Routine[None]:
-        """Wait until a command is done. Raises SkillFailure with cause EXECUTION when it was stopped or refused."""
+    def finish(self, command: CommandId, message: str, what: str) -> Routine[float | None]:
+        """Wait until a command is done, and give None; or, when a pause stopped it, the time (s) of its last tick.
+
+        Raises SkillFailure with cause EXECUTION when it was stopped otherwise, or refused.
+        """
+        last_s = self.context.clock.now()
         while (status := self.context.robot.command_status(command)).state is CommandState.RUNNING:
+            last_s = self.context.clock.now()
             yield Running(message)
-        if status.state is not CommandState.DONE:
-            why = f": {status.reason}" if status.reason else ""
-            raise SkillFailure(Cause.EXECUTION, f"{what} was {status.state.value} while {message}{why}")
+        if status.state is CommandState.DONE:
+            return None
+        if command in self._interrupted:
+            return last_s
+        why = f": {status.reason}" if status.reason else ""
+        raise SkillFailure(Cause.EXECUTION, f"{what} was {status.state.value} while {message}{why}")
 
     def pause(self, duration_s: float, message: str) -> Routine[None]:
         """Wait on the robot's clock."""
         end_s = self.context.clock.now() + duration_s
         while self.context.clock.now() < end_s:
             yield Running(message)
+
+
+def rest_of(trajectory: ArmTrajectory, elapsed_s: float, q_rad: FloatArray) -> ArmTrajectory:
+    """What is left of a trajectory that was stopped after elapsed_s, from where the arm is now; it starts slowly."""
+    times, positions = trajectory.times_s, trajectory.positions_rad
+    ahead = times > elapsed_s
+    ahead[-1] = True
+    here = np.clip(q_rad, positions.min(axis=0), positions.max(axis=0))
+    left_s = times[ahead] - elapsed_s
+    first_s = max(float(np.max(np.abs(positions[ahead][0] - here))) / _RESTART_RAD_S, _LEAST_S, float(left_s[0]))
+    return ArmTrajectory(np.concatenate([[0.0], left_s - left_s[0] + first_s]), np.vstack([here, positions[ahead]]))

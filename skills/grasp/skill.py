@@ -127,7 +127,9 @@ class Grasp(ArmSkill[GraspInputs]):
         return Succeeded(f"the {seen.thing} was in the jaw already; holding it", {"tried": self._tried})
 
     def _take_along(self, seen: ObjectObservation, at_thing: bool) -> Routine[None]:
-        """Lift and draw back what the jaw has hold of, hold it near the body, and make sure that it is held."""
+        """Clamp, lift and draw back what the jaw has hold of, hold it near the body, and make sure that it is held."""
+        yield from self.move_gripper(0.0, GRASP_FORCE_N, f"closing on the {seen.thing}")
+        yield from self.pause(_FEEL_S, f"closing on the {seen.thing}")
         message, opening = f"carrying the {seen.thing}", self._check_held(str(seen.thing), None)
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         if at_thing:

@@ -1,7 +1,8 @@
 """The store: states, claims, and files that cannot be used."""
 
-import multiprocessing
 import sqlite3
+import subprocess
+import sys
 
 import pytest
 from py_trees.common import Status
@@ -149,27 +150,32 @@ def test_a_value_that_cannot_be_read_names_the_mend(path):
             store.memory(1)
 
 
-def _hold(path, held, release):
-    with MissionStore(path) as store, store.claimed():
-        held.set()
-        release.wait(10)
+HOLD = """
+import sys
+from pathlib import Path
+from executive.store.missions import MissionStore
+
+with MissionStore(Path(sys.argv[1])) as store, store.claimed():
+    sys.stdout.write("held\\n")
+    sys.stdout.flush()
+    sys.stdin.read()
+"""
 
 
 def test_two_processes_do_not_run_missions_of_one_store(path):
-    context = multiprocessing.get_context("spawn")
-    held, release = context.Event(), context.Event()
-    process = context.Process(target=_hold, args=(path, held, release))
-    process.start()
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
     try:
-        assert held.wait(30)
+        assert holder.stdout.readline() == "held\n"
         with (
             MissionStore(path) as store,
-            pytest.raises(InputError, match=f"process {process.pid} runs a mission"),
+            pytest.raises(InputError, match=f"process {holder.pid} runs a mission"),
             store.claimed(),
         ):
             pass
     finally:
-        process.kill()
-        process.join()
+        holder.kill()
+        holder.communicate()
     with MissionStore(path) as store, store.claimed():
         pass

@@ -3,7 +3,7 @@
 import numpy as np
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed
 
-from skills.api import Cause, ObjectObservation, Thing
+from skills.api import Cause, Failed, ObjectObservation, Running, Succeeded, Thing
 from skills.grasp.skill import Grasp, GraspInputs
 from skills.robot import CommandState, CommandStatus
 
@@ -45,3 +45,35 @@ def test_after_a_failure_the_body_stands_at_its_usual_height():
     failed(Grasp(context_of(robot)), high, Cause.PRECONDITION, "no longer where it was seen")
     assert heights[0] > 0.55
     assert robot.height_m == 0.52
+
+
+def resumed(skill, inputs):
+    """Go on to the end of a skill that a restart broke off."""
+    skill.resume(inputs)
+    while isinstance(step := skill.step(), Running):
+        skill.context.clock.advance(0.05)
+    skill.end()
+    return step
+
+
+def test_a_thing_that_is_held_after_a_restart_is_not_taken_again():
+    robot = ScriptedRobot(holding=True, opening_rad=0.3, jaw_stops_rad=0.3)
+    step = resumed(Grasp(context_of(robot)), SEEN)
+    assert isinstance(step, Succeeded), step
+    assert step.message == "the coke was in the jaw already; holding it"
+    assert (robot.opening_rad, robot.holding) == (0.3, True)
+
+
+def test_after_a_restart_with_an_empty_jaw_the_robot_looks_before_it_takes():
+    robot = ScriptedRobot()
+    step = resumed(Grasp(context_of(robot)), SEEN)
+    assert isinstance(step, Failed)
+    assert "no longer where it was seen" in step.message
+
+
+def test_what_the_jaw_has_lost_is_undone():
+    robot = ScriptedRobot()
+    skill = Grasp(context_of(robot))
+    assert skill.undone(SEEN) == "the coke is not in the jaw"
+    robot.holding = True
+    assert skill.undone(SEEN) is None

@@ -137,12 +137,12 @@ KINDS = {
 CASES = [(verb, kind) for kind, (_, verbs) in KINDS.items() for verb in sorted(verbs)]
 
 
-def spoilt_run(tmp_path, verb, kind, *, worker=LockStepWorker):
+def spoilt_run(tmp_path, verb, kind, *, worker=LockStepWorker, limit_s=30.0):
     """Run UseAll on a robot with one bad verb; the result, the robot, and the log read back."""
     clock = VirtualClock()
     robot = ScriptedRobot(clock, capabilities=CAPABILITIES)
     faults = [Fault(f"{verb} {kind}", Effect(frozenset({verb}), KINDS[kind][0]))] if kind else []
-    plan = SkillPlan(path_id="alice/test", name="use all", skill=UseAll, limit_s=30.0)
+    plan = SkillPlan(path_id="alice/test", name="use all", skill=UseAll, limit_s=limit_s)
     entry = RunEntry(
         CompiledTree("Alice", "test", (), plan), with_faults(robot, clock, faults), KnownPlace(), BlockCostmap()
     )
@@ -197,7 +197,8 @@ def test_a_hang_ends_a_run_that_is_not_in_the_main_thread(tmp_path, verb):
 def test_a_picture_that_hangs_in_the_workers_thread_holds_up_nobody(tmp_path, monkeypatch):
     over = threading.Event()
     monkeypatch.setitem(KINDS, "blocks", (lambda call: (over.wait(20.0), call.proceed())[1], ("image",)))
-    result, robot, topics = spoilt_run(tmp_path, "image", "blocks", worker=lambda clock: ThreadWorker())
+    threads = {"worker": lambda clock: ThreadWorker(), "limit_s": 2.0}
+    result, robot, topics = spoilt_run(tmp_path, "image", "blocks", **threads)
     over.set()
     assert (result.outcome, result.worst.cause, robot.moving_parts) == (Outcome.FAILURE, Cause.TIMEOUT, ())
     assert "outcome" in topics

@@ -24,6 +24,7 @@ from executive.behaviours.freshness import Remembered
 from executive.compiler import CompiledTree
 from executive.compiling.interrupts import InterruptsPlan
 from executive.compiling.plans import NodePlan, SelectorPlan, SkillPlan
+from executive.compiling.policies import AskPlan, SkipPlan
 from executive.compiling.recovery import OnlyIfHoldingPlan, OnlyIfKnownPlan, RecoverPlan, RemedyPlan
 from executive.store.recollection import Recollection
 from executive.store.records import Memory, StepRecord
@@ -107,6 +108,8 @@ class _Change:
             return plan
         if plan.kind == "guard" and (step.status is Status.SUCCESS or self._failed(plan.children[0].path_id)):
             return _built(plan, _Unguarded)
+        if isinstance(plan, AskPlan) and step.status is Status.SUCCESS and self._failed(plan.child.path_id):
+            return SkipPlan(path_id=plan.path_id, name=plan.name, source=plan.source, child=plan.child, step=plan.step)
         known = all(key in self.memory.board for key in plan.writes())
         if plan.kind == "guard" or (not plan.children and known):
             return _built(plan, lambda node: _AsBefore(node, step))

@@ -7,11 +7,14 @@ from py_trees.common import Status
 
 from executive.command import parse_command
 from executive.compiler import Step, compile_commands
+from executive.compiling.policies import AskPlan
+from executive.missionfile.model import OperatorQuestion
 from executive.outcome import Outcome
 from executive.registry import installed_skills
 from executive.resuming import resumed_tree
 from executive.runner import RunEntry, RunSettings, run
 from executive.store.missions import MissionStore, Order
+from executive.store.records import Memory, StepRecord
 from executive.worker import LockStepWorker
 from skills.api import Cause, Failed, Running, Succeeded
 
@@ -241,3 +244,19 @@ def test_causes_come_back_with_failures(live, store, script):
     failed = [step for step in store.memory(1).steps.values() if step.status is Status.FAILURE]
     assert failed
     assert all(step.cause is Cause.PLANNING for step in failed)
+
+
+def test_the_operator_is_not_asked_again_about_a_step_that_was_skipped(compiled):
+    tree = compiled(*TIDY)
+    first, *others = tree.root.mission.steps
+    ask = AskPlan(
+        path_id="alice/ask", name="ask", child=first, step="get it", question=OperatorQuestion(), options=("skip",)
+    )
+    mission = dataclasses.replace(tree.root.mission, steps=(ask, *others))
+    asking = dataclasses.replace(tree, root=dataclasses.replace(tree.root, mission=mission))
+    ended = {ask.path_id: Status.SUCCESS, first.path_id: Status.FAILURE}
+    steps = {path: StepRecord(status, None, "", 1.0, {}) for path, status in ended.items()}
+    again, _ = resumed_tree(asking, Memory(steps, {}, None))
+    assert next(node.kind for node in again.root.walk() if node.path_id == ask.path_id) == "skip"
+    fresh, _ = resumed_tree(asking, Memory({}, {}, None))
+    assert next(node.kind for node in fresh.root.walk() if node.path_id == ask.path_id) == "ask"

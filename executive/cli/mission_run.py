@@ -24,6 +24,7 @@ from executive.outcome import RunResult
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
 from executive.runner import Observer, Progress, RunSettings, run
+from executive.view.collapse import DRAWN_NODES, folded_to
 from executive.view.model import NodeView, node_view
 from executive.view.svg import to_svg
 from executive.worker import LockStepWorker
@@ -87,7 +88,7 @@ def run_request(
         log.close()
     verdict = judge(simulation, tree, request.knowledge, result.worst)
     view = node_view(tree.root, result.worst.states)
-    (out / "tree.svg").write_text(to_svg(view, title=request.mission.name), encoding="utf-8")
+    (out / "tree.svg").write_text(to_svg(folded_to(view, DRAWN_NODES), title=request.mission.name), encoding="utf-8")
     if record:
         simulation.save_recording(out / "recording.html")
         draw_souvenirs(souvenirs, simulation, request.mission.robot_name, out)

@@ -17,7 +17,7 @@ from executive.cli.requests import Request, filed, said
 from executive.errors import InputError
 from executive.record.history import read_history
 from executive.view.btcpp import to_btcpp
-from executive.view.collapse import MANY_NODES, folded_below, folded_to
+from executive.view.collapse import DRAWN_NODES, MANY_NODES, folded_below, folded_to
 from executive.view.mermaid import to_mermaid
 from executive.view.model import NodeView, node_view, to_json
 from executive.view.svg import to_svg
@@ -47,7 +47,7 @@ _FORMS: Final[Mapping[TreeFormat, Callable[[NodeView, bool], str]]] = MappingPro
 )
 _MOST: Final[Mapping[TreeFormat, int]] = (
     MappingProxyType(  # programs, which read the other forms, do not mind a large tree
-        {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: MANY_NODES // 2, TreeFormat.MERMAID: MANY_NODES // 2}
+        {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: DRAWN_NODES, TreeFormat.MERMAID: DRAWN_NODES}
     )
 )
 

@@ -11,6 +11,7 @@ from executive.view.model import NodeView
 from executive.view.text import closed
 
 MANY_NODES = 80
+DRAWN_NODES = 40
 
 
 def folded_below(root: NodeView, depth: int) -> NodeView:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 from executive.cli.durable import STORE, Asked
@@ -56,7 +57,8 @@ def show(out: Out = Path("out"), store: Store = None, as_json: AsJson = False) -
     for each in known:
         order = each.order
         commands = "\n".join(order.commands)
-        table.add_row(str(each.id), _state(each), order.name, order.world_name, str(order.seed), commands, each.message)
+        row = (str(each.id), _state(each), order.name, order.world_name, str(order.seed), commands, each.message)
+        table.add_row(*map(escape, row))
     console_for(as_json).print(table)
     if as_json:
         print_json({"missions": [_told(each) for each in known]})

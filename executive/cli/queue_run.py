@@ -48,7 +48,7 @@ def start_of(missions: MissionStore, mission: StoredMission, console: Console, *
     out = Path(order.out) / f"{mission.id:03d}-{slug(order.name)}" if mission.queued else Path(order.out)
     before = _before(missions, mission) if mission.queued else None
     durable = new_run(missions, mission) if before is None else next_run(missions, mission, before)
-    console.print(f"[bold]Mission {mission.id}[/bold]: {order.name}")
+    console.print(f"Mission {mission.id}: {order.name}", markup=False, style="bold")
     with kept(missions, mission) as ended:
         start = partial(run_request, request, tree, seed=order.seed, out=out, record=order.record, durable=durable)
         finished = show_run(start, request, tree, console, control=control_for(console, quiet=quiet), quiet=quiet)

@@ -125,6 +125,11 @@ def test_the_list_tells_states_and_numbers(errand, mission, plant):
     assert [(each["mission"], each["state"], each["name"]) for each in told["missions"]] == [(2, "queued", "second")]
 
 
+def test_the_list_shows_commands_with_their_brackets(errand, mission, plant):
+    errand("queue", "add", mission("first"))
+    assert "[kitchen]" in errand("queue", "list").output
+
+
 def test_a_bad_mission_is_not_queued(errand, mission, states):
     result = errand("queue", "add", mission("bad", place="kitschen"))
     assert result.exit_code == 2

@@ -1,0 +1,49 @@
+"""The whole path: from a sentence to a drink brought back, as a user runs it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from executive.record.reader import comparable_events
+
+pytestmark = pytest.mark.mission
+
+SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
+SOUVENIRS = {"tree.svg", "log.mcap", "recording.html", "map.png", "detection.png", "grasp.png", "hand_over.png"}
+
+
+def errand_run(out: Path, *arguments: str) -> dict:
+    command = [sys.executable, "-m", "executive.cli", "run", "--say", SENTENCE, "--seed", "1", "--quiet", "--json"]
+    done = subprocess.run([*command, "--out", str(out), *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A run with recording: its folder and report."""
+    out = tmp_path_factory.mktemp("recorded")
+    return out, errand_run(out)
+
+
+def test_tree_and_referee_agree_that_the_drink_was_brought(recorded):
+    _, report = recorded
+    assert report["outcome"] == "success"
+    assert report["referee"] == {**report["referee"], "success": True, "collisions": 0, "drops": 0}
+
+
+def test_the_run_leaves_tree_log_recording_and_pictures(recorded):
+    out, _ = recorded
+    assert {path.name for path in out.iterdir()} >= SOUVENIRS
+    assert all((out / name).stat().st_size > 1000 for name in SOUVENIRS)
+
+
+def test_the_same_seed_gives_the_same_events(recorded, tmp_path):
+    out, _ = recorded
+    errand_run(tmp_path, "--no-record")
+    first, second = comparable_events(out / "log.mcap"), comparable_events(tmp_path / "log.mcap")
+    assert len(first) > 100
+    assert first == second

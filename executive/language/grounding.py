@@ -1,18 +1,35 @@
-"""Names as spoken become names of the world, and what was left open is filled in."""
+"""Names as spoken become names of the world, and what was left open is filled in.
+
+A name is looked up as it stands, then by what it is otherwise called, then by its noun alone; what could be several,
+or only looks or sounds like something known, makes a question.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
 
 from executive.command import Command, Task, Thing
-from executive.errors import did_you_mean, listing
+from executive.errors import listing
 from executive.knowledge import Knowledge
 from executive.language.drafts import Draft
+from executive.language.parser import Token
 from executive.language.phrases import Phrase
+from executive.language.questions import ClarifyingQuestion, Slot, perhaps, which
 from executive.language.refusal import RefusalError
 from executive.language.roles import HERE, Location
+from executive.language.similar import WordFacts, look_alikes, synonyms_of
 
-__all__ = ["ground", "known_line"]
+__all__ = ["Grounded", "ground", "ground_noted", "known_line"]
+
+
+@dataclass(frozen=True)
+class Grounded:
+    """Commands in the world's own names, and a word on each name that was taken for another."""
+
+    commands: tuple[Command, ...]
+    notes: tuple[str, ...] = ()
 
 
 def known_line(knowledge: Knowledge | None) -> str:
@@ -24,79 +41,177 @@ def known_line(knowledge: Knowledge | None) -> str:
 
 
 def ground(drafts: Sequence[Draft], knowledge: Knowledge) -> tuple[Command, ...]:
+    """The commands of `ground_noted`. Raises as that does."""
+    return ground_noted(drafts, knowledge).commands
+
+
+def ground_noted(drafts: Sequence[Draft], knowledge: Knowledge, facts: WordFacts | None = None) -> Grounded:
     """The drafts as commands in the world's own names, with default places where none was said.
 
+    `facts` on English words widen what an unknown name may stand for.
+
     Raises:
-        RefusalError: a thing, place or person is unknown, or a place could be several.
+        RefusalError: a thing, place or person is unknown, or could be several; with a question where that helps.
     """
-    return tuple(_ground(draft, knowledge) for draft in drafts)
+    grounder = _Grounder(knowledge, facts)
+    commands = tuple(grounder.command(draft) for draft in drafts)
+    return Grounded(commands, tuple(dict.fromkeys(grounder.notes)))
 
 
-def _ground(draft: Draft, knowledge: Knowledge) -> Command:
-    item, target = (None if phrase is None else _thing(phrase, knowledge) for phrase in (draft.item, draft.object))
-    goal, goal_at = (None, None) if draft.goal is None else _goal(draft.goal, knowledge)
-    if goal is None and target is not None and draft.task in (Task.GRASP, Task.FIND):
-        goal = knowledge.default_place(draft.task, target.name)
-    return Command(
-        item=item,
-        goal=goal,
-        goal_at=goal_at,
-        task=draft.task,
-        object=target,
-        item_count=1 if draft.item is None else draft.item.count,
-        object_count=1 if draft.object is None else draft.object.count,
-        verb=draft.verb,
-    )
+@dataclass
+class _Grounder:
+    """Looks names up in one world, and notes what it took for what."""
+
+    knowledge: Knowledge
+    facts: WordFacts | None
+    notes: list[str] = field(default_factory=list)
+
+    def command(self, draft: Draft) -> Command:
+        """One draft as a command."""
+        item, target = (None if phrase is None else self.thing(phrase) for phrase in (draft.item, draft.object))
+        goal, goal_at = (None, None) if draft.goal is None else self.goal(draft.goal)
+        if goal is None and target is not None and draft.task in (Task.GRASP, Task.FIND):
+            goal = self.knowledge.default_place(draft.task, target.name)
+        return Command(
+            item=item,
+            goal=goal,
+            goal_at=goal_at,
+            task=draft.task,
+            object=target,
+            item_count=1 if draft.item is None else draft.item.count,
+            object_count=1 if draft.object is None else draft.object.count,
+            verb=draft.verb,
+        )
+
+    def thing(self, phrase: Phrase) -> Thing:
+        """The known thing or category, with the adjectives before it."""
+        if phrase.person and self.knowledge.person(phrase.text):
+            raise RefusalError(f"I can look for things, not for people like {phrase.text!r}", [phrase.text])
+        known = _spellings(self.knowledge, self.knowledge.thing_names())
+        for attributes, form in _readings(phrase):
+            if (name := self.knowledge.thing(form)) is not None:
+                return Thing(name, attributes)
+        for attributes, form in _readings(phrase):
+            candidates = synonyms_of(form, known) or _ending_with(form, known)
+            if candidates:
+                return Thing(self._only(candidates, Slot.THING, form), attributes)
+        raise self._unknown(Slot.THING, (phrase.text, phrase.singular), known)
+
+    def goal(self, location: Location) -> tuple[str, str | None]:
+        """The goal, and where it is to be found when it is a person."""
+        if location == HERE:
+            return HERE.name, None
+        person = None if location.phrase is None else self._person(location.phrase)
+        if person is None:
+            return self.place(location), None
+        return person, None if location.within is None else self.place(location.within)
+
+    def place(self, location: Location) -> str:
+        """The known place that the words mean.
+
+        Several surfaces may share a noun ("table"): the larger place around it, where said, tells which one is meant.
+        """
+        if location.phrase is None:
+            raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
+        known = _spellings(self.knowledge, self.knowledge.place_names())
+        room = self._room(location)
+        candidates = self._places(location.phrase, room, known)
+        inside = [name for name in candidates if room in (None, name, self.knowledge.room(name))]
+        if not inside:
+            raise self._unknown(Slot.PLACE, (location.phrase.text, location.phrase.singular), known)
+        return self._only(inside, Slot.PLACE, Phrase(location.phrase.tokens).text)
+
+    def _room(self, location: Location) -> str | None:
+        """The larger place around it, where one was said ("in the kitchen", "of the kitchen", "bedroom table")."""
+        around = _around(location)
+        if around is not None:
+            known = _spellings(self.knowledge, self.knowledge.place_names())
+            found = self.knowledge.place(around) or next(iter(synonyms_of(around, known)), None)
+            if found is None:
+                raise self._unknown(Slot.PLACE, (around,), known)
+            return found
+        words = [] if location.phrase is None else [t.text for t in location.phrase.tokens[:-1]]
+        return next(filter(None, map(self.knowledge.place, words)), None)
+
+    def _places(self, phrase: Phrase, room: str | None, known: Mapping[str, str]) -> Sequence[str]:
+        """The places of that very name, or else of that noun; with a room said, also by their other names."""
+        bare = Phrase(phrase.tokens)
+        forms = (phrase.text, bare.text, bare.singular)
+        exact = next(filter(None, map(self.knowledge.place, forms)), None)
+        if exact is not None:
+            return [exact]
+        synonyms = [name for form in forms for name in synonyms_of(form, known)]
+        if synonyms:
+            return [self._noted(bare.text, name) for name in dict.fromkeys(synonyms)]
+        own = [name for name in self.knowledge.place_names() if _last(name) in (phrase.head.word, phrase.head.lemma)]
+        other = [name for spelling, name in known.items() if _last(spelling) in (phrase.head.word, phrase.head.lemma)]
+        return list(dict.fromkeys([*own, *other] if room is not None or not own else own))
+
+    def _person(self, phrase: Phrase) -> str | None:
+        """The known person; None when the words mean nobody."""
+        name = self.knowledge.person(phrase.text)
+        if name is not None or not phrase.person or self.knowledge.place(phrase.text) is not None:
+            return name
+        people = tuple(self.knowledge.people)
+        if people and not phrase.named_person:
+            raise _asking(which(Slot.PERSON, phrase.text, people))
+        raise self._unknown(Slot.PERSON, (phrase.text,), _spellings(self.knowledge, people))
+
+    def _only(self, candidates: Sequence[str], slot: Slot, heard: str) -> str:
+        """The only candidate; several make a question."""
+        if len(candidates) > 1:
+            raise _asking(which(slot, heard, tuple(candidates)))
+        return candidates[0] if slot is Slot.PLACE else self._noted(heard, candidates[0])
+
+    def _noted(self, heard: str, name: str) -> str:
+        if heard.lower() != name.lower():
+            self.notes.append(f"I take '{heard}' to be {name}")
+        return name
+
+    def _unknown(self, slot: Slot, forms: Sequence[str], known: Mapping[str, str]) -> RefusalError:
+        """A question where something known looks, sounds or means alike; else a refusal."""
+        heard = forms[0]
+        ends = (name for form in forms for spelling, name in known.items() if spelling == _last(form))
+        near = (name for form in forms for name in look_alikes(form, known, self.facts))
+        candidates = tuple(dict.fromkeys([*ends, *near]))
+        if candidates:
+            return _asking(perhaps(slot, heard, candidates))
+        names = tuple(dict.fromkeys(known.values()))
+        return RefusalError(f"I know no {slot.value} {heard!r}; known {_PLURALS[slot]}: {listing(names)}", [heard])
 
 
-def _thing(phrase: Phrase, knowledge: Knowledge) -> Thing:
-    """The known thing or category, with the adjectives before it."""
-    if phrase.person and knowledge.person(phrase.text):
-        raise RefusalError(f"I can look for things, not for people like {phrase.text!r}", [phrase.text])
+def _asking(question: ClarifyingQuestion) -> RefusalError:
+    heard = () if question.heard is None else (question.heard,)
+    return RefusalError(question.text, heard, question=question)
+
+
+def _readings(phrase: Phrase) -> Iterator[tuple[tuple[str, ...], str]]:
+    """The ways to read a phrase as adjectives and a name: the longest name first, as spoken and in singular."""
     *left, head = phrase.tokens
     words = [t for t in left if t.text in phrase.text.split()]
     for first in range(len(words) + 1):
         attributes, name = words[:first], [t.text for t in words[first:]]
-        forms = (" ".join([*name, form, *phrase.extra]) for form in (head.text, head.lemma))
-        known = next(filter(None, map(knowledge.thing, forms)), None)
-        if known and all(t.adjective for t in attributes):
-            return Thing(known, tuple(t.word for t in attributes))
-    raise _unknown("thing", phrase.text, knowledge.thing_names(), knowledge)
+        if all(t.adjective for t in attributes):
+            for form in _forms(head):
+                yield tuple(t.word for t in attributes), " ".join([*name, form, *phrase.extra])
 
 
-def _unknown(kind: str, name: str, known: Sequence[str], knowledge: Knowledge) -> RefusalError:
-    near = did_you_mean(name, knowledge.spellings(known))
-    hint = f" (did you mean {near!r}?)" if near else ""
-    return RefusalError(f"I know no {kind} {name!r}{hint}; known {kind}s: {listing(known)}", [name])
+def _forms(head: Token) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((head.text, head.lemma)))
 
 
-def _goal(location: Location, knowledge: Knowledge) -> tuple[str, str | None]:
-    """The goal, and where it is to be found when it is a person."""
-    if location == HERE:
-        return HERE.name, None
-    person = None if location.phrase is None else knowledge.person(location.phrase.text)
-    if person is None:
-        return _place(location, knowledge), None
-    return person, None if location.within is None else _place(location.within, knowledge)
+def _ending_with(form: str, known: Mapping[str, str]) -> tuple[str, ...]:
+    """The known names that end with this noun ("bottle" for "water bottle")."""
+    return tuple(dict.fromkeys(name for spelling, name in known.items() if spelling.endswith(f" {form.lower()}")))
 
 
-def _place(location: Location, knowledge: Knowledge) -> str:
-    """The known place that the words mean.
+def _spellings(knowledge: Knowledge, names: Sequence[str]) -> Mapping[str, str]:
+    """The names by each of their spellings in lower case."""
+    return {word.lower(): name for name in names for word in knowledge.spellings([name])}
 
-    Several surfaces may share a noun ("table"): the larger place around it, where said, tells which one is meant.
-    """
-    if location.phrase is None:
-        raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
-    phrase, around = location.phrase, _around(location)
-    room = None if around is None else knowledge.place(around)
-    if around is not None and room is None:
-        raise _unknown("place", around, knowledge.place_names(), knowledge)
-    inside = [name for name in _candidates(phrase, knowledge) if room in (None, name, knowledge.room(name))]
-    if not inside:
-        raise _unknown("place", location.text, knowledge.place_names(), knowledge)
-    if len(inside) > 1:
-        raise RefusalError(f"which {phrase.text}: {listing(inside, last='or')}?", [phrase.text], question=True)
-    return inside[0]
+
+def _last(name: str) -> str:
+    return name.split()[-1].lower()
 
 
 def _around(location: Location) -> str | None:
@@ -107,10 +222,4 @@ def _around(location: Location) -> str | None:
     return " ".join(extra[1:]) if extra[:1] == ("of",) else None
 
 
-def _candidates(phrase: Phrase, knowledge: Knowledge) -> list[str]:
-    """The places of that very name, or else all that end with the noun."""
-    bare = Phrase(phrase.tokens)
-    exact = next(filter(None, map(knowledge.place, (phrase.text, bare.text, bare.singular))), None)
-    if exact is not None:
-        return [exact]
-    return [name for name in knowledge.place_names() if name.split()[-1].lower() == bare.text.lower()]
+_PLURALS: Final = {Slot.THING: "things", Slot.PLACE: "places", Slot.PERSON: "people", Slot.GOAL: "places"}

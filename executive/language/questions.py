@@ -1,0 +1,167 @@
+"""One question back to the speaker, and what a sentence becomes by the answer.
+
+The answer is put into the sentence, which is then understood anew: so it goes through the same steps as all else.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from executive.errors import listing
+from executive.language.similar import spelling_distance
+from executive.language.sounds import nearest_by_sound
+
+__all__ = ["Answerer", "ClarifyingQuestion", "QuestionPolicy", "Slot", "answer_by", "chosen", "with_answer"]
+
+ALIKE_SOUND: Final = 0.2
+
+
+class Slot(Enum):
+    """What a question asks for."""
+
+    THING = "thing"  # which thing
+    PLACE = "place"  # which place
+    PERSON = "person"  # which person
+    GOAL = "goal"  # where to; nothing was said of it
+
+
+@dataclass(frozen=True)
+class ClarifyingQuestion:
+    """What the robot asks before it acts.
+
+    `candidates` are the answers to choose from, empty when any name will do; `default` is the likeliest of them;
+    `heard` is what was said in the answer's place, None when nothing was.
+    """
+
+    text: str
+    slot: Slot
+    candidates: tuple[str, ...] = ()
+    default: str | None = None
+    heard: str | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """The question as JSON values."""
+        return {
+            "text": self.text,
+            "slot": self.slot.value,
+            "candidates": list(self.candidates),
+            "default": self.default,
+            "heard": self.heard,
+        }
+
+
+Answerer = Callable[[ClarifyingQuestion], str | None]
+"""Answers a question, or leaves it open (None)."""
+
+
+class QuestionPolicy(Enum):
+    """What becomes of a question that nobody is asked."""
+
+    ASK = "ask"  # somebody is asked where somebody is there; else the sentence is refused
+    FIRST = "first"  # the likeliest candidate is taken
+    REFUSE = "refuse"  # the sentence is refused
+
+
+def answer_by(policy: QuestionPolicy, person: Answerer | None = None) -> Answerer:
+    """Who answers under a policy; `person` asks somebody, and is None where nobody is there."""
+    if policy is QuestionPolicy.FIRST:
+        return lambda question: question.default or next(iter(question.candidates), None)
+    if policy is QuestionPolicy.ASK and person is not None:
+        return person
+    return lambda question: None
+
+
+def which(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
+    """Which of several that one name could mean."""
+    text = f"Which {heard}: {listing(candidates, last='or')}?"
+    return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
+
+
+def perhaps(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
+    """Whether an unknown name stands for a known one."""
+    text = f"I know no {slot.value} '{heard}'; do you mean {listing(candidates, last='or')}?"
+    return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
+
+
+def left_open(reason: str, heard: str | None) -> ClarifyingQuestion:
+    """What the sentence does not say at all: where to, or what "it" and "there" stand for."""
+    slot = Slot.GOAL if heard is None else Slot.PLACE if heard in _PLACE_WORDS else Slot.THING
+    return ClarifyingQuestion(f"{reason[:1].upper()}{reason[1:]}", slot, heard=heard)
+
+
+def chosen(question: ClarifyingQuestion, answer: str) -> str | None:
+    """The candidate that an answer means: by its number, its name, a word of it, or nearly so; None when unclear."""
+    said = _bare(answer)
+    order = {word: candidate for number, candidate in enumerate(question.candidates) for word in _order(number)}
+    if said in order:
+        return order[said]
+    if said in _YES:
+        return question.candidates[0] if len(question.candidates) == 1 else None
+    exact = [c for c in question.candidates if c.lower() == said]
+    parts = [c for c in question.candidates if said and set(said.split()) <= set(c.lower().split())]
+    inside = [c for c in question.candidates if re.search(rf"\b{re.escape(c.lower())}\b", said)]
+    for found in (exact, parts, inside, _nearly(question, said)):
+        if len(found) == 1:
+            return found[0]
+    return None
+
+
+def with_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str:
+    """The sentence with the answer in its place: the candidate that it means, else the answer's own words."""
+    value = chosen(question, answer) or _FILLERS.sub("", answer).strip(" ,.!?")
+    if question.heard is None:
+        return f"{sentence.rstrip(' .,!?')} {_whereto(value)}"
+    place_word = question.heard.lower() in _PLACE_WORDS
+    full = _whereto(value) if place_word else value
+    if question.heard.lower() in _PRONOUNS and not place_word:
+        full = _definite(value)
+    spans = [m.span() for m in re.finditer(rf"\b{re.escape(question.heard)}\b", sentence, re.IGNORECASE)]
+    start, end = next((span for span in spans if not _inside_candidate(sentence, span, question)), (None, None))
+    return f"{sentence[:start]}{full}{sentence[end:]}" if start is not None and end is not None else sentence
+
+
+def _inside_candidate(sentence: str, span: tuple[int, int], question: ClarifyingQuestion) -> bool:
+    """Whether what was heard stands there as a part of a candidate's whole name."""
+    upto = sentence[: span[1]].lower()
+    heard = (question.heard or "").lower()
+    return any(upto.endswith(c.lower()) for c in question.candidates if c.lower() != heard)
+
+
+def _bare(answer: str) -> str:
+    words = _FILLERS.sub("", answer.lower()).strip(" ,.!?")
+    return re.sub(rf"^(?:{_PREPOSITION}\s+)?(?:the|a|an|my)\s+(?=\w)|\s+(?:one|please)$", "", words).strip(" ,.!?")
+
+
+def _order(number: int) -> tuple[str, ...]:
+    return (str(number + 1), _ORDINALS[number]) if number < len(_ORDINALS) else (str(number + 1),)
+
+
+def _nearly(question: ClarifyingQuestion, said: str) -> list[str]:
+    """Candidates that the answer is a slip for, or sounds like."""
+    slips = [c for c in question.candidates if len(said) > 2 and spelling_distance(said, c.lower()) <= len(c) // 4]
+    match = nearest_by_sound(said, question.candidates)
+    return slips or ([match.name] if match is not None and match.distance <= ALIKE_SOUND else [])
+
+
+def _definite(value: str) -> str:
+    return value if re.match(r"(?:the|a|an|my|some|that|this|\d+|one|two|three)\b|[A-Z]", value) else f"the {value}"
+
+
+def _whereto(value: str) -> str:
+    return value if re.match(rf"(?:{_PREPOSITION})\b", value, re.IGNORECASE) else f"to {_definite(value)}"
+
+
+_PREPOSITION: Final = r"(?:to|into|onto|in|on|at|from|near|next to|beside|under|behind|here|there)"
+_FILLERS: Final = re.compile(
+    r"^\W*(?:(?:um|uh|er|well|oh|please|yes|yeah|i mean|i meant|i said|i want|i think|make it|take|it is|it's)"
+    r"\b[\s,]*)+(?=\w)|[\s,]+please\W*$",
+    re.IGNORECASE,
+)
+_PRONOUNS: Final = frozenset("it them they one ones that this those these some him her there".split())  # noqa: SIM905
+_PLACE_WORDS: Final = frozenset({"there"})
+_YES: Final = frozenset({"yes", "yeah", "yep", "sure", "ok", "okay", "right", "correct", "exactly", "y"})
+_ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")

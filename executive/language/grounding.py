@@ -19,7 +19,7 @@ from executive.language.phrases import Phrase
 from executive.language.questions import ClarifyingQuestion, Slot, perhaps, which
 from executive.language.refusal import RefusalError
 from executive.language.roles import HERE, Location
-from executive.language.similar import WordFacts, look_alikes, synonyms_of
+from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 
 __all__ = ["Grounded", "ground", "ground_noted", "known_line"]
 
@@ -91,9 +91,10 @@ class _Grounder:
         for attributes, form in _readings(phrase):
             if (name := self.knowledge.thing(form)) is not None:
                 return Thing(name, attributes)
+            if candidates := synonyms_of(form, known):
+                return Thing(self._only(candidates, Slot.THING, form), attributes)
         for attributes, form in _readings(phrase):
-            candidates = synonyms_of(form, known) or _ending_with(form, known)
-            if candidates:
+            if candidates := _ending_with(form, known):
                 return Thing(self._only(candidates, Slot.THING, form), attributes)
         raise self._unknown(Slot.THING, (phrase.text, phrase.singular), known)
 
@@ -143,9 +144,11 @@ class _Grounder:
         synonyms = [name for form in forms for name in synonyms_of(form, known)]
         if synonyms:
             return [self._noted(bare.text, name) for name in dict.fromkeys(synonyms)]
-        own = [name for name in self.knowledge.place_names() if _last(name) in (phrase.head.word, phrase.head.lemma)]
-        other = [name for spelling, name in known.items() if _last(spelling) in (phrase.head.word, phrase.head.lemma)]
-        return list(dict.fromkeys([*own, *other] if room is not None or not own else own))
+        nouns = _forms(phrase.head)
+        own = [name for name in self.knowledge.place_names() if _last(name) in nouns]
+        other = [name for spelling, name in known.items() if _last(spelling) in nouns]
+        called = [name for spelling, name in known.items() if any(_last(word) in nouns for word in words_for(spelling))]
+        return list(dict.fromkeys([*own, *other, *called] if room is not None else own or other))
 
     def _person(self, phrase: Phrase) -> str | None:
         """The known person; None when the words mean nobody."""
@@ -197,7 +200,7 @@ def _readings(phrase: Phrase) -> Iterator[tuple[tuple[str, ...], str]]:
 
 
 def _forms(head: Token) -> tuple[str, ...]:
-    return tuple(dict.fromkeys((head.text, head.lemma)))
+    return tuple(dict.fromkeys((head.word, head.lemma)))
 
 
 def _ending_with(form: str, known: Mapping[str, str]) -> tuple[str, ...]:

@@ -99,8 +99,8 @@ def chosen(question: ClarifyingQuestion, answer: str) -> str | None:
     order = {word: candidate for number, candidate in enumerate(question.candidates) for word in _order(number)}
     if said in order:
         return order[said]
-    if said in _YES:
-        return question.candidates[0] if len(question.candidates) == 1 else None
+    if len(question.candidates) == 1 and _agrees(answer):
+        return question.candidates[0]
     exact = [c for c in question.candidates if c.lower() == said]
     parts = [c for c in question.candidates if said and set(said.split()) <= set(c.lower().split())]
     inside = [c for c in question.candidates if re.search(rf"\b{re.escape(c.lower())}\b", said)]
@@ -117,8 +117,8 @@ def with_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str
         return f"{sentence.rstrip(' .,!?')} {_whereto(value)}"
     place_word = question.heard.lower() in _PLACE_WORDS
     full = _whereto(value) if place_word else value
-    if question.heard.lower() in _PRONOUNS and not place_word:
-        full = _definite(value)
+    if not place_word:
+        full = _definite(value) if question.heard.lower() in _PRONOUNS else _LEADING.sub("", value)
     spans = [m.span() for m in re.finditer(rf"\b{re.escape(question.heard)}\b", sentence, re.IGNORECASE)]
     start, end = next((span for span in spans if not _inside_candidate(sentence, span, question)), (None, None))
     return f"{sentence[:start]}{full}{sentence[end:]}" if start is not None and end is not None else sentence
@@ -133,7 +133,12 @@ def _inside_candidate(sentence: str, span: tuple[int, int], question: Clarifying
 
 def _bare(answer: str) -> str:
     words = _FILLERS.sub("", answer.lower()).strip(" ,.!?")
-    return re.sub(rf"^(?:{_PREPOSITION}\s+)?(?:the|a|an|my)\s+(?=\w)|\s+(?:one|please)$", "", words).strip(" ,.!?")
+    return re.sub(r"\s+(?:one|please)$", "", _LEADING.sub("", words)).strip(" ,.!?")
+
+
+def _agrees(answer: str) -> bool:
+    words = set(re.findall(r"\w+", answer.lower()))
+    return bool(words & _YES) and words <= _YES | {"please"}
 
 
 def _order(number: int) -> tuple[str, ...]:
@@ -161,6 +166,7 @@ _FILLERS: Final = re.compile(
     r"\b[\s,]*)+(?=\w)|[\s,]+please\W*$",
     re.IGNORECASE,
 )
+_LEADING: Final = re.compile(rf"^(?:{_PREPOSITION}\s+)?(?:(?:the|a|an|my)\s+)?(?=\w)", re.IGNORECASE)
 _PRONOUNS: Final = frozenset("it them they one ones that this those these some him her there".split())  # noqa: SIM905
 _PLACE_WORDS: Final = frozenset({"there"})
 _YES: Final = frozenset({"yes", "yeah", "yep", "sure", "ok", "okay", "right", "correct", "exactly", "y"})

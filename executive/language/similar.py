@@ -120,11 +120,14 @@ def _note(spoken: str, name: str) -> str:
 
 @dataclass(frozen=True)
 class _Known:
-    """The spellings that count as known: the names, their words, and the names by their letters without blanks."""
+    """The spellings that count as known, in lower case: the names, their words, the names by their letters without
+    blanks, and how each name is written.
+    """
 
     names: frozenset[str]
     words: frozenset[str]
     joined: Mapping[str, str]
+    spelled: Mapping[str, str]
 
 
 def _mended_at(words: Sequence[re.Match[str]], at: int, known: _Known, facts: WordFacts) -> tuple[int, str | None]:
@@ -151,9 +154,10 @@ def _only_near(row: Sequence[str], known: _Known, facts: WordFacts) -> str | Non
         return None
     spoken = " ".join(row)
     names = [name for name in known.names if name.count(" ") == len(row) - 1]
-    near = sorted((distance, name) for name in names if (distance := _slips(spoken, name)) <= _slips_allowed(name))
+    forms = [form for name in names for form in (name, f"{name}s")]
+    near = sorted((distance, form) for form in forms if (distance := _slips(spoken, form)) <= _slips_allowed(form))
     unsure = len(near) > 1 and near[1][0] == near[0][0]
-    return None if unsure or not near else near[0][1]
+    return None if unsure or not near else known.spelled.get(near[0][1], near[0][1])
 
 
 def _may_be_right(word: str, facts: WordFacts) -> bool:
@@ -183,15 +187,16 @@ def _slip(word: str, name: str) -> float:
 
 def _known(knowledge: Knowledge) -> _Known:
     own = [*knowledge.thing_names(), *knowledge.place_names(), *knowledge.people]
-    return _known_of(tuple(word.lower() for word in knowledge.spellings(own)))
+    return _known_of(knowledge.spellings(own))
 
 
 @lru_cache(maxsize=16)
 def _known_of(spelled: tuple[str, ...]) -> _Known:
-    """The names of a world with their aliases, and the general synonyms of those, in lower case."""
-    names = tuple(dict.fromkeys([*spelled, *(word for name in spelled for word in words_for(name))]))
+    """The names of a world with their aliases, and the general synonyms of those."""
+    written = {name.lower(): name for name in spelled}
+    names = tuple(dict.fromkeys([*written, *(word for name in written for word in words_for(name))]))
     words = frozenset(word for name in names for word in name.split())
-    return _Known(frozenset(names), words, {_despaced(name): name for name in reversed(names)})
+    return _Known(frozenset(names), words, {_despaced(name): name for name in reversed(names)}, written)
 
 
 def _singular(word: str) -> str:

@@ -122,6 +122,8 @@ def test_lines_are_answered_in_order_and_one_by_one(parser):
         "status": "ok",
         "reason": None,
         "unknown_words": [],
+        "question": None,
+        "notes": [],
         "commands": [
             {
                 "item": None,

@@ -1,0 +1,125 @@
+"""Names as people say them in world.yaml: taken, asked or refused."""
+
+import pytest
+
+from executive.language import Status, understand
+
+
+@pytest.fixture
+def told(parser, knowledge):
+    return lambda sentence: understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
+
+
+@pytest.mark.parametrize(
+    ("sentence", "thing"),
+    [
+        ("fetch me a spanner", "wrench"),
+        ("fetch me a soda", "coke"),
+        ("fetch me a lager", "beer"),
+        ("fetch me a beverage", "drink"),
+        ("fetch me the adjustable wrench", "wrench"),
+        ("fetch me a can of coke", "coke"),
+        ("fetch me a bottle of beer", "beer"),
+        ("fetch me the red spanner", "red wrench"),
+        ("fetch me the wrnch", "wrench"),
+        ("fetch me the big screwdrver", "big screwdriver"),
+    ],
+)
+def test_a_thing_by_another_name_is_known(told, sentence, thing):
+    answer = told(sentence)
+    assert answer.status is Status.OK, answer.reason
+    assert str(answer.commands[0].object) == thing
+
+
+@pytest.mark.parametrize(
+    ("sentence", "place"),
+    [
+        ("go to the lounge", "living room"),
+        ("go to the sitting room", "living room"),
+        ("go to the corridor", "hall"),
+        ("go to the lab", "workshop"),
+        ("go to the kitchin", "kitchen"),
+        ("go to the bedside table", "night stand"),
+        ("go to the table in the kitchen", "kitchen table"),
+        ("go to the table in the lounge", "coffee table"),
+        ("go to the bedroom table", "night stand"),
+        ("go to the workshop bench", "workbench"),
+    ],
+)
+def test_a_place_by_another_name_is_known(told, sentence, place):
+    answer = told(sentence)
+    assert answer.status is Status.OK, answer.reason
+    assert answer.commands[0].goal == place
+
+
+@pytest.mark.parametrize(
+    ("sentence", "notes"),
+    [
+        ("fetch me a soda", ("I take 'soda' to be coke",)),
+        ("go to the kitchin", ("I take 'kitchin' to be kitchen",)),
+        ("fetch me a coke", ()),
+        ("fetch me the coke can", ()),
+    ],
+)
+def test_what_was_taken_for_something_else_is_told(told, sentence, notes):
+    assert told(sentence).notes == notes
+
+
+@pytest.mark.parametrize(
+    ("sentence", "slot", "candidates"),
+    [
+        ("put the cube on the table", "place", ["kitchen table", "coffee table"]),
+        ("fetch me a cake", "thing", ["coke"]),
+        ("fetch me the hamper", "thing", ["hammer"]),
+        ("fetch me the toy hammer", "thing", ["hammer"]),
+        ("bring the hammer to the man", "person", ["Robin", "Charlie"]),
+        ("take it to the kitchen", "thing", []),
+        ("go there", "place", []),
+        ("send the hammer", "goal", []),
+    ],
+)
+def test_what_could_be_several_or_is_unsure_is_asked(told, sentence, slot, candidates):
+    answer = told(sentence)
+    assert (answer.status, answer.commands) == (Status.QUESTION, ())
+    asked = answer.to_json()["question"]
+    assert (asked["slot"], asked["candidates"]) == (slot, candidates)
+    assert asked["text"].endswith("?")
+
+
+@pytest.mark.parametrize("sentence", ["fetch me a drink", "fetch me a tool", "find a drink in the kitchen"])
+def test_any_member_serves_for_a_category_and_nothing_is_asked(told, sentence):
+    assert told(sentence).status is Status.OK
+
+
+@pytest.mark.parametrize(
+    "sentence", ["fetch me a banana", "go to the cellar", "bring the hammer to Quentin", "fetch me a unicorn"]
+)
+def test_what_is_like_nothing_known_is_refused_with_what_is_known(told, sentence):
+    answer = told(sentence)
+    assert (answer.status, answer.question) == (Status.REFUSED, None)
+    assert "known" in answer.reason
+    assert "\n" not in answer.reason
+
+
+def test_two_members_of_a_kind_are_asked_by_their_names(parser, knowledge):
+    facts = {name: facts.model_copy(update={"aliases": ()}) for name, facts in knowledge.things.items()}
+    both = knowledge.model_copy(update={"things": {**facts, "lemonade": facts["beer"]}})
+    answer = understand("fetch me a soda", parser=parser, knowledge=both, require_wake=False)
+    assert answer.reason == "Which soda: coke or lemonade?"
+
+
+@pytest.mark.parametrize(
+    ("sentence", "words"),
+    [
+        ("Bring mir bitte ein Bier aus der Küche", "German"),
+        ("apporte-moi une bière s'il vous plaît", "French"),
+        ("tráeme una cerveza de la cocina por favor", "Spanish"),
+        ("принеси мне пиво", "English only"),
+        ("把饮料拿来", "English only"),
+        ("飲み物を持ってきて", "English only"),
+    ],
+)
+def test_other_languages_are_answered_as_such(told, sentence, words):
+    answer = told(sentence)
+    assert answer.status is Status.REFUSED
+    assert words in answer.reason

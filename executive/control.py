@@ -12,6 +12,8 @@ From Python, with the run in one thread and the hands in another:
     for question in control.state.questions:
         control.answer(question.id, question.options[0])
     control.preempt(tree_of_another_mission)  # the present one is taken up again afterwards
+    control.then(tree_of_another_mission)  # when the present one is done
+    control.replace(tree_of_another_mission)  # the present one is given up
     control.cancel("enough for today")
 
 All methods may be called from any thread and from signal handlers; they return at once, and the run heeds them
@@ -71,13 +73,15 @@ class Event:
 
 @dataclass(frozen=True)
 class Wishes:
-    """What the runner is to heed now."""
+    """What the runner is to heed now; `preempts` are missions to do first, `instead` and `later` as they say."""
 
     cancel: str | None
     hold: str | None
     preempts: tuple[CompiledTree, ...]
     breakpoints: frozenset[str]
     events: tuple[Event, ...]
+    instead: tuple[CompiledTree, ...] = ()
+    later: tuple[CompiledTree, ...] = ()
 
 
 class Control:
@@ -104,6 +108,8 @@ class Control:
         self._known: frozenset[str] = frozenset()
         self._breakpoints: frozenset[str] = frozenset()
         self._preempts: tuple[CompiledTree, ...] = ()
+        self._instead: tuple[CompiledTree, ...] = ()
+        self._later: tuple[CompiledTree, ...] = ()
         self._events: tuple[Event, ...] = ()
 
     # -- for people and programs ------------------------------------------------------------------------------------
@@ -209,15 +215,27 @@ class Control:
             ValueError: no such robot in the run, or the mission is under way already.
         """
         with self._changed:
-            under_way = self._missions.get(tree.robot_name)
-            if self._begun and under_way is None:
-                raise ValueError(
-                    f"robot '{tree.robot_name}' is not in this run; there are: {', '.join(self._missions)}"
-                )
-            if tree.mission_name in (under_way or ()):
-                raise ValueError(f"the mission '{tree.mission_name}' is under way already")
+            self._refuse_mission(tree)
             self._preempts += (tree,)
             self._note("preempt", f"first '{tree.mission_name}'")
+
+    def then(self, tree: CompiledTree) -> None:
+        """Do another mission when the one that the robot began with is done. Raises ValueError as `preempt`."""
+        with self._changed:
+            self._refuse_mission(tree)
+            self._later += (tree,)
+            self._note("then", f"afterwards '{tree.mission_name}'")
+
+    def replace(self, tree: CompiledTree) -> None:
+        """Do another mission instead of the one under way, which is given up.
+
+        Raises:
+            ValueError: no such robot in the run.
+        """
+        with self._changed:
+            self._refuse_robot(tree)
+            self._instead += (tree,)
+            self._note("replace", f"instead '{tree.mission_name}'")
 
     def answer(self, question_id: str, text: str) -> None:
         """Answer an open question. Raises ValueError when it is not open or `text` is none of its options."""
@@ -257,8 +275,10 @@ class Control:
         with self._changed:
             mode, reason = self._mode()
             held = reason if mode is Mode.STOPPED or (mode is Mode.PAUSED and self._stride is None) else None
-            wishes = Wishes(self._cancel, held, self._preempts, self._breakpoints, self._events)
-            self._preempts, self._events = (), ()
+            wishes = Wishes(
+                self._cancel, held, self._preempts, self._breakpoints, self._events, self._instead, self._later
+            )
+            self._preempts, self._instead, self._later, self._events = (), (), (), ()
             return wishes
 
     def ticked(self, *, changed: bool) -> None:
@@ -328,6 +348,16 @@ class Control:
             (not self._begun, Mode.READY, ""),
         )
         return next(((mode, reason or "") for holds, mode, reason in order if holds), (Mode.RUNNING, ""))
+
+    def _refuse_robot(self, tree: CompiledTree) -> None:
+        if self._begun and tree.robot_name not in self._missions:
+            raise ValueError(f"robot '{tree.robot_name}' is not in this run; there are: {', '.join(self._missions)}")
+
+    def _refuse_mission(self, tree: CompiledTree) -> None:
+        self._refuse_robot(tree)
+        waiting = [other.mission_name for other in (*self._preempts, *self._later)]
+        if tree.mission_name in (*self._missions.get(tree.robot_name, ()), *waiting):
+            raise ValueError(f"the mission '{tree.mission_name}' is under way already")
 
     def _note(self, what: str, message: str) -> None:
         self._events += (Event(what, message),)

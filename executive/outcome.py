@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from executive.compiler import CompiledTree
 from executive.snapshot import Snapshot
 from skills.api import Cause
+from skills.robot import Pose2D
 
 
 class Outcome(enum.Enum):
@@ -37,10 +39,19 @@ class RobotResult:
 
 
 @dataclass(frozen=True)
+class Glance:
+    """A robot at one moment: where it believes to be (world frame; None when lost), and whether it holds something."""
+
+    pose: Pose2D | None
+    holding: bool
+
+
+@dataclass(frozen=True)
 class RunResult:
     """How a run ended. Times in seconds: `sim_time_s` on the robots' clock, `wall_time_s` on the wall's.
 
-    `overruns` counts the ticks that took longer on the wall's clock than the tick period.
+    `overruns` counts the ticks that took longer on the wall's clock than the tick period. `trees` are the missions
+    that the robots began with, or those that took their place, by robot.
     """
 
     robots: tuple[RobotResult, ...]
@@ -48,6 +59,7 @@ class RunResult:
     overruns: int
     sim_time_s: float
     wall_time_s: float
+    trees: Mapping[str, CompiledTree] = field(default_factory=dict)
 
     @property
     def worst(self) -> RobotResult:

@@ -18,7 +18,7 @@ from executive.control import Control, Event, Wishes
 from executive.guarded_robot import guarded, show_lease_behind
 from executive.journal import Journal
 from executive.lease_keeper import LeaseKeeper
-from executive.outcome import Outcome, RobotResult, RunResult
+from executive.outcome import Glance, Outcome, RobotResult, RunResult
 from executive.record.schemas import CONTROL
 from executive.record.ticks import TickMeter
 from executive.session import Session
@@ -59,13 +59,14 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class Progress:
-    """What an observer is told after each tick: by robot, the states of all nodes and the mission under way."""
+    """What an observer is told after each tick: by robot, the states of all nodes, the mission, and a glance at it."""
 
     now_s: float
     ticks: int
     overruns: int
     states: Mapping[str, Snapshot]
     trees: Mapping[str, CompiledTree] = field(default_factory=dict)
+    glances: Mapping[str, Glance] = field(default_factory=dict)
 
 
 Observer = Callable[[Progress], None]
@@ -207,10 +208,13 @@ class _Run:
         self._tell(wishes.events)
         if wishes.cancel is not None:
             raise _CancelledError(wishes.cancel)
-        for tree in wishes.preempts:
-            for session in live:
-                if session.name == tree.robot_name:
-                    session.preempt(tree)
+        for session in live:
+            for tree in _for_robot(session, wishes.instead):
+                session.replace(tree)
+            for tree in _for_robot(session, wishes.preempts):
+                session.preempt(tree)
+            for tree in _for_robot(session, wishes.later):
+                session.later(tree)
         if wishes.hold is None:
             self._time.go_on()
         else:
@@ -239,7 +243,8 @@ class _Run:
     def _progress(self) -> Progress:
         states = {session.name: session.states for session in self._sessions}
         trees = {session.name: session.tree for session in self._sessions}
-        return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees)
+        glances = {session.name: session.glance for session in self._sessions}
+        return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees, glances)
 
     def _keep_pace(self, begun_wall_s: float) -> None:
         """Do not let simulated time run ahead of people who have something to decide."""
@@ -271,7 +276,12 @@ class _Run:
         began = {session.name for session in self._sessions}
         absent = tuple(_never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
         sim_time_s = self._clock.now() - self._begun_s
-        return RunResult(robots + absent, self._ticks, self._meter.overruns, sim_time_s, wall_time_s)
+        trees = {session.name: session.main_tree for session in self._sessions}
+        return RunResult(robots + absent, self._ticks, self._meter.overruns, sim_time_s, wall_time_s, trees)
+
+
+def _for_robot(session: Session, trees: Sequence[CompiledTree]) -> Sequence[CompiledTree]:
+    return [tree for tree in trees if tree.robot_name == session.name]
 
 
 def _never_began(entry: RunEntry, ending: Ending) -> RobotResult:

@@ -14,7 +14,7 @@ from executive.compiling.workshop import slug
 from executive.control import Control
 from executive.journal import Journal
 from executive.lease_keeper import LeaseKeeper
-from executive.outcome import Outcome, RobotResult
+from executive.outcome import Glance, Outcome, RobotResult
 from executive.record.drawable import stamp
 from executive.record.schemas import OUTCOME, POSE
 from executive.snapshot import NodeState, Snapshot
@@ -45,6 +45,7 @@ class Session:
         self._held = False
         self._lost_since_s: float | None = None
         self._preempting: tuple[RobotResult, ...] = ()
+        self._later: tuple[CompiledTree, ...] = ()
         self.result: RobotResult | None = None
         self._pose_due_s = context.clock.now()
 
@@ -71,7 +72,20 @@ class Session:
     @property
     def finished(self) -> bool:
         """True when the mission that the robot began with has come to an end."""
-        return self.result is not None or (len(self._stack) == 1 and self._top.finished)
+        return self.result is not None or (len(self._stack) == 1 and self._top.finished and not self._later)
+
+    @property
+    def main_tree(self) -> CompiledTree:
+        """The mission that the robot began with, or the one that took its place."""
+        return self._stack[0].tree
+
+    @property
+    def glance(self) -> Glance:
+        """Where the robot is and whether it holds something."""
+        estimate = self.context.localiser.estimate()
+        X_WB = estimate.X_WO @ self.context.robot.odometry().X_OB
+        pose = Pose2D.from_transform(X_WB) if estimate.localised else None
+        return Glance(pose, self.context.robot.gripper().holding)
 
     @property
     def waiting_at(self) -> str | None:
@@ -116,6 +130,10 @@ class Session:
         changed = self._top.tick(breakpoints)
         if self._top.finished and len(self._stack) > 1:
             self._take_up_the_one_before()
+        if self._top.finished and self._later:
+            tree, *later = self._later
+            self._later = tuple(later)
+            self._begin(tree)
         return changed
 
     def hold(self) -> None:
@@ -129,10 +147,22 @@ class Session:
     def preempt(self, tree: CompiledTree) -> None:
         """Suspend the mission under way and begin another; nothing of the one leaks into the other."""
         self.hold()
-        self._held = False
-        context = replace(self.context, board=Board(slug(tree.robot_name)))
-        self._stack = (*self._stack, TreeRun(tree, context))
-        self._control.mission_begun(self.name, tree)
+        self._begin(tree)
+
+    def later(self, tree: CompiledTree) -> None:
+        """Begin another mission when the one that the robot began with is done."""
+        self._later += (tree,)
+
+    def replace(self, tree: CompiledTree) -> None:
+        """Give up the mission under way and begin another in its place."""
+        self.hold()
+        given_up = self._top
+        given_up.halt(self._attempt)
+        self._stack = self._stack[:-1]
+        self._control.mission_ended(self.name)
+        self._begin(tree)
+        message = f"given up for '{tree.mission_name}'"
+        self._note_result(given_up.judge(Ending(Outcome.CANCELLED, Cause.CANCELLED, message)))
 
     def close(self, ending: Ending | None = None) -> RobotResult:
         """Stop the trees and the robot, give the lease back, log the end. Idempotent; raises nothing."""
@@ -157,6 +187,12 @@ class Session:
     def _top(self) -> TreeRun:
         return self._stack[-1]
 
+    def _begin(self, tree: CompiledTree) -> None:
+        self._held = False
+        context = replace(self.context, board=Board(slug(tree.robot_name)))
+        self._stack = (*self._stack, TreeRun(tree, context))
+        self._control.mission_begun(self.name, tree)
+
     def _take_up_the_one_before(self) -> None:
         done = self._top
         done.halt(self._attempt)
@@ -166,8 +202,11 @@ class Session:
 
     def _note_end(self, result: RobotResult) -> None:
         """A mission that came in between is over."""
-        self._preempting += (result,)
         self._control.mission_ended(self.name)
+        self._note_result(result)
+
+    def _note_result(self, result: RobotResult) -> None:
+        self._preempting += (result,)
         self._publish_outcome(result, None)
 
     def _publish_outcome(self, result: RobotResult, ticks: int | None) -> None:

@@ -86,6 +86,7 @@ def run_request(
             log(ERROR_TOPIC, {"node": tree.robot_name, "what": "keep the mission's state", "traceback": trouble})
     finally:
         log.close()
+    tree = result.trees.get(tree.robot_name, tree)
     verdict = judge(simulation, tree, request.knowledge, result.worst)
     view = node_view(tree.root, result.worst.states)
     (out / "tree.svg").write_text(to_svg(folded_to(view, DRAWN_NODES), title=request.mission.name), encoding="utf-8")
@@ -95,7 +96,7 @@ def run_request(
     if page is not None:
         page.end(out / "recording.html" if record else None)
     referee = RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops, simulation.referee.events)
-    return Finished(_report(request, result, referee, seed=seed, log=log.path), view)
+    return Finished(_report(request, tree, result, referee, seed=seed, log=log.path), view)
 
 
 def both(*observers: Observer | None) -> Observer:
@@ -109,14 +110,16 @@ def both(*observers: Observer | None) -> Observer:
     return tell
 
 
-def _report(request: Request, result: RunResult, referee: RefereeReport, *, seed: int, log: Path) -> RunReport:
+def _report(
+    request: Request, tree: CompiledTree, result: RunResult, referee: RefereeReport, *, seed: int, log: Path
+) -> RunReport:
     worst = result.worst
     return RunReport(
         outcome=worst.outcome.value,
         cause=None if worst.cause is None else worst.cause.value,
         message=worst.message,
         referee=referee,
-        commands=tuple(map(str, request.mission.commands)),
+        commands=tuple(map(str, tree.commands)),
         world=request.world.name,
         seed=seed,
         sim_time_s=round(result.sim_time_s, 3),

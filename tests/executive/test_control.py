@@ -443,3 +443,64 @@ def test_a_lease_shown_by_another_is_left_as_it_is(robot):
     keeper = LeaseKeeper(robot, "errand")
     foreign = Lease("Alice", "tablet", 99)
     assert keeper.behind(foreign) == foreign
+
+
+def test_a_mission_can_take_the_place_of_the_one_under_way(compiled, run_tree, make, control, robot, script, notes):
+    other = compiled(GO, name="go to the bedroom")
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({4: lambda: control.replace(other)}))
+    assert (result.outcome, result.worst.mission) == (Outcome.SUCCESS, "go to the bedroom")
+    assert result.trees == {"Alice": other}
+    assert script.begun == ["navigate", "detect", "navigate"]
+    assert script.ended == script.begun
+    (given_up,) = result.worst.preempting
+    assert (given_up.mission, given_up.outcome) == ("fetch drink", Outcome.CANCELLED)
+    assert "given up" in given_up.message
+    assert ("replace", "instead 'go to the bedroom'") in notes()
+    assert control.state.missions == {"Alice": ("go to the bedroom",)}
+
+
+def test_a_mission_that_came_in_between_is_replaced_and_the_first_taken_up(compiled, run_tree, make, control, script):
+    between, other = compiled(GO, name="between"), compiled(GO, name="other")
+    actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
+    assert (result.outcome, result.worst.mission) == (Outcome.SUCCESS, "fetch drink")
+    ends = [(each.mission, each.outcome) for each in result.worst.preempting]
+    assert ends == [("between", Outcome.CANCELLED), ("other", Outcome.SUCCESS)]
+
+
+def test_a_mission_for_later_begins_when_the_first_is_done(compiled, run_tree, make, control, script):
+    other = compiled(GO, name="go to the bedroom")
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({4: lambda: control.then(other)}))
+    assert (result.outcome, result.worst.mission) == (Outcome.SUCCESS, "fetch drink")
+    assert script.begun == ["navigate", "detect", "approach", "grasp", "stow", "navigate", "hand_over", "navigate"]
+    assert [each.mission for each in result.worst.preempting] == ["go to the bedroom"]
+
+
+def test_missions_for_later_come_in_their_order(compiled, run_tree, control):
+    first, second = compiled(GO, name="first"), compiled(GO, name="second")
+    control.then(first)
+    control.then(second)
+    result = run_tree(compiled(GO), control=control)
+    assert [each.mission for each in result.worst.preempting] == ["first", "second"]
+
+
+def test_a_mission_for_later_is_refused_when_it_waits_already(compiled, control):
+    control.then(compiled(GO, name="first"))
+    with pytest.raises(ValueError, match="under way already"):
+        control.then(compiled(GO, name="first"))
+
+
+def test_a_robot_that_is_not_in_the_run_gets_no_mission(compiled, control, make):
+    control.begin({"Bob": compiled(GO)})
+    for give in (control.replace, control.then, control.preempt):
+        with pytest.raises(ValueError, match="not in this run"):
+            give(compiled(GO, name="other"))
+
+
+def test_an_observer_sees_where_the_robot_is_and_what_it_holds(compiled, run_tree, make, control):
+    glances = []
+    run_tree(
+        compiled(*make.FETCH), control=control, observer=lambda progress: glances.append(progress.glances["Alice"])
+    )
+    assert (glances[0].pose.x_m, glances[0].pose.y_m, glances[0].holding) == (0.0, 0.0, False)
+    assert glances[-1].holding

@@ -8,7 +8,7 @@ from itertools import zip_longest
 from typing import Final
 
 from executive.language.clauses import Clause
-from executive.language.items import Being, Separator, Unknown, Verb, spoken_words
+from executive.language.items import Being, Outside, Separator, Unknown, Verb, Whether, spoken_words
 from executive.language.lexicon import Lexicon, VerbKind
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, Location, Roles, read_roles
@@ -50,13 +50,22 @@ def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
     """Leave out "see" and "check" before "if there is": the question stands alone."""
     for clause, after in zip_longest(clauses, clauses[1:]):
         checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
-        if not (checks and after is not None and after.whether):
+        tries = checks and after is not None and isinstance(after.verb, Verb) and _only_whether(clause)
+        if not (checks and after is not None and after.whether) and not tries:
             yield clause
+
+
+def _only_whether(clause: Clause) -> bool:
+    """Whether only "if" stands behind its verb, as in "see if you can find it"."""
+    content = [item for item in clause.items if not isinstance(item, Separator)]
+    return len(content) == 1 and isinstance(content[0], Whether)
 
 
 def _actions(clause: Clause, words: Lexicon) -> Iterator[Action]:
     if clause.verb is None:
         yield Action(None, "", unknown=(spoken_words(clause.items),))
+    elif isinstance(clause.verb, Outside):
+        yield Action(None, "", unknown=(spoken_words([clause.verb, *clause.items]),))
     elif isinstance(clause.verb, Being):
         yield _being(clause, clause.verb, words)
     else:
@@ -92,12 +101,12 @@ def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
     blank = Action(kind, verb.text, unknown=tuple(roles.unknown))
     if kind is VerbKind.GO:
         yield from _going(blank, roles, words)
-    elif kind is VerbKind.FIND:
-        yield _finding(blank, roles)
+    elif kind is VerbKind.FIND or (kind is VerbKind.CHECK and roles.searched is not None):
+        yield from _finding(replace(blank, kind=VerbKind.FIND), roles)
     elif kind is VerbKind.CHECK:
         yield replace(blank, unknown=(spoken_words([verb, *clause.items]),))
     else:
-        yield _carrying(blank, roles, words)
+        yield from _carrying(blank, roles, words)
 
 
 def _kind(verb: Verb, roles: Roles) -> VerbKind:
@@ -119,17 +128,23 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     yield from (replace(blank, goal=place) for place in places) if places else (blank,)
 
 
-def _finding(blank: Action, roles: Roles) -> Action:
+def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
+    """One action for each place to look at: "in the kitchen and the hall"."""
     objects, places = list(roles.objects), [*roles.ats, *roles.sources, *roles.goals]
     if roles.searched is not None:
         places = [*(Location(phrase) for phrase in objects), *places]
         objects = [roles.searched]
-    extra = [place.text for place in (*places[1:], *roles.joined_goals)]
-    return _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
+    extra = [place.text for place in places[1:]]
+    found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
+    yield found
+    yield from (replace(found, source=place) for place in roles.joined_goals)
 
 
-def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Action:
-    """Taking, bringing and putting: sort out from where, to where and for whom."""
+def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
+    """Taking, bringing and putting: sort out from where, to where and for whom.
+
+    One thing of a kind for each of several places: "a beer to Robin and Charlie".
+    """
     goals, sources, ats = list(roles.goals), list(roles.sources), list(roles.ats)
     if roles.recipient is not None:
         recipient = HERE if roles.recipient.speaker else Location(roles.recipient)
@@ -139,11 +154,18 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Action:
         goals.append(ats.pop())
     sources += ats
     goal = next(iter(goals), None)
-    extra = [place.text for place in (*sources[1:], *_others(goals), *roles.joined_goals)]
+    shared = roles.joined_goals if goal is not None and _for_each(roles) else []
+    extra = [place.text for place in (*sources[1:], *_others(goals), *([] if shared else roles.joined_goals))]
     extra += [roles.searched.text] if roles.searched is not None else []
-    return _with_object(
-        replace(blank, objects=tuple(roles.objects), source=next(iter(sources), None), goal=goal), extra
-    )
+    source = next(iter(sources), None)
+    carried = _with_object(replace(blank, objects=tuple(roles.objects), source=source, goal=goal), extra)
+    yield carried
+    yield from (replace(carried, goal=place) for place in shared)
+
+
+def _for_each(roles: Roles) -> bool:
+    """Whether there can be one for each place: a single "a beer", not "the hammer"."""
+    return len(roles.objects) == 1 and roles.objects[0].indefinite and not roles.objects[0].pronoun
 
 
 def _others(goals: Sequence[Location]) -> Sequence[Location]:

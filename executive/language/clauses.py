@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from executive.language.items import Being, Chunk, Item, Separator, Verb, Whether
+from executive.language.items import Being, Chunk, Item, Outside, Separator, Verb, Whether
 
 __all__ = ["Clause", "split_clauses", "without_name"]
 
 
 @dataclass(frozen=True)
 class Clause:
-    """A verb, or a form of "to be", with the items behind it.
+    """A verb, or a form of "to be", with the items behind it; a verb may be one that the robot does not know.
 
     `verb` is None for what stands before the first verb; `subject` stood before a form of "to be"; `whether` says that
     "if" or "whether" did.
     """
 
-    verb: Verb | Being | None
+    verb: Verb | Being | Outside | None
     items: tuple[Item, ...] = ()
     subject: Chunk | None = None
     whether: bool = False
@@ -30,7 +30,7 @@ def split_clauses(items: Iterable[Item]) -> tuple[Clause, ...]:
     for item in items:
         if isinstance(item, Being):
             found = [*found[:-1], *_begin_being(found[-1], item)]
-        elif isinstance(item, Verb):
+        elif isinstance(item, Verb | Outside):
             found.append(Clause(item))
         else:
             found[-1] = replace(found[-1], items=(*found[-1].items, item))

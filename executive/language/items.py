@@ -6,7 +6,7 @@ which place plays which role.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,11 +14,28 @@ from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
 
-__all__ = ["Adverb", "Being", "Chunk", "Item", "Separator", "Unknown", "Verb", "Whether", "split_items", "spoken_words"]
+__all__ = [
+    "Adverb",
+    "Being",
+    "Chunk",
+    "Correction",
+    "Item",
+    "Negation",
+    "Outside",
+    "Separator",
+    "Unknown",
+    "Verb",
+    "Whether",
+    "split_items",
+    "spoken_words",
+]
 
 _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
 _LONGEST: Final = 6
+_RELATIVE: Final = frozenset({"that", "which", "what"})
+_WHO: Final = frozenset({"who", "that", "which"})
+_IS: Final = frozenset({"is", "'s", "are", "'re"})
 
 
 @dataclass(frozen=True)
@@ -83,7 +100,29 @@ class Unknown:
     word: str
 
 
-Item = Verb | Chunk | Adverb | Being | Whether | Separator | Unknown
+@dataclass(frozen=True)
+class Outside:
+    """A verb that the robot does not know; what follows belongs to it."""
+
+    word: str
+
+
+@dataclass(frozen=True)
+class Negation:
+    """ "Not" and its kin: the speaker leaves out what follows."""
+
+    word: str
+
+
+@dataclass(frozen=True)
+class Correction:
+    """ "No", "I mean": what follows takes the place of what was said; a `soft` one may also mean nothing."""
+
+    word: str
+    soft: bool
+
+
+Item = Verb | Chunk | Adverb | Being | Whether | Separator | Unknown | Outside | Negation | Correction
 
 
 @dataclass
@@ -96,14 +135,14 @@ class _Reader:
     at: int = 0
 
     def read(self) -> Iterable[Item]:
-        steps = (self._verb, self._being, self._chunk, self._small)
+        steps = (self._mark, self._told, self._verb, self._being, self._chunk, self._small, self._outside)
         items: list[Item] = []
         while self.at < len(self.tokens):
             item = next((found for step in steps if (found := step(items)) is not None), None)
             items.append(item if item is not None else self._unknown())
         return items
 
-    def _match(self, phrases: Iterable[tuple[str, ...]], lemma: bool = False) -> tuple[str, ...] | None:
+    def _match(self, phrases: Container[tuple[str, ...]]) -> tuple[str, ...] | None:
         """The longest of the phrases that stands here."""
         for length in range(_LONGEST, 0, -1):
             piece = self.tokens[self.at : self.at + length]
@@ -112,12 +151,51 @@ class _Reader:
                 return spoken
         return None
 
+    def _mark(self, items: list[Item]) -> Item | None:
+        """What takes something back: "not", "no, the hammer"."""
+        correction, negation = self._match(self.words.corrections), self._match(self.words.negations)
+        if correction is not None and len(correction) >= len(negation or ()) and self._is_correction(len(correction)):
+            self.at += len(correction)
+            return Correction(" ".join(correction), self.words.corrections[correction])
+        if negation is not None:
+            self.at += len(negation)
+            return Negation(" ".join(negation))
+        return None
+
+    def _is_correction(self, length: int) -> bool:
+        """Whether "no" is none that belongs to a noun ("no milk")."""
+        behind = self.tokens[self.at + length : self.at + length + 1]
+        return self.tokens[self.at].word != "no" or length > 1 or not behind or behind[0].pos not in ("NOUN", "ADJ")
+
+    def _told(self, items: list[Item]) -> Item | None:
+        """ "I left it in the hall" tells where a thing is; behind a noun it tells only which one is meant."""
+        subject = items[-1] if items else None
+        if not isinstance(subject, Chunk) or self.tokens[self.at].word not in self.words.told:
+            return None
+        phrase = subject.phrase
+        if subject.role is not None or not (phrase.head.word in self.words.subjects or phrase.named_person):
+            return None
+        items.pop()
+        text = self._words(1)
+        if items and isinstance(items[-1], Unknown) and items[-1].word.lower() in _RELATIVE:
+            items.pop()
+        relative = bool(items) and isinstance(items[-1], Chunk)
+        return Separator("") if relative else Being(text, existential=True, asked=False)
+
     def _verb(self, items: list[Item]) -> Item | None:
-        found = self._match(self.words.verbs)
+        found = self._match(self.words.verbs) or self._gerund(items)
         if found is None or not self._is_verb(items, len(found)):
             return None
         self.at += len(found)
         return Verb(" ".join(found), self.words.verbs[found])
+
+    def _gerund(self, items: list[Item]) -> tuple[str, ...] | None:
+        """A verb that stands as "bringing" where a command begins, as behind "would you mind"."""
+        first = self.tokens[self.at]
+        if first.tag != "VBG" or not _command_position(items):
+            return None
+        spoken = (first.lemma, *(t.word for t in self.tokens[self.at + 1 : self.at + _LONGEST]))
+        return next((spoken[:n] for n in range(len(spoken), 0, -1) if spoken[:n] in self.words.verbs), None)
 
     def _is_verb(self, items: list[Item], length: int) -> bool:
         token = self.tokens[self.at]
@@ -152,8 +230,9 @@ class _Reader:
         if phrase is None:
             return None
         self.at = start + len(phrase.tokens)
-        phrase = self._of(phrase)
-        phrase = self._description(phrase)
+        if phrase.negative:
+            return Unknown(phrase.spoken)
+        phrase = self._described(self._of(phrase))
         role = self.words.prepositions[preposition] if preposition else None
         return Chunk(phrase, " ".join(preposition), role)
 
@@ -172,19 +251,53 @@ class _Reader:
             if inner is None:
                 break
             self.at += 1 + len(inner.tokens)
-            phrase = phrase.counting(inner) if phrase.counts else phrase.with_extra("of", inner.text, *inner.extra)
+            phrase = phrase.counting(inner) if phrase.counts else phrase.consisting_of(inner)
         return phrase
 
-    def _description(self, phrase: Phrase) -> Phrase:
-        """Join what somebody is doing to them: "the person raising their left arm"."""
-        if not phrase.person or self.at >= len(self.tokens) or self.tokens[self.at].tag != "VBG":
-            return phrase
+    def _described(self, phrase: Phrase) -> Phrase:
+        """Join what tells somebody or something apart: what they do, what they wear, what it has."""
+        while (end := self._description_end(phrase)) > self.at:
+            words = [t.text for t in self.tokens[self.at : end]]
+            self.at = end
+            phrase = phrase.with_extra(*words)
+        return phrase
+
+    def _description_end(self, phrase: Phrase) -> int:
+        """Where a description that begins here ends."""
+        if self.at >= len(self.tokens):
+            return self.at
+        if phrase.person:
+            self._skip_relative()
+        token = self.tokens[self.at]
+        if phrase.person and token.tag == "VBG":
+            return self._doing_end()
+        joins = token.word == "with" or (phrase.person and token.word in ("in", "wearing") and self._worn())
+        inner = self._phrase_at(self.at + 1) if joins else None
+        if inner is None or inner.person or inner.speaker or inner.pronoun:
+            return self.at
+        return self.at + 1 + len(inner.tokens)
+
+    def _skip_relative(self) -> None:
+        """Leave out "who is" before what somebody does or wears."""
+        here = tuple(t.word for t in self.tokens[self.at : self.at + 2])
+        after = self.tokens[self.at + 2 : self.at + 3]
+        if len(here) == 2 and here[0] in _WHO and here[1] in _IS and after and after[0].tag in ("VBG", "IN"):
+            self.at += 2
+
+    def _worn(self) -> bool:
+        """Whether what stands behind the next word is worn: clothes, or a colour."""
+        inner = self._phrase_at(self.at + 1)
+        return inner is not None and inner.head.lemma in self.words.worn
+
+    def _doing_end(self) -> int:
+        """The end of "raising their left arm" or "wearing a blue shirt": what is done, and in which direction."""
         end = self.at + 1
-        while end < len(self.tokens) and (inner := self._directional(end)):
-            end += inner
-        words = [t.text for t in self.tokens[self.at : end]]
-        self.at = end
-        return phrase.with_extra(*words)
+        inner = self._phrase_at(end)
+        if inner is not None and not inner.person:
+            end += len(inner.tokens)
+        while end < len(self.tokens) and (more := self._directional(end)):
+            end += more
+        return end
 
     def _directional(self, start: int) -> int:
         """How many words from `start` on tell a direction or a posture."""
@@ -219,6 +332,14 @@ class _Reader:
             return None
         items[at] = Verb(f"{verb.text} {particle}", self.words.verbs[(*verb.text.split(), particle)])
         return (particle,)
+
+    def _outside(self, items: list[Item]) -> Item | None:
+        """A verb that the robot does not know, where a clause may begin."""
+        token = self.tokens[self.at]
+        if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (_command_position(items) or token.tag == "VB"):
+            return None
+        self.at += 1
+        return Outside(token.text)
 
     def _unknown(self) -> Unknown:
         token = self.tokens[self.at]

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import Any, Final
 
 import yaml
 
@@ -41,7 +41,11 @@ class PrepositionRole(enum.Enum):
 
 @dataclass(frozen=True)
 class Lexicon:
-    """All dictionaries; phrases are tuples of lower-case words."""
+    """All dictionaries; phrases are tuples of lower-case words.
+
+    `corrections` says of each phrase whether it may also be a mere filler; `light_nouns` gives for a verb the nouns
+    that make one act with it ("take a picture").
+    """
 
     verbs: Mapping[Phrase, frozenset[VerbKind]]
     at_is_goal: frozenset[str]
@@ -51,6 +55,8 @@ class Lexicon:
     fillers: frozenset[Phrase]
     openers: tuple[str, ...]
     requests: tuple[str, ...]
+    searches: tuple[str, ...]
+    hesitations: tuple[str, ...]
     speaker: frozenset[str]
     pronouns: frozenset[str]
     here: frozenset[str]
@@ -58,7 +64,15 @@ class Lexicon:
     people: frozenset[str]
     everyone: frozenset[str]
     directions: frozenset[str]
-    intangible: frozenset[str]
+    worn: frozenset[str]
+    quantities: frozenset[str]
+    fixtures: frozenset[str]
+    somebody: frozenset[str]
+    subjects: frozenset[str]
+    told: frozenset[str]
+    negations: frozenset[Phrase]
+    corrections: Mapping[Phrase, bool]
+    light_nouns: Mapping[str, frozenset[str]]
 
 
 @cache
@@ -75,14 +89,38 @@ def lexicon() -> Lexicon:
             for role, phrases in words["prepositions"].items()
             for phrase in phrases
         },
-        fillers=frozenset(tuple(phrase.split()) for phrase in words["fillers"]),
+        fillers=_phrases(words["fillers"]),
+        searches=_longest_first(words["searches"]),
+        hesitations=_longest_first(words["hesitations"]),
         openers=_longest_first(words["openers"]),
         requests=_longest_first(words["requests"]),
-        **{
-            name: frozenset(words[name])
-            for name in ("speaker", "pronouns", "here", "there", "people", "everyone", "directions", "intangible")
-        },
+        **{name: frozenset(words[name]) for name in _WORD_SETS},
+        negations=_phrases(words["negations"]),
+        corrections={tuple(p.split()): soft for soft in (False, True) for p in words["corrections"][_SOFTNESS[soft]]},
+        light_nouns={verb: frozenset(nouns) for verb, nouns in words["light_nouns"].items()},
     )
+
+
+_SOFTNESS: Final = {False: "certain", True: "soft"}
+_WORD_SETS: Final = (
+    "speaker",
+    "pronouns",
+    "here",
+    "there",
+    "people",
+    "everyone",
+    "directions",
+    "worn",
+    "quantities",
+    "fixtures",
+    "somebody",
+    "subjects",
+    "told",
+)
+
+
+def _phrases(texts: Iterable[str]) -> frozenset[Phrase]:
+    return frozenset(tuple(text.split()) for text in texts)
 
 
 def _read(name: str) -> dict[str, Any]:

@@ -59,4 +59,4 @@ def _named(token: Token, match: re.Match[str] | None, stand_in: str) -> Token:
     if match is None:
         return token
     entity = "PERSON" if stand_in == PERSON else ""
-    return replace(token, text=match.group(0), lemma=match.group(1).lower(), entity=entity)
+    return replace(token, text=match.group(0), lemma=match.group(1).lower(), entity=entity, known=True)

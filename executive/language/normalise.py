@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Sequence
 from typing import Final
 
 from executive.language.lexicon import lexicon
@@ -12,6 +13,7 @@ __all__ = ["MAX_WORDS", "clean", "open_commands"]
 
 MAX_WORDS: Final = 60
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
+_SOMETHING: Final = {r"\b(?:something|anything) to drink\b": "a drink", r"\b(?:something|anything) to eat\b": "food"}
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")
 
 
@@ -29,16 +31,27 @@ def clean(text: str) -> str:
 def open_commands(text: str) -> str:
     """Turn polite forms into plain commands: "could you please get it" becomes "get it".
 
-    Where such a form stands inside the sentence, a comma takes its place. "I would like something to drink" becomes
-    "bring me a drink".
+    Hesitations and words said twice are left out. Where a polite form stands inside the sentence, a comma takes its
+    place. "I would like something to drink" becomes "bring me a drink".
     """
-    requests = "|".join(map(re.escape, lexicon().requests))
+    text = _said_once(text)
     text = re.sub(r"^\W*(please\s+)?robot\b[\s,]*", r"\1", text, flags=re.IGNORECASE)
-    text = re.sub(rf"\b(?:{requests})\s+(?!you\b|to\b)", ", bring me ", text, flags=re.IGNORECASE)
-    text = re.sub(r"\b(?:something|anything) to (?=\w)", "a ", text, flags=re.IGNORECASE)
-    openers = "|".join(map(re.escape, lexicon().openers))
-    text = re.sub(rf"(?:(?:\b(?:{openers}))\b[\s,]*)+", _break, text, flags=re.IGNORECASE)
+    for words, command in ((lexicon().searches, "find"), (lexicon().requests, "bring me")):
+        text = re.sub(rf"\b(?:{_any(words)})\s+(?!you\b|to\b)", f", {command} ", text, flags=re.IGNORECASE)
+    for something, thing in _SOMETHING.items():
+        text = re.sub(something, thing, text, flags=re.IGNORECASE)
+    text = re.sub(rf"(?:(?:\b(?:{_any(lexicon().openers)}))\b[\s,]*)+", _break, text, flags=re.IGNORECASE)
     return text.strip(" ,;:-.")
+
+
+def _said_once(text: str) -> str:
+    """The text without hesitations, and without the repetition of words that were said twice ("the the")."""
+    text = re.sub(rf"(?<![\w'])(?:{_any(lexicon().hesitations)})(?![\w'])[,.\s]*", " ", text, flags=re.IGNORECASE)
+    return re.sub(r"\b(\w+(?:\s\w+){0,2})(?:[\s,]+\1\b)+", r"\1", " ".join(text.split()), flags=re.IGNORECASE)
+
+
+def _any(phrases: Sequence[str]) -> str:
+    return "|".join(map(re.escape, phrases))
 
 
 def _break(match: re.Match[str]) -> str:

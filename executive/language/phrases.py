@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from executive.command import Thing
 from executive.language.lexicon import lexicon
+from executive.language.nouns import NounKind
 from executive.language.parser import Token
 
 __all__ = ["Phrase", "noun_phrases"]
@@ -21,15 +22,23 @@ _NUMBERS: Final[Mapping[str, int]] = {
     for number, word in enumerate("zero one two three four five six seven eight nine ten eleven twelve".split())  # noqa: SIM905
 } | {"couple": 2, "dozen": 12}
 _DEEPEST: Final = 6
+# They stand before a noun, too, but say nothing of it.
+_LOOSE: Final = frozenset({"then", "now", "just", "also", "please", "maybe", "again", "not", "n't", "instead"})
 _HEADLIKE: Final = frozenset({"obj", "iobj", "obl", "nsubj", "attr", "conj", "root"})
 
 
 @dataclass(frozen=True)
 class Phrase:
-    """A noun with what stands around it; `extra` are the words joined behind it ("of wine")."""
+    """A noun with what stands around it.
+
+    `extra` are the words joined behind it ("of wine"), `of_kind` the kind of what stands behind "of", and `numbered`
+    a count that was said apart from it ("make that two").
+    """
 
     tokens: tuple[Token, ...]
     extra: tuple[str, ...] = ()
+    of_kind: NounKind | None = None
+    numbered: int | None = None
 
     @property
     def head(self) -> Token:
@@ -64,13 +73,39 @@ class Phrase:
     @property
     def count(self) -> int:
         """The number said; 1 for a singular, 0 for a plural without a number."""
-        said = next((n for n in map(_number, self.tokens[:-1]) if n is not None), None)
+        said = self.said_count
         return said if said is not None else 0 if self.plural else 1
 
     @property
+    def said_count(self) -> int | None:
+        """The number said, if any; that of "one" and "two" standing alone, too."""
+        words = self.tokens if self.counts else self.tokens[:-1]
+        said = next((n for n in map(_number, words) if n is not None), None)
+        return said if self.numbered is None else self.numbered
+
+    @property
     def pronoun(self) -> bool:
-        """Whether it stands for something said before."""
-        return len(self.tokens) == 1 and self.head.word in lexicon().pronouns
+        """Whether it stands for something said before ("it", "one", "two of them")."""
+        return (
+            self.head.word in lexicon().pronouns
+            and all(map(_is_determiner, self.tokens[:-1]))
+            and (len(self.tokens) == 1 or self.head.word not in _ONE)
+        )
+
+    @property
+    def stands_for_one(self) -> bool:
+        """Whether its noun is "one", told apart by what stands before it ("the red one")."""
+        return self.head.word in _ONE and len(self.tokens) > 1
+
+    @property
+    def stands_for_somebody(self) -> bool:
+        """Whether it is a pronoun that can mean a person."""
+        return len(self.tokens) == 1 and self.head.word in lexicon().somebody
+
+    @property
+    def stands_for_somewhere(self) -> bool:
+        """Whether it is a pronoun that can mean a place or a person."""
+        return self.pronoun or self.stands_for_one or self.stands_for_somebody
 
     @property
     def speaker(self) -> bool:
@@ -93,10 +128,29 @@ class Phrase:
         return any(t.word in lexicon().everyone for t in self.tokens)
 
     @property
-    def intangible(self) -> bool:
-        """Whether it is nothing that a hand can hold or that one can go to ("the news", "six o'clock")."""
-        words = lexicon().intangible
-        return any(word in words for word in (self.head.lemma, self.head.word, *self.extra))
+    def negative(self) -> bool:
+        """Whether it says that there is none ("no milk")."""
+        return len(self.tokens) > 1 and self.tokens[0].word == "no"
+
+    @property
+    def indefinite(self) -> bool:
+        """Whether it means any one of its kind: no article but "a", no possessive."""
+        return not any(t.word in _DEFINITE or t.tag in ("PRP$", "POS") for t in self.tokens)
+
+    @property
+    def nominal(self) -> bool:
+        """Whether it can be a place or a thing: no bare adjective ("silent")."""
+        return self.head.pos not in ("ADJ", "ADV") or len(self.tokens) > 1 or self.head.known
+
+    @property
+    def known(self) -> bool:
+        """Whether the world knows its name."""
+        return self.head.known
+
+    @property
+    def kind(self) -> NounKind | None:
+        """What kind of thing it is: of "a piece of advice", what the advice is."""
+        return self.of_kind if self.head.lemma in lexicon().quantities and self.of_kind else self.head.kind
 
     @property
     def spoken(self) -> str:
@@ -110,11 +164,26 @@ class Phrase:
 
     def counting(self, counted: Phrase) -> Phrase:
         """The phrase of so many of what is counted."""
-        return Phrase((*self.tokens, *counted.tokens), counted.extra)
+        return replace(counted, tokens=(*self.tokens, *counted.tokens))
 
     def with_extra(self, *words: str) -> Phrase:
         """The phrase with more words behind the noun."""
-        return Phrase(self.tokens, (*self.extra, *words))
+        return replace(self, extra=(*self.extra, *words))
+
+    def consisting_of(self, inner: Phrase) -> Phrase:
+        """The phrase with "of" and what it consists of behind the noun."""
+        return replace(self.with_extra("of", inner.text), of_kind=inner.kind)
+
+    def with_count(self, count: int) -> Phrase:
+        """So many of the same."""
+        return replace(self, numbered=count)
+
+    def instead_of_one(self, meant: Phrase) -> Phrase:
+        """The phrase with the noun of `meant` in the place of "one"; its own adjectives hold."""
+        noun = tuple(t for t in meant.tokens if not t.adjective and not _is_determiner(t))
+        return replace(
+            self, tokens=(*self.tokens[:-1], *(noun or meant.tokens[-1:])), extra=(*meant.extra, *self.extra)
+        )
 
     def _determined(self) -> bool:
         return any(t.relation in ("det", "poss") for t in self.tokens)
@@ -122,6 +191,12 @@ class Phrase:
     def _content(self) -> tuple[Token, ...]:
         *left, head = self.tokens
         return (*(t for t in left if not _is_determiner(t)), head)
+
+
+_ONE: Final = frozenset({"one", "ones"})
+_DEFINITE: Final = frozenset(
+    {"the", "this", "that", "these", "those", "my", "your", "his", "her", "its", "our", "their"}
+)
 
 
 def _is_determiner(token: Token) -> bool:
@@ -173,7 +248,7 @@ def _first(head: Token, tokens: Sequence[Token]) -> int:
 def _belongs(token: Token, head: Token, tokens: Sequence[Token]) -> bool:
     """Whether a word before `head` depends on it through words of its own phrase only."""
     for _ in range(_DEEPEST):
-        if token.relation not in _LEFT or token.word == ",":
+        if token.relation not in _LEFT or token.word == "," or token.word in _LOOSE:
             return False
         token = tokens[token.head]
         if token.index >= head.index:

@@ -11,7 +11,7 @@ from executive.language.phrases import Phrase
 from executive.language.refusal import RefusalError
 from executive.language.roles import THERE, Location
 
-__all__ = ["Deed", "resolve"]
+__all__ = ["Deed", "Memory", "resolve"]
 
 
 @dataclass(frozen=True)
@@ -26,67 +26,84 @@ class Deed:
     again: bool = False
 
 
-@dataclass
-class _Memory:
-    """What was last spoken of."""
+@dataclass(frozen=True)
+class Memory:
+    """What was last spoken of: things, where they are, a place, a person."""
 
     things: tuple[Phrase, ...] = ()
     where: Location | None = None
     place: Location | None = None
+    person: Location | None = None
 
 
-def resolve(actions: Sequence[Action]) -> tuple[Deed, ...]:
-    """The actions as deeds, each on one thing.
+def resolve(actions: Sequence[Action], memory: Memory) -> tuple[tuple[Deed, ...], Memory]:
+    """The actions as deeds, each on one thing, and what was spoken of last; `memory` is what was spoken of before.
 
     Raises:
         RefusalError: a pronoun stands for nothing that was said.
     """
-    memory = _Memory()
     deeds: list[Deed] = []
     for action in actions:
         if action.kind is None:
-            deeds = _stated(action, deeds, memory)
-            continue
-        again = any(phrase.pronoun for phrase in action.objects)
-        things = _things(action, memory)
-        goal, source = (_place(place, memory) for place in (action.goal, action.source))
-        source = source or (memory.where if again else None)
-        for thing in things or (None,):
-            deeds.append(Deed(action.kind, action.verb, thing, source, goal, again))
-        memory.things = things or memory.things
-        memory.where = source if again or not things else None
-        memory.place = goal or source or memory.place
-    return tuple(deeds)
+            deeds, memory = _stated(action, deeds, memory)
+        else:
+            found, memory = _done(action, action.kind, memory)
+            deeds += found
+    return tuple(deeds), memory
 
 
-def _stated(action: Action, deeds: list[Deed], memory: _Memory) -> list[Deed]:
+def _done(action: Action, kind: VerbKind, memory: Memory) -> tuple[list[Deed], Memory]:
+    again = any(phrase.pronoun for phrase in action.objects)
+    things = _things(action, memory)
+    goal, source = (_place(place, memory) for place in (action.goal, action.source))
+    source = source or (memory.where if again else None)
+    person = next((place for place in (goal, source) if place is not None and place.person), memory.person)
+    after = Memory(
+        things=things or memory.things,
+        where=source if again or not things else None,
+        place=goal or source or memory.place,
+        person=person,
+    )
+    return [Deed(kind, action.verb, thing, source, goal, again) for thing in things or (None,)], after
+
+
+def _stated(action: Action, deeds: list[Deed], memory: Memory) -> tuple[list[Deed], Memory]:
     """Remember a statement; "it is in the drawer" tells where the thing of an earlier deed is."""
-    pronoun = any(phrase.pronoun for phrase in action.objects)
-    memory.where = _place(action.source, memory)
-    memory.place = memory.where or memory.place
-    if not pronoun:
-        memory.things = action.objects or memory.things
-        return deeds
-    return [
-        replace(deed, source=memory.where) if deed.target in memory.things and deed.source is None else deed
-        for deed in deeds
+    where = _place(action.source, memory)
+    memory = replace(memory, where=where, place=where or memory.place)
+    if not any(phrase.pronoun for phrase in action.objects):
+        return deeds, replace(memory, things=action.objects or memory.things)
+    told = [
+        replace(deed, source=where) if deed.target in memory.things and deed.source is None else deed for deed in deeds
     ]
+    return told, memory
 
 
-def _things(action: Action, memory: _Memory) -> tuple[Phrase, ...]:
-    things: list[Phrase] = []
-    for phrase in action.objects:
-        if phrase.pronoun and not memory.things:
-            raise RefusalError(f"what does {phrase.text!r} stand for?", [phrase.text], question=True)
-        things += memory.things if phrase.pronoun else [phrase]
-    return tuple(things)
+def _things(action: Action, memory: Memory) -> tuple[Phrase, ...]:
+    return tuple(thing for phrase in action.objects for thing in _meant(phrase, memory))
 
 
-def _place(place: Location | None, memory: _Memory) -> Location | None:
-    pronoun = place is not None and place.phrase is not None and place.phrase.pronoun
-    if place is None or not (pronoun or place == THERE):
+def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:
+    """What a phrase stands for: itself, unless it is "it", "two of them" or "the red one"."""
+    if not (phrase.pronoun or phrase.stands_for_one):
+        return [phrase]
+    if not memory.things:
+        raise RefusalError(f"what does {phrase.text!r} stand for?", [phrase.text], question=True)
+    if phrase.stands_for_one:
+        return [phrase.instead_of_one(memory.things[-1])]
+    said = phrase.said_count
+    return memory.things if said is None else [thing.with_count(said) for thing in memory.things]
+
+
+def _place(place: Location | None, memory: Memory) -> Location | None:
+    """The place that was meant: "there" is the last one, "her" the last person."""
+    phrase = None if place is None else place.phrase
+    if place is None or not (place == THERE or (phrase is not None and phrase.stands_for_somewhere)):
         return place
-    if memory.place is None:
-        word = THERE.preposition if place.phrase is None else place.phrase.text
+    meant = memory.person if phrase is not None and phrase.stands_for_somebody and memory.person else memory.place
+    if phrase is not None and phrase.person:
+        return memory.person or place
+    if meant is None:
+        word = THERE.preposition if phrase is None else phrase.text
         raise RefusalError(f"which place is {word!r}?", [word], question=True)
-    return memory.place
+    return meant

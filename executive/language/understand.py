@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from executive.command import Command
 from executive.knowledge import Knowledge
-from executive.language.actions import Action, read_actions
-from executive.language.clauses import split_clauses, without_name
-from executive.language.drafts import draft_commands, spoken_command
-from executive.language.grounding import ground, known_line
-from executive.language.items import split_items
-from executive.language.lexicon import VerbKind, lexicon
-from executive.language.names import name_table, parse_with_names
-from executive.language.normalise import MAX_WORDS, clean, open_commands
+from executive.language.foreign import foreign_reason
+from executive.language.normalise import clean
 from executive.language.parser import DependencyParser
-from executive.language.phrases import Phrase, noun_phrases
-from executive.language.reference import Deed, resolve
-from executive.language.refusal import RefusalError
+from executive.language.questions import ClarifyingQuestion
+from executive.language.reference import Memory
+from executive.language.similar import Mended, WordFacts, mend_spelling
+from executive.language.steps import trace_sentence
 from executive.language.wake import strip_wake
 
 __all__ = ["Status", "Understanding", "parse_lines", "understand"]
@@ -37,13 +32,19 @@ class Status(enum.Enum):
 
 @dataclass(frozen=True)
 class Understanding:
-    """What a sentence means: commands when `status` is OK, else the reason in one line."""
+    """What a sentence means: commands when `status` is OK, else the reason in one line.
+
+    `question` is what the robot asks back, `notes` say which name was taken for which, `memory` is what was spoken of.
+    """
 
     text: str
     status: Status
     commands: tuple[Command, ...] = ()
     reason: str | None = None
     unknown_words: tuple[str, ...] = ()
+    question: ClarifyingQuestion | None = None
+    notes: tuple[str, ...] = ()
+    memory: Memory | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The answer as JSON values."""
@@ -52,6 +53,8 @@ class Understanding:
             "status": self.status.value,
             "reason": self.reason,
             "unknown_words": list(self.unknown_words),
+            "question": None if self.question is None else self.question.to_json(),
+            "notes": list(self.notes),
             "commands": [command.to_json() for command in self.commands],
         }
 
@@ -63,6 +66,7 @@ def understand(
     knowledge: Knowledge | None,
     require_wake: bool,
     robot_name: str | None = None,
+    memory: Memory | None = None,
 ) -> Understanding:
     """The commands that `sentence` asks for.
 
@@ -72,6 +76,7 @@ def understand(
         knowledge: the world's names and defaults; None keeps all names as they were spoken.
         require_wake: whether a sentence without the wake phrase is not for this robot.
         robot_name: the name to listen to; by default the one in `knowledge`.
+        memory: what was spoken of before, for "it" and "there".
     """
     name = robot_name or (knowledge.robot.name if knowledge else "robot")
     wake = strip_wake(clean(sentence), name)
@@ -81,11 +86,17 @@ def understand(
     if require_wake and not wake.addressed:
         reason = f'the robot\'s name was not said; begin with "Hey {name}"'
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
-    try:
-        return Understanding(sentence, Status.OK, _commands(wake.text, parser, knowledge))
-    except RefusalError as refusal:
-        status = Status.QUESTION if refusal.question else Status.REFUSED
-        return Understanding(sentence, status, reason=refusal.reason, unknown_words=refusal.unknown)
+    facts = parser if isinstance(parser, WordFacts) else None
+    mended = Mended(wake.text)
+    if knowledge is not None and facts is not None:
+        mended = mend_spelling(wake.text, knowledge, facts)
+    trace = trace_sentence(mended.text, parser=parser, knowledge=knowledge, memory=memory)
+    refusal, notes = trace.refusal, (*mended.notes, *trace.notes)
+    if refusal is None:
+        return Understanding(sentence, Status.OK, trace.commands, notes=notes, memory=trace.memory)
+    status = Status.QUESTION if refusal.question else Status.REFUSED
+    reason = foreign_reason(wake.text) or refusal.reason
+    return Understanding(sentence, status, (), reason, refusal.unknown, refusal.question, notes)
 
 
 def parse_lines(
@@ -94,53 +105,3 @@ def parse_lines(
     """Understand each line for itself, in order; an empty line is refused, not skipped."""
     for line in lines:
         yield understand(line.rstrip("\r\n"), parser=parser, knowledge=knowledge, require_wake=require_wake)
-
-
-def _commands(text: str, parser: DependencyParser, knowledge: Knowledge | None) -> tuple[Command, ...]:
-    """All steps from text to commands; raises RefusalError."""
-    words = text.split()
-    if len(words) > MAX_WORDS:
-        raise RefusalError(f"{len(words)} words are too many for one sentence; say it in {MAX_WORDS} at most")
-    tokens = parse_with_names(open_commands(text), parser, None if knowledge is None else name_table(knowledge))
-    items = split_items(tokens, noun_phrases(tokens), lexicon())
-    clauses = split_clauses(items)
-    if not clauses:
-        raise RefusalError(f"nothing was said; {known_line(knowledge)}")
-    actions = read_actions(clauses if knowledge else without_name(clauses), lexicon())
-    _check(actions, knowledge)
-    deeds = resolve(actions)
-    _check_deeds(deeds, knowledge)
-    drafts = draft_commands(deeds)
-    return tuple(map(spoken_command, drafts)) if knowledge is None else ground(drafts, knowledge)
-
-
-def _check(actions: Sequence[Action], knowledge: Knowledge | None) -> None:
-    """Refuse the whole sentence when any part of it was not understood."""
-    unknown = tuple(dict.fromkeys(word for action in actions for word in action.unknown))
-    if unknown:
-        raise _not_understood(unknown, knowledge)
-    if not any(action.kind for action in actions):
-        told = [phrase.text for action in actions for phrase in action.objects]
-        raise RefusalError(f"nothing to do was said; {known_line(knowledge)}", told)
-
-
-def _not_understood(words: Sequence[str], knowledge: Knowledge | None) -> RefusalError:
-    quoted = ", ".join(repr(word) for word in words)
-    return RefusalError(f"I do not understand {quoted}; {known_line(knowledge)}", words)
-
-
-def _check_deeds(deeds: Sequence[Deed], knowledge: Knowledge | None) -> None:
-    """Refuse to carry people, to serve all of a kind, and what no hand can hold."""
-    carries = (deed for deed in deeds if deed.kind not in (VerbKind.GO, VerbKind.FIND))
-    people = [f"{d.verb} {d.target.text}" for d in carries if d.target is not None and d.target.person]
-    if people:
-        raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
-    phrases = (p for deed in deeds for p in _phrases(deed))
-    outside = [p.spoken for p in phrases if p.universal or p.intangible]
-    if outside:
-        raise _not_understood(outside, knowledge)
-
-
-def _phrases(deed: Deed) -> Iterator[Phrase]:
-    places = (place.phrase for place in (deed.source, deed.goal) if place is not None)
-    yield from (phrase for phrase in (deed.target, *places) if phrase is not None)

@@ -1,0 +1,120 @@
+"""What a speaker takes back: corrections ("the wrench, no, the hammer") and negations ("not the coke")."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Final
+
+from executive.language.items import Adverb, Being, Chunk, Correction, Item, Negation, Separator, Unknown, Verb
+from executive.language.lexicon import PrepositionRole
+from executive.language.nouns import NounKind
+from executive.language.phrases import Phrase
+
+__all__ = ["mended"]
+
+_CONTRAST: Final = "but"
+_WHERE_FROM: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.AT, PrepositionRole.BESIDE})
+_WHERE_TO: Final = frozenset({PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE, PrepositionRole.FOR})
+
+
+def mended(items: Iterable[Item]) -> tuple[Item, ...]:
+    """The items as if the speaker had said at once what they mean.
+
+    A correction or negation that fits nothing becomes an unknown word.
+    """
+    rest, done = list(items), list[Item]()
+    while rest:
+        item = rest.pop(0)
+        if isinstance(item, Negation):
+            done, rest = _negated(done, rest, item)
+        elif isinstance(item, Correction):
+            done, rest = _corrected(done, rest, item)
+        else:
+            done.append(item)
+    return tuple(done)
+
+
+def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[Item], list[Item]]:
+    """Leave out the clause or the chunks behind "not"."""
+    ahead = _without_separators(rest)
+    if ahead and isinstance(ahead[0], Verb) and not (done and isinstance(done[-1], Being)):
+        return done, _behind_clause(ahead)
+    if ahead and isinstance(ahead[0], Chunk) and not (done and isinstance(done[-1], Being)):
+        return done, _behind_chunks(ahead)
+    return [*done, Unknown(mark.word)], rest
+
+
+def _behind_clause(ahead: list[Item]) -> list[Item]:
+    """What stands behind a negated clause; "but" lets its verb hold for what follows ("not to the hall but here")."""
+    verb, *clause = ahead
+    end = next((n for n, item in enumerate(clause) if isinstance(item, Verb | Being | Correction)), len(clause))
+    turns = (n for n, item in enumerate(clause[:end]) if isinstance(item, Separator) and item.word == _CONTRAST)
+    turn = next(turns, None)
+    kept = [] if turn is None or turn + 1 == end else [verb, *clause[turn + 1 : end]]
+    return [Separator(","), *kept, *clause[end:]]
+
+
+def _behind_chunks(ahead: list[Item]) -> list[Item]:
+    """What stands behind a negated chunk and those joined to it by "or"."""
+    rest = ahead[1:]
+    while len(rest) > 1 and isinstance(rest[0], Separator) and rest[0].word == "or" and isinstance(rest[1], Chunk):
+        rest = rest[2:]
+    return rest
+
+
+def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[list[Item], list[Item]]:
+    """Put what follows in the place of what it corrects."""
+    ahead = _without_separators(rest)
+    verb = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), None)
+    if not any(not isinstance(item, Separator) for item in done):
+        return done, ahead
+    if ahead and isinstance(ahead[0], Verb) and verb is not None:
+        return done[:verb], ahead
+    if verb is None or not ahead or not isinstance(ahead[0], Chunk | Adverb):
+        return (done, rest) if mark.soft else ([*done, Unknown(mark.word)], rest)
+    while ahead and isinstance(new := ahead[0], Chunk | Adverb):
+        done = [*done[:verb], *_replaced(done[verb:], new)]
+        ahead = ahead[1:]
+    return done, ahead
+
+
+def _without_separators(items: list[Item]) -> list[Item]:
+    first = (n for n, item in enumerate(items) if not isinstance(item, Separator | Correction))
+    return items[next(first, len(items)) :]
+
+
+def _replaced(clause: Sequence[Item], new: Chunk | Adverb) -> list[Item]:
+    """The clause with the chunk that `new` corrects replaced, or with `new` added when there is none."""
+    at = _corrected_index(clause, new)
+    if at is None:
+        return [*clause, new]
+    old = clause[at]
+    if isinstance(new, Chunk) and new.role is None and isinstance(old, Chunk):
+        new = replace(old, phrase=_same_kind(new.phrase, old.phrase))
+    return [*clause[:at], new, *clause[at + 1 :]]
+
+
+def _same_kind(new: Phrase, old: Phrase) -> Phrase:
+    """The new phrase; "two" and "the red one" take their noun from the old one."""
+    if new.counts:
+        return old.with_count(new.count)
+    return new.instead_of_one(old) if new.stands_for_one else new
+
+
+def _corrected_index(clause: Sequence[Item], new: Chunk | Adverb) -> int | None:
+    """Where the last item stands that `new` can take the place of."""
+    fitting = (n for n in range(len(clause) - 1, -1, -1) if _corrects(new, clause[n]))
+    return next(fitting, None)
+
+
+def _corrects(new: Chunk | Adverb, old: Item) -> bool:
+    if isinstance(new, Adverb):
+        return isinstance(old, Adverb) or (isinstance(old, Chunk) and old.role is PrepositionRole.GOAL)
+    if not isinstance(old, Chunk):
+        return False
+    if new.role is not None:
+        return old.role is not None and any({old.role, new.role} <= group for group in (_WHERE_FROM, _WHERE_TO))
+    if new.phrase.person or old.phrase.person or old.phrase.speaker:
+        return new.phrase.person and (old.phrase.person or old.phrase.speaker)
+    return (new.phrase.kind is NounKind.PLACE) == (old.role is not None)

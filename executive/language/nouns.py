@@ -1,0 +1,109 @@
+"""What kind of thing a noun stands for, judged by the nearness of its meaning to examples of each kind.
+
+The examples stand in nouns.yaml by kind. A noun that is no example is judged by linear discriminant analysis on word
+vectors: each kind is a Gaussian about the mean of its examples, and all share one covariance, which is shrunk towards
+a multiple of the identity since there are few examples for so many dimensions (Friedman, "Regularized Discriminant
+Analysis", JASA 1989; Ledoit and Wolf, "A well-conditioned estimator for large-dimensional covariance matrices", 2004).
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import yaml
+
+__all__ = ["FloatArray", "NounKind", "NounKinds", "noun_examples"]
+
+FloatArray = npt.NDArray[np.float64]
+VectorOf = Callable[[str], FloatArray | None]
+
+_SHRINKAGE: Final = 0.2
+_MODIFIER_WEIGHT: Final = 0.3
+_MARGIN: Final = 2.0
+
+
+class NounKind(enum.Enum):
+    """What a noun stands for."""
+
+    THING = "thing"  # something that lies about and can be found, and mostly taken
+    PLACE = "place"  # where one can go, or where things are kept
+    PERSON = "person"  # somebody, animals included
+    VEHICLE = "vehicle"  # where things can be brought to, and which is not carried
+    ELSEWHERE = "elsewhere"  # a place out of reach
+    ABSTRACT = "abstract"  # nothing that a hand can hold
+
+    @property
+    def within_reach(self) -> bool:
+        """Whether a robot in a house can have to do with it."""
+        return self not in (NounKind.ELSEWHERE, NounKind.ABSTRACT)
+
+
+@cache
+def noun_examples() -> Mapping[str, NounKind]:
+    """The examples that come with the package: each noun, or pair of nouns, and its kind."""
+    text = resources.files(__package__).joinpath("nouns.yaml").read_text(encoding="utf-8")
+    data: dict[str, dict[str, list[Any]]] = yaml.load(text, Loader=yaml.BaseLoader)
+    kinds = [(NounKind(kind), noun) for kind, fields in data.items() for nouns in fields.values() for noun in nouns]
+    return {noun: kind for kind, noun in reversed(kinds)}
+
+
+@dataclass(frozen=True)
+class NounKinds:
+    """Judges nouns: `weights`, of shape (dimensions + 1, kinds), gives a score for each kind; its last row is constant."""
+
+    examples: Mapping[str, NounKind]
+    vector_of: VectorOf
+    weights: FloatArray
+
+    @classmethod
+    def learn(cls, examples: Mapping[str, NounKind], vector_of: VectorOf) -> NounKinds:
+        """Learn from examples; `vector_of` gives the unit vector of a word, or None."""
+        single = ((vector_of(noun), kind) for noun, kind in examples.items() if " " not in noun)
+        known = [(vector, kind) for vector, kind in single if vector is not None]
+        vectors = np.array([vector for vector, _ in known])
+        labels = np.array([list(NounKind).index(kind) for _, kind in known])
+        return cls(examples, vector_of, _discriminant(vectors, labels))
+
+    def kind(self, words: Sequence[str], *, lemma: str) -> NounKind | None:
+        """The kind of a noun, the last of `words`, with what stands before it; None when unknown.
+
+        `lemma` is its dictionary form. In doubt it is something within reach.
+        """
+        *before, noun = words
+        pairs = [f"{before[-1]} {form}" for form in (noun, lemma)] if before else []
+        for known in (*pairs, noun, lemma):
+            if known in self.examples:
+                return self.examples[known]
+        scores = self.scores(words)
+        return None if scores is None else list(NounKind)[int(np.argmax(scores))]
+
+    def scores(self, words: Sequence[str]) -> FloatArray | None:
+        """The score of each kind for a noun; the words before it count less."""
+        vector = self.vector_of(words[-1])
+        if vector is None:
+            return None
+        before = [v for v in map(self.vector_of, words[:-1]) if v is not None]
+        if before:
+            vector = vector + _MODIFIER_WEIGHT * np.mean(before, axis=0)
+            vector = vector / np.linalg.norm(vector)
+        doubt = np.array([_MARGIN * kind.within_reach for kind in NounKind])
+        scores: FloatArray = np.append(vector, 1.0) @ self.weights + doubt
+        return scores
+
+
+def _discriminant(vectors: FloatArray, labels: npt.NDArray[np.int_]) -> FloatArray:
+    """The weights of a linear discriminant with shrunk covariance, all kinds being equally likely beforehand."""
+    means = np.array([vectors[labels == label].mean(axis=0) for label in range(len(NounKind))])
+    spread = vectors - means[labels]
+    covariance = spread.T @ spread / len(vectors)
+    size = len(covariance)
+    ball = np.trace(covariance) / size * np.eye(size)
+    slopes = np.linalg.solve((1 - _SHRINKAGE) * covariance + _SHRINKAGE * ball, means.T)
+    return np.vstack([slopes, -0.5 * np.sum(means.T * slopes, axis=0)])

@@ -1,0 +1,83 @@
+"""What lies within the robot's reach: things that a hand can hold, places in the house, and no people to be carried."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from executive.knowledge import Knowledge
+from executive.language.grounding import known_line
+from executive.language.lexicon import VerbKind, lexicon
+from executive.language.nouns import NounKind
+from executive.language.phrases import Phrase
+from executive.language.reference import Deed
+from executive.language.refusal import RefusalError
+from executive.language.roles import Location
+
+__all__ = ["check_reach", "not_understood"]
+
+
+def check_reach(deeds: Sequence[Deed], knowledge: Knowledge | None) -> None:
+    """Refuse to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
+
+    Raises:
+        RefusalError: any deed is out of reach; it names all that is.
+    """
+    people = [f"{d.verb} {d.target.text}" for d in deeds if _carries(d) and d.target is not None and d.target.person]
+    if people:
+        raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
+    outside = [part for deed in deeds for part in _outside(deed)]
+    if outside:
+        raise not_understood(outside, knowledge)
+
+
+def not_understood(parts: Sequence[str], knowledge: Knowledge | None) -> RefusalError:
+    """The refusal that names the parts which lie outside the mission."""
+    quoted = ", ".join(repr(part) for part in dict.fromkeys(parts))
+    return RefusalError(f"I do not understand {quoted}; {known_line(knowledge)}", parts)
+
+
+def _carries(deed: Deed) -> bool:
+    return deed.kind not in (VerbKind.GO, VerbKind.FIND)
+
+
+def _outside(deed: Deed) -> Iterator[str]:
+    """The parts of a deed that are out of reach."""
+    if deed.target is not None and (deed.target.universal or not _holdable(deed.target, deed)):
+        yield f"{deed.verb} {deed.target.spoken}"
+    for place in (deed.source, deed.goal):
+        yield from _outside_place(place, deed)
+
+
+def _holdable(phrase: Phrase, deed: Deed) -> bool:
+    """Whether it is something to be found, and taken where the deed takes it."""
+    if phrase.known:
+        return True
+    if deed.kind is not VerbKind.FIND and (_fixture(phrase) or phrase.kind is NounKind.VEHICLE):
+        return False
+    return not _light(phrase, deed) and (phrase.kind is None or phrase.kind.within_reach)
+
+
+def _fixture(phrase: Phrase) -> bool:
+    return phrase.head.lemma in lexicon().fixtures
+
+
+def _light(phrase: Phrase, deed: Deed) -> bool:
+    """Whether verb and noun are one act, as in "take a picture": the noun is no thing then."""
+    acts = lexicon().light_nouns.get(deed.verb.split()[0], frozenset())
+    return phrase.head.lemma in acts and phrase.indefinite and deed.source is None and deed.goal is None
+
+
+def _outside_place(place: Location | None, deed: Deed) -> Iterator[str]:
+    while place is not None:
+        phrase = place.phrase
+        if phrase is not None and (phrase.universal or not _reachable(phrase, place)):
+            yield f"{deed.verb} {place.preposition} {phrase.spoken}".replace("  ", " ")
+        place = place.within
+
+
+def _reachable(phrase: Phrase, place: Location) -> bool:
+    """Whether one can go there, or to somebody; a name in front of a place is somebody's ("Paris at the desk")."""
+    named = place.within is not None and phrase.head.pos == "PROPN"
+    if phrase.known or named or phrase.person:
+        return True
+    return phrase.nominal and (phrase.kind is None or phrase.kind.within_reach)

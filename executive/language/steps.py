@@ -1,0 +1,146 @@
+"""The steps from a cleaned sentence to its commands, and the trace that they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from executive.command import Command
+from executive.knowledge import Knowledge
+from executive.language.actions import Action, read_actions
+from executive.language.clauses import Clause, split_clauses, without_name
+from executive.language.drafts import Draft, draft_commands, spoken_command
+from executive.language.grounding import ground_noted, known_line
+from executive.language.items import Item, split_items
+from executive.language.lexicon import lexicon
+from executive.language.mending import mended
+from executive.language.names import name_table, parse_with_names
+from executive.language.normalise import MAX_WORDS, open_commands
+from executive.language.parser import DependencyParser, Token
+from executive.language.phrases import noun_phrases
+from executive.language.reach import check_reach, not_understood
+from executive.language.reference import Deed, Memory, resolve
+from executive.language.refusal import RefusalError
+from executive.language.similar import WordFacts
+
+__all__ = ["Trace", "trace_sentence"]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What each step made of a sentence, in the order of the fields; steps behind a refusal are empty.
+
+    `notes` say which name was taken for which. `refused_at` names the step that refused. `memory` is what was spoken
+    of before, and afterwards what was spoken of last.
+    """
+
+    text: str
+    opened: str = ""
+    tokens: tuple[Token, ...] = ()
+    items: tuple[Item, ...] = ()
+    clauses: tuple[Clause, ...] = ()
+    actions: tuple[Action, ...] = ()
+    deeds: tuple[Deed, ...] = ()
+    drafts: tuple[Draft, ...] = ()
+    commands: tuple[Command, ...] = ()
+    notes: tuple[str, ...] = ()
+    refusal: RefusalError | None = None
+    refused_at: str | None = None
+    memory: Memory = field(default_factory=Memory)
+
+
+@dataclass(frozen=True)
+class _Context:
+    parser: DependencyParser
+    knowledge: Knowledge | None
+
+
+def trace_sentence(
+    text: str, *, parser: DependencyParser, knowledge: Knowledge | None, memory: Memory | None = None
+) -> Trace:
+    """All steps from text, without wake phrase, to commands; never raises on text.
+
+    With `knowledge` None all names stay as they were spoken. `memory` is what earlier sentences spoke of.
+    """
+    trace, context = Trace(text, memory=memory or Memory()), _Context(parser, knowledge)
+    for name, step in _STEPS.items():
+        try:
+            trace = step(trace, context)
+        except RefusalError as refusal:
+            return replace(trace, refusal=refusal, refused_at=name)
+    return trace
+
+
+def _open(trace: Trace, _: _Context) -> Trace:
+    words = trace.text.split()
+    if len(words) > MAX_WORDS:
+        raise RefusalError(f"{len(words)} words are too many for one sentence; say it in {MAX_WORDS} at most")
+    return replace(trace, opened=open_commands(trace.text))
+
+
+def _parse(trace: Trace, context: _Context) -> Trace:
+    table = None if context.knowledge is None else name_table(context.knowledge)
+    return replace(trace, tokens=parse_with_names(trace.opened, context.parser, table))
+
+
+def _read(trace: Trace, _: _Context) -> Trace:
+    return replace(trace, items=mended(split_items(trace.tokens, noun_phrases(trace.tokens), lexicon())))
+
+
+def _split(trace: Trace, context: _Context) -> Trace:
+    clauses = split_clauses(trace.items)
+    if not clauses:
+        raise RefusalError(f"nothing was said; {known_line(context.knowledge)}")
+    return replace(trace, clauses=clauses if context.knowledge else without_name(clauses))
+
+
+def _act(trace: Trace, context: _Context) -> Trace:
+    trace = replace(trace, actions=read_actions(trace.clauses, lexicon()))
+    _check_actions(trace.actions, context.knowledge)
+    return trace
+
+
+def _check_actions(actions: Sequence[Action], knowledge: Knowledge | None) -> None:
+    """Refuse the whole sentence when any part of it was not understood."""
+    unknown = tuple(dict.fromkeys(word for action in actions for word in action.unknown))
+    if unknown:
+        raise not_understood(unknown, knowledge)
+    if not any(action.kind for action in actions):
+        told = [phrase.text for action in actions for phrase in action.objects]
+        raise RefusalError(f"nothing to do was said; {known_line(knowledge)}", told)
+
+
+def _refer(trace: Trace, context: _Context) -> Trace:
+    deeds, memory = resolve(trace.actions, trace.memory)
+    return replace(trace, deeds=deeds, memory=memory)
+
+
+def _reach(trace: Trace, context: _Context) -> Trace:
+    check_reach(trace.deeds, context.knowledge)
+    return trace
+
+
+def _draft(trace: Trace, _: _Context) -> Trace:
+    return replace(trace, drafts=draft_commands(trace.deeds))
+
+
+def _command(trace: Trace, context: _Context) -> Trace:
+    if context.knowledge is None:
+        return replace(trace, commands=tuple(map(spoken_command, trace.drafts)))
+    facts = context.parser if isinstance(context.parser, WordFacts) else None
+    grounded = ground_noted(trace.drafts, context.knowledge, facts)
+    return replace(trace, commands=grounded.commands, notes=grounded.notes)
+
+
+_STEPS: Final[dict[str, Callable[[Trace, _Context], Trace]]] = {
+    "cleaning": _open,
+    "parsing": _parse,
+    "reading": _read,
+    "clauses": _split,
+    "actions": _act,
+    "reference": _refer,
+    "reach": _reach,
+    "drafts": _draft,
+    "grounding": _command,
+}

@@ -72,6 +72,14 @@ class Event:
 
 
 @dataclass(frozen=True)
+class Replacement:
+    """A mission, and the name of the one whose place it takes; None is the one under way."""
+
+    tree: CompiledTree
+    instead_of: str | None = None
+
+
+@dataclass(frozen=True)
 class Wishes:
     """What the runner is to heed now; `preempts` are missions to do first, `instead` and `later` as they say."""
 
@@ -80,7 +88,7 @@ class Wishes:
     preempts: tuple[CompiledTree, ...]
     breakpoints: frozenset[str]
     events: tuple[Event, ...]
-    instead: tuple[CompiledTree, ...] = ()
+    instead: tuple[Replacement, ...] = ()
     later: tuple[CompiledTree, ...] = ()
 
 
@@ -108,7 +116,7 @@ class Control:
         self._known: frozenset[str] = frozenset()
         self._breakpoints: frozenset[str] = frozenset()
         self._preempts: tuple[CompiledTree, ...] = ()
-        self._instead: tuple[CompiledTree, ...] = ()
+        self._instead: tuple[Replacement, ...] = ()
         self._later: tuple[CompiledTree, ...] = ()
         self._events: tuple[Event, ...] = ()
 
@@ -226,15 +234,18 @@ class Control:
             self._later += (tree,)
             self._note("then", f"afterwards '{tree.mission_name}'")
 
-    def replace(self, tree: CompiledTree) -> None:
+    def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
         """Do another mission instead of the one under way, which is given up.
+
+        With `instead_of` it takes the place of the mission of that name: one that waits is not begun, and one that is
+        not under way just now is left alone, as by `preempt`.
 
         Raises:
             ValueError: no such robot in the run.
         """
         with self._changed:
             self._refuse_robot(tree)
-            self._instead += (tree,)
+            self._instead += (Replacement(tree, instead_of),)
             self._note("replace", f"instead '{tree.mission_name}'")
 
     def answer(self, question_id: str, text: str) -> None:

@@ -209,8 +209,9 @@ class _Run:
         if wishes.cancel is not None:
             raise _CancelledError(wishes.cancel)
         for session in live:
-            for tree in _for_robot(session, wishes.instead):
-                session.replace(tree)
+            for wish in wishes.instead:
+                if wish.tree.robot_name == session.name:
+                    session.replace(wish.tree, wish.instead_of)
             for tree in _for_robot(session, wishes.preempts):
                 session.preempt(tree)
             for tree in _for_robot(session, wishes.later):

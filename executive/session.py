@@ -153,8 +153,19 @@ class Session:
         """Begin another mission when the one that the robot began with is done."""
         self._later += (tree,)
 
-    def replace(self, tree: CompiledTree) -> None:
-        """Give up the mission under way and begin another in its place."""
+    def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
+        """Give up the mission under way, or not begin one that waits, and have another in its place.
+
+        Where the mission called `instead_of` is neither, the other is done first.
+        """
+        if any(waiting.mission_name == instead_of for waiting in self._later):
+            self._later = tuple(tree if one.mission_name == instead_of else one for one in self._later)
+        elif instead_of in (None, self.tree.mission_name):
+            self._give_up_for(tree)
+        else:
+            self.preempt(tree)
+
+    def _give_up_for(self, tree: CompiledTree) -> None:
         self.hold()
         given_up = self._top
         given_up.halt(self._attempt)

@@ -1,0 +1,14 @@
+"""A conversation with a robot that works: requests, corrections, questions and answers, remarks about the run.
+
+From Python, beside a run:
+
+    conversation = Conversation(speech, control)
+    run([entry], control=control, observer=conversation.observe, ...)     # in one thread
+    reply = conversation.hear("no, the hammer", now_s=12.0)               # from another
+    print(reply.text)
+"""
+
+from executive.conversation.parts import Hands, Reply, ReplyKind, Speech
+from executive.conversation.talk import Conversation
+
+__all__ = ["Conversation", "Hands", "Reply", "ReplyKind", "Speech"]

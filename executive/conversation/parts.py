@@ -1,0 +1,105 @@
+"""What a conversation is made of: the hands on the run, how sentences become missions, and replies."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from executive.command import Command
+from executive.compiler import CompiledTree
+from executive.control import ControlState
+from executive.knowledge import Knowledge
+from executive.language.questions import ClarifyingQuestion
+from executive.language.reference import Memory
+from executive.language.understand import Understanding
+
+__all__ = ["NEVER_MIND", "OVER", "Hands", "Reply", "ReplyKind", "Speech", "answer", "done", "refused"]
+
+OVER: Final = "the run is over; begin another with 'errand run'"
+NEVER_MIND: Final = "all right, never mind"
+
+
+class Hands(Protocol):
+    """What a conversation does to a run; `executive.control.Control` is one."""
+
+    @property
+    def state(self) -> ControlState:
+        """What can be seen of the run."""
+
+    def pause(self, reason: str = ...) -> None:
+        """Hold the robot still."""
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+
+    def cancel(self, reason: str = ...) -> None:
+        """End the run."""
+
+    def stop_button(self, reason: str = ...) -> None:
+        """Stop at once."""
+
+    def release_stop_button(self) -> None:
+        """Let go of the stop button."""
+
+    def preempt(self, tree: CompiledTree) -> None:
+        """Do a mission first. Raises ValueError."""
+
+    def then(self, tree: CompiledTree) -> None:
+        """Do a mission afterwards. Raises ValueError."""
+
+    def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
+        """Do a mission instead of the one of that name. Raises ValueError."""
+
+    def answer(self, question_id: str, text: str) -> None:
+        """Answer the mission's own question. Raises ValueError."""
+
+
+@dataclass(frozen=True)
+class Speech:
+    """How sentences become missions of one robot.
+
+    `understand` takes a sentence without wake phrase and what was spoken of before; `compile` makes a mission of
+    commands under a name that is none of those given, and raises InputError.
+    """
+
+    knowledge: Knowledge
+    robot_name: str
+    understand: Callable[[str, Memory | None], Understanding]
+    compile: Callable[[Sequence[Command], frozenset[str]], CompiledTree]
+
+
+class ReplyKind(enum.Enum):
+    """What became of what was said."""
+
+    DONE = "done"  # it is done, or begun
+    ANSWER = "answer"  # it was a question to the robot
+    QUESTION = "question"  # the robot asks back
+    REFUSED = "refused"  # it cannot be done; the text says why
+    IGNORED = "ignored"  # it was not said to this robot
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What the robot says, in one line, and the commands that it begins with or the question that it asks."""
+
+    kind: ReplyKind
+    text: str
+    commands: tuple[Command, ...] = ()
+    question: ClarifyingQuestion | None = None
+
+
+def answer(text: str) -> Reply:
+    """An answer to what was asked."""
+    return Reply(ReplyKind.ANSWER, text)
+
+
+def done(text: str) -> Reply:
+    """It is done."""
+    return Reply(ReplyKind.DONE, text)
+
+
+def refused(text: str) -> Reply:
+    """It cannot be done."""
+    return Reply(ReplyKind.REFUSED, text)

@@ -1,0 +1,72 @@
+"""What remarks about the run do: they act at once, through the hands on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from executive.control import Mode
+from executive.conversation.parts import OVER, Hands, Reply, Speech, answer, done, refused
+from executive.conversation.status_words import doing_in_words, place_in_words
+from executive.language.grounding import known_line
+from executive.language.remarks import Remark
+from executive.runner import Progress
+
+__all__ = ["RemarkAnswers"]
+
+_TOLD_TO_STOP: Final = "told to stop"
+
+
+class RemarkAnswers:
+    """Stops, holds, goes on, cancels, and tells where the robot is and what it does. `progress` is the latest."""
+
+    def __init__(self, speech: Speech, hands: Hands) -> None:
+        self._speech, self._hands = speech, hands
+        self.progress: Progress | None = None
+        self._answers: Mapping[Remark, Callable[[], Reply]] = MappingProxyType(
+            {
+                Remark.STOP: self._stop,
+                Remark.WAIT: self._wait,
+                Remark.GO_ON: self._go_on,
+                Remark.CANCEL: self._cancel,
+                Remark.WHERE: self._where,
+                Remark.DOING: lambda: answer(doing_in_words(self.progress, hands.state, speech.robot_name)),
+                Remark.ABLE: lambda: answer(known_line(speech.knowledge)),
+                Remark.THANKS: lambda: answer("you are welcome"),
+            }
+        )
+
+    def to(self, remark: Remark) -> Reply:
+        """Do what a remark asks for."""
+        acts = remark in (Remark.STOP, Remark.WAIT, Remark.GO_ON, Remark.CANCEL)
+        if acts and self._hands.state.mode is Mode.ENDED:
+            return refused(OVER)
+        return self._answers[remark]()
+
+    def _stop(self) -> Reply:
+        self._hands.stop_button(_TOLD_TO_STOP)
+        return done("I stand still; say 'go on' when I may move again")
+
+    def _wait(self) -> Reply:
+        self._hands.pause("told to wait")
+        return done("I wait; say 'go on' when I may go on")
+
+    def _go_on(self) -> Reply:
+        state = self._hands.state
+        if state.mode is Mode.STOPPED and state.reason != _TOLD_TO_STOP:
+            return refused(f"{state.reason}; release it where it was pressed")
+        held = state.mode in (Mode.STOPPED, Mode.PAUSED)
+        self._hands.release_stop_button()
+        self._hands.resume()
+        return done("I go on" if held else "I am under way")
+
+    def _cancel(self) -> Reply:
+        self._hands.cancel("told to cancel")
+        return done("I give it up and stop")
+
+    def _where(self) -> Reply:
+        glance = None if self.progress is None else self.progress.glances.get(self._speech.robot_name)
+        if glance is None:
+            return answer("I do not know yet; the run has not begun")
+        return answer(place_in_words(glance.pose, self._speech.knowledge))

@@ -1,0 +1,326 @@
+"""The conversation itself: to whom something is said, what it goes on from, and what is begun by it."""
+
+from __future__ import annotations
+
+import enum
+import re
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import Final
+
+from executive.command import Command, Task, Thing
+from executive.compiler import CompiledTree
+from executive.control import Mode
+from executive.conversation.parts import NEVER_MIND, OVER, Hands, Reply, ReplyKind, Speech, answer, done, refused
+from executive.conversation.remarks import RemarkAnswers
+from executive.errors import InputError
+from executive.language.followups import Amendment, FollowUp, FollowUpKind, amended, follow_up_of, without_fetching
+from executive.language.questions import ClarifyingQuestion, with_answer
+from executive.language.reference import Memory
+from executive.language.remarks import Remark, remark_of
+from executive.language.understand import Status, Understanding
+from executive.language.wake import heard_wake, strip_wake
+from executive.runner import Progress
+
+__all__ = ["REMEMBERED_S", "Conversation"]
+
+REMEMBERED_S: Final = 60.0
+"""How long (robot's clock) what was spoken of is remembered, and a question waits for its answer."""
+
+
+@dataclass(frozen=True)
+class _Spoken:
+    """A request: its commands, what it spoke of, when (s), and the mission that it became."""
+
+    commands: tuple[Command, ...]
+    memory: Memory | None
+    at_s: float
+    mission: str
+
+
+@dataclass(frozen=True)
+class _Open:
+    """A question that waits, and what was said that led to it."""
+
+    question: ClarifyingQuestion
+    sentence: str
+    at_s: float
+
+
+class _When(enum.Enum):
+    """When a mission is done, in a word for the reply."""
+
+    FIRST = "first"
+    INSTEAD = "instead"
+    AFTERWARDS = "afterwards"
+
+
+class Conversation:
+    """What is said to one robot during a run. All methods may be called from any thread.
+
+    With `require_wake` only what is said to the robot by its name counts, and answers to its questions.
+    """
+
+    def __init__(self, speech: Speech, hands: Hands, *, require_wake: bool = False, others: Sequence[str] = ()) -> None:
+        self._speech, self._hands = speech, hands
+        self._require_wake, self._others = require_wake, tuple(others)
+        self._lock = threading.Lock()
+        self._progress: Progress | None = None
+        self._last: _Spoken | None = None
+        self._open: _Open | None = None
+        self._names: frozenset[str] = frozenset()
+        self._seen: frozenset[str] = frozenset()  # missions that have begun
+        self._remarks = RemarkAnswers(speech, hands)
+
+    def begun(self, tree: CompiledTree, *, memory: Memory | None = None, now_s: float = 0.0) -> None:
+        """The run begins with a mission: it can be corrected, and spoken of, as any other."""
+        with self._lock:
+            self._names |= {tree.mission_name}
+            self._last = _Spoken(tree.commands, memory, now_s, tree.mission_name)
+
+    def observe(self, progress: Progress) -> None:
+        """See how far the run is; an observer for the runner."""
+        self._progress = self._remarks.progress = progress
+        tree = progress.trees.get(self._speech.robot_name)
+        if tree is not None and tree.mission_name not in self._seen:
+            self._seen |= {tree.mission_name}
+
+    def hear(self, text: str, now_s: float | None = None) -> Reply:
+        """Do what was said and say what became of it. `now_s` is the robot's clock; that of the run unless given.
+
+        Never raises on text.
+        """
+        with self._lock:
+            seen_s = 0.0 if self._progress is None else self._progress.now_s
+            now_s = seen_s if now_s is None else now_s
+            said, ignored = self._addressed(text, now_s)
+            return ignored or self._reply(said, now_s)
+
+    # -- to whom -----------------------------------------------------------------------------------------------------
+
+    def _addressed(self, text: str, now_s: float) -> tuple[str, Reply | None]:
+        """The text without the wake phrase, and why it is not for this robot."""
+        name = self._speech.robot_name
+        short = text[:_MOST_LETTERS]
+        if not self._require_wake:
+            wake = strip_wake(short, name)
+            if wake.other_name is None:
+                return wake.text, None
+            return short, Reply(ReplyKind.IGNORED, f"it is said to {wake.other_name}, and I am {name}")
+        address = heard_wake(short, name, others=self._others)
+        if address.name is None and self._waiting(now_s) is None:
+            return short, Reply(ReplyKind.IGNORED, f'my name was not said; begin with "Hey {name}"')
+        return address.text, None
+
+    def _reply(self, text: str, now_s: float) -> Reply:
+        if not text.strip(" .,!?"):
+            return answer("yes?")
+        remark = remark_of(text)
+        if remark is Remark.CANCEL and self._waiting(now_s) is not None:
+            self._open = None
+            return done(NEVER_MIND)
+        if remark is not None:
+            return self._remarks.to(remark)
+        for step in (self._answer_mission, self._answer_own, self._follow_up):
+            reply = step(text, now_s)
+            if reply is not None:
+                return reply
+        return self._request(text, now_s)
+
+    # -- answers -----------------------------------------------------------------------------------------------------
+
+    def _answer_mission(self, text: str, now_s: float) -> Reply | None:
+        """An answer to a question that the mission asks."""
+        said = text.strip(" .,!?").lower()
+        for each in self._hands.state.questions:
+            option = next((o for n, o in enumerate(each.options, 1) if said in (o.lower(), str(n))), None)
+            chosen = option or (text if not each.options else None)
+            if chosen is not None:
+                return self._tried(partial(self._hands.answer, each.id, chosen), f"{chosen}, then")
+        return None
+
+    def _answer_own(self, text: str, now_s: float) -> Reply | None:
+        """An answer to the question that the robot asked."""
+        waiting, self._open = self._waiting(now_s), None
+        if waiting is None:
+            return None
+        if text.strip(" .,!?").lower() in _NONE_OF_THEM:
+            return done(NEVER_MIND)
+        whole = with_answer(waiting.sentence, waiting.question, text)
+        reply = self._said(whole, now_s)
+        if reply.kind is not ReplyKind.REFUSED:
+            return reply
+        if follow_up_of(text) is not None or self._understood(text, now_s).status is Status.OK:
+            return None
+        self._open = waiting
+        return Reply(ReplyKind.QUESTION, f"I did not understand. {waiting.question.text}", question=waiting.question)
+
+    def _waiting(self, now_s: float) -> _Open | None:
+        return self._open if self._open is not None and now_s - self._open.at_s <= REMEMBERED_S else None
+
+    def _ask(self, question: ClarifyingQuestion, sentence: str, now_s: float) -> Reply:
+        self._open = _Open(question, sentence, now_s)
+        return Reply(ReplyKind.QUESTION, question.text, question=question)
+
+    # -- requests ----------------------------------------------------------------------------------------------------
+
+    def _said(self, text: str, now_s: float) -> Reply:
+        return self._follow_up(text, now_s) or self._request(text, now_s)
+
+    def _remembered(self, now_s: float) -> _Spoken | None:
+        """The last request, while it is remembered."""
+        return self._last if self._last is not None and now_s - self._last.at_s <= REMEMBERED_S else None
+
+    def _understood(self, text: str, now_s: float) -> Understanding:
+        last = self._remembered(now_s)
+        return self._speech.understand(text, None if last is None else last.memory or self._memory_of(last.commands))
+
+    def _memory_of(self, commands: Sequence[Command]) -> Memory | None:
+        """What commands of a file speak of, as if somebody had said them."""
+        thing = next((c.object or c.item for c in commands if c.object or c.item), None)
+        goal = next((c.goal for c in reversed(commands) if c.goal not in (None, _START)), None)
+        said = f"find the {thing}" if thing is not None else f"go to {goal}" if goal is not None else ""
+        return self._speech.understand(said, None).memory if said else None
+
+    def _request(self, text: str, now_s: float) -> Reply:
+        """A sentence that stands for itself."""
+        meant = self._understood(text, now_s)
+        if meant.status is not Status.OK:
+            return self._not_ok(meant, text, now_s)
+        when = _When.FIRST
+        if re.match(_LATER, text, re.IGNORECASE):
+            when = _When.AFTERWARDS
+        elif (
+            re.search(_PRONOUN, text, re.IGNORECASE)
+            and self._can_be_changed(now_s)
+            and self._same_thing(meant.commands)
+        ):
+            when = _When.INSTEAD
+        return self._begin(meant.commands, when, now_s, notes=meant.notes, memory=meant.memory)
+
+    def _not_ok(self, meant: Understanding, text: str, now_s: float) -> Reply:
+        if meant.question is not None:
+            return self._ask(meant.question, text, now_s)
+        return refused(meant.reason or "I did not understand")
+
+    def _follow_up(self, text: str, now_s: float) -> Reply | None:
+        """A sentence that goes on from the one before, while that is remembered."""
+        last, follow_up = self._remembered(now_s), follow_up_of(text)
+        if follow_up is None or last is None:
+            return None
+        when = _When.AFTERWARDS
+        if follow_up.kind is FollowUpKind.AGAIN:
+            return self._begin(last.commands, when, now_s, memory=last.memory)
+        if follow_up.kind is FollowUpKind.CORRECTION:
+            when = _When.INSTEAD if self._can_be_changed(now_s) else _When.FIRST
+        whole = self._understood(follow_up.whole, now_s)
+        if whole.status is Status.OK:
+            return self._begin(whole.commands, when, now_s, notes=whole.notes, memory=whole.memory)
+        named = self._named(follow_up, now_s)
+        if isinstance(named, Understanding):
+            return self._not_ok(named, text, now_s)
+        changed = amended(last.commands, named, self._speech.knowledge)
+        if changed == last.commands:
+            return refused(f"I do not see what '{follow_up.whole}' changes")
+        return self._begin(changed, when, now_s)
+
+    def _named(self, follow_up: FollowUp, now_s: float) -> Amendment | Understanding:
+        """What a few words name, grounded as in a whole sentence; or why that is unclear."""
+        if follow_up.said.lower() in _COUNTS:
+            return Amendment(count=_COUNTS[follow_up.said.lower()])
+        said = follow_up.said if re.match(_DETERMINED, follow_up.said, re.IGNORECASE) else f"the {follow_up.said}"
+        place = self._understood(f"go to {said}", now_s)
+        thing = self._understood(f"find {said}", now_s)
+        old = self._old_name(follow_up.instead_of, now_s)
+        if thing.status is Status.OK and not follow_up.preposition and thing.commands[0].object is not None:
+            first = thing.commands[0]
+            count = first.object_count if re.match(_COUNTED, said, re.IGNORECASE) else None
+            return Amendment(thing=first.object, count=count, old=old)
+        if place.status is Status.OK:
+            goal = place.commands[0]
+            source = follow_up.preposition in _SOURCES
+            return Amendment(goal=goal.goal, goal_at=goal.goal_at, source=source, old=old)
+        both = (place, thing) if follow_up.preposition else (thing, place)
+        return next((each for each in both if each.status is Status.QUESTION), both[0])
+
+    def _old_name(self, said: str, now_s: float) -> str | None:
+        """The known name that another takes the place of."""
+        if not said:
+            return None
+        bare = re.sub(r"^(?:the|a|an|my|some)\s+", "", said, flags=re.IGNORECASE)
+        knowledge = self._speech.knowledge
+        return knowledge.thing(bare) or knowledge.place(bare) or knowledge.person(bare)
+
+    # -- missions ----------------------------------------------------------------------------------------------------
+
+    def _begin(
+        self,
+        commands: Sequence[Command],
+        when: _When,
+        now_s: float,
+        *,
+        notes: Sequence[str] = (),
+        memory: Memory | None = None,
+    ) -> Reply:
+        """Have commands done, and remember them."""
+        state = self._hands.state
+        if state.mode is Mode.ENDED:
+            return refused(OVER)
+        todo = tuple(commands)
+        if when is _When.INSTEAD:
+            todo = without_fetching(todo, self._held(), self._speech.knowledge)
+        try:
+            tree = self._speech.compile(todo, self._names)
+        except InputError as error:
+            return refused(str(error))
+        give = {_When.FIRST: self._hands.preempt, _When.AFTERWARDS: self._hands.then}.get(when, self._replace)
+        still = "; I stand still until you say 'go on'" if state.mode in (Mode.PAUSED, Mode.STOPPED) else ""
+        text = "; ".join((*notes, f"{when.value}: {'; '.join(map(str, todo))}{still}"))
+        reply = self._tried(partial(give, tree), text, todo)
+        if reply.kind is ReplyKind.DONE:
+            self._names |= {tree.mission_name}
+            self._last = _Spoken(tuple(commands), memory, now_s, tree.mission_name)
+        return reply
+
+    def _replace(self, tree: CompiledTree) -> None:
+        self._hands.replace(tree, None if self._last is None else self._last.mission)
+
+    def _tried(self, act: Callable[[], None], text: str, commands: tuple[Command, ...] = ()) -> Reply:
+        try:
+            act()
+        except ValueError as error:
+            return refused(str(error))
+        return Reply(ReplyKind.DONE, text, commands)
+
+    def _can_be_changed(self, now_s: float) -> bool:
+        """Whether the last request is not done yet: it is under way, waits, or is about to begin."""
+        last, missions = self._remembered(now_s), self._hands.state.missions.get(self._speech.robot_name, ())
+        return last is not None and (last.mission in missions or last.mission not in self._seen)
+
+    def _same_thing(self, commands: Sequence[Command]) -> bool:
+        last = () if self._last is None else self._last.commands
+        return bool({c.object or c.item for c in commands} & {c.object or c.item for c in last} - {None})
+
+    def _held(self) -> Thing | None:
+        """The thing in the gripper, as far as the last request tells."""
+        glance = None if self._progress is None else self._progress.glances.get(self._speech.robot_name)
+        missions = self._hands.state.missions.get(self._speech.robot_name, ())
+        if glance is None or not glance.holding or self._last is None or self._last.mission not in missions[-1:]:
+            return None
+        return next((command.object for command in self._last.commands if command.task is Task.GRASP), None)
+
+
+_START: Final = "start"
+_MOST_LETTERS: Final = 2000
+_LATER: Final = r"\W*(?:then|and then|after that|afterwards|when you are done|when that is done|later)\b"
+_PRONOUN: Final = r"\b(?:it|them|that one|this one)\b"
+_DETERMINED: Final = r"(?:the|a|an|my|your|some|any|this|that|\d+|two|three|four|five|another)\b|[A-Z]|me$"
+_COUNTED: Final = r"(?:\d+|two|three|four|five|six)\b"
+_SOURCES: Final = frozenset({"from", "out of", "off", "in", "on", "at"})
+_NONE_OF_THEM: Final = frozenset({"no", "none", "neither", "none of them", "nothing", "neither of them", "no thanks"})
+_COUNTS: Final = MappingProxyType(
+    {word: number for number, words in {2: ("two", "2"), 3: ("three", "3"), 4: ("four", "4")}.items() for word in words}
+)

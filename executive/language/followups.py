@@ -1,0 +1,178 @@
+"""What is said after something else: corrections ("no, the hammer"), more of it ("the beer too"), the same again.
+
+The commands of the request before are amended by what was said; names are grounded before this step.
+"""
+
+from __future__ import annotations
+
+import enum
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from executive.command import Command, Task, Thing
+from executive.knowledge import Knowledge
+
+__all__ = ["Amendment", "FollowUp", "FollowUpKind", "amended", "follow_up_of", "without_fetching"]
+
+
+class FollowUpKind(enum.Enum):
+    """How a sentence goes on from the one before."""
+
+    CORRECTION = "correction"  # in place of it
+    ADDITION = "addition"  # after it
+    AGAIN = "again"  # the same once more, after it
+
+
+@dataclass(frozen=True)
+class FollowUp:
+    """A sentence that goes on from the one before: what it says, with its preposition, and in place of what."""
+
+    kind: FollowUpKind
+    said: str = ""
+    preposition: str = ""
+    instead_of: str = ""
+
+    @property
+    def whole(self) -> str:
+        """What was said, as it was said."""
+        return f"{self.preposition} {self.said}".strip()
+
+
+@dataclass(frozen=True)
+class Amendment:
+    """A grounded name that was said: a thing, with its number where one was said, or else a place or a person.
+
+    `source` says that the place is where the thing is; `old` is the name that it takes the place of, where said.
+    """
+
+    thing: Thing | None = None
+    count: int | None = None
+    goal: str | None = None
+    goal_at: str | None = None
+    source: bool = False
+    old: str | None = None
+
+
+def follow_up_of(text: str) -> FollowUp | None:
+    """How a sentence goes on from the one before; None when it stands for itself."""
+    plain = " ".join(text.replace("’", "'").split()).strip(" .!,")
+    if _AGAIN.fullmatch(plain):
+        return FollowUp(FollowUpKind.AGAIN)
+    for pattern, kind in _FORMS:
+        match = pattern.fullmatch(plain)
+        if match:
+            found = {key: (value or "").strip(" ,.!?") for key, value in match.groupdict().items()}
+            preposition, said = _split(found["said"])
+            return FollowUp(kind, said, preposition, _split(found.get("old", ""))[1])
+    return None
+
+
+def amended(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> tuple[Command, ...]:
+    """The commands with a thing, a place or a person changed.
+
+    A new thing is looked for where the old one was only if that was said and not the old one's usual place. A place
+    without a preposition is where things go to when that was said before, else where they are looked for.
+    """
+    if by.thing is not None:
+        return tuple(_with_thing(command, by, knowledge) for command in commands)
+    if by.goal is None:
+        return tuple(_with_count(command, by.count) for command in commands)
+    at = _place_of(commands, by)
+    return tuple(
+        replace(command, goal=by.goal, goal_at=by.goal_at) if number == at else command
+        for number, command in enumerate(commands)
+    )
+
+
+def without_fetching(commands: Sequence[Command], held: Thing | None, knowledge: Knowledge) -> tuple[Command, ...]:
+    """What is left to do when the robot holds something already.
+
+    The same thing is not gone for again; another one is put down first, in the place where such things usually are.
+    """
+    if held is None or not commands:
+        return tuple(commands)
+    first = commands[0]
+    if first.task is Task.GRASP and first.object == held and len(commands) > 1:
+        return tuple(commands[1:])
+    if all(command.item is None and command.task is not Task.GRASP for command in commands):
+        return tuple(commands)
+    usual = next(iter(knowledge.usual_surfaces(held.name)), None)
+    back = Command(item=held, goal=usual, task=Task.PLACE, object=held, verb="put back")
+    return (back, *commands) if usual is not None else tuple(commands)
+
+
+def _with_thing(command: Command, by: Amendment, knowledge: Knowledge) -> Command:
+    assert by.thing is not None
+    old = command.object or command.item
+    if old is None or (by.old is not None and old.name != by.old and by.old not in knowledge.classes(old.name)):
+        return command
+    usual = command.task in (Task.GRASP, Task.FIND) and command.goal == knowledge.default_place(command.task, old.name)
+    counts = {} if by.count is None else {"item_count": by.count, "object_count": by.count}
+    return replace(
+        command,
+        item=None if command.item is None else by.thing,
+        object=None if command.object is None else by.thing,
+        goal=knowledge.default_place(command.task, by.thing.name) if usual else command.goal,
+        item_count=counts.get("item_count", command.item_count) if command.item is not None else 1,
+        object_count=counts.get("object_count", command.object_count) if command.object is not None else 1,
+    )
+
+
+def _with_count(command: Command, count: int | None) -> Command:
+    if count is None:
+        return command
+    return replace(
+        command,
+        item_count=1 if command.item is None else count,
+        object_count=1 if command.object is None else count,
+    )
+
+
+def _place_of(commands: Sequence[Command], by: Amendment) -> int:
+    """Which command's goal a place changes."""
+    named = [n for n, command in enumerate(commands) if by.old is not None and command.goal == by.old]
+    sources = [n for n, command in enumerate(commands) if command.item is None and command.task is not None]
+    goals = [n for n, command in enumerate(commands) if n not in sources]
+    if by.source:
+        return next(iter([*named, *sources, *goals]))
+    said = [n for n in goals if commands[n].goal != _START]
+    return next(iter([*named, *said[-1:], *goals[-1:], *sources]))
+
+
+def _split(said: str) -> tuple[str, str]:
+    """A preposition at the beginning, and the rest."""
+    match = re.fullmatch(rf"({_PREPOSITION})\s+(.+)", said, re.IGNORECASE)
+    return (match.group(1).lower(), match.group(2)) if match else ("", said)
+
+
+_START: Final = "start"
+_PREPOSITION: Final = r"to|into|onto|from|out of|off|in|on|at"
+_NOUN: Final = r"(?P<said>(?:(?:to|into|onto|from|out of|off|in|on|at)\s+)?[\w'\- ]{1,60}?)"
+_NO: Final = r"(?:no|nope|nah|sorry|oops|wait|actually|i mean|i meant|rather|correction|or rather|hold on)"
+_NOT_OLD: Final = r"not\s+(?P<old>[\w'\- ]{1,40}?)"
+_OLD: Final = r"(?P<old>[\w'\- ]{1,40}?)"
+_PLEASE: Final = r"(?:[\s,]+please)?\??"
+_FORMS: Final = tuple(
+    (re.compile(pattern, re.IGNORECASE), kind)
+    for pattern, kind in (
+        (rf"(?:{_NO}[\s,]+)*not\s+{_OLD}\s*(?:,|but|,\s*but)\s*{_NOUN}", FollowUpKind.CORRECTION),
+        (rf"(?:{_NO}[\s,]+)*{_NOUN}\s*,?\s*not\s+{_OLD}", FollowUpKind.CORRECTION),
+        (rf"(?:{_NO}[\s,]+)*{_NOUN}\s+instead(?:\s+of\s+{_OLD})?{_PLEASE}", FollowUpKind.CORRECTION),
+        (rf"(?:{_NO}[\s,]+)+(?:make (?:it|that)\s+)?{_NOUN}{_PLEASE}", FollowUpKind.CORRECTION),
+        (rf"make (?:it|that)\s+{_NOUN}{_PLEASE}", FollowUpKind.CORRECTION),
+        (rf"(?:(?:and|also)\s+)?{_NOUN}[\s,]+(?:too|as well|also){_PLEASE}", FollowUpKind.ADDITION),
+        (
+            rf"(?:and|also|and also|plus|what about|and what about|how about|and then|then)\s+{_NOUN}{_PLEASE}",
+            FollowUpKind.ADDITION,
+        ),
+        (rf"(?:another|one more)\s+{_NOUN}{_PLEASE}", FollowUpKind.ADDITION),
+    )
+)
+_AGAIN: Final = re.compile(
+    r"(?:(?:and|ok|okay|please|bring me|fetch me|get me|give me|i want|i would like|i'd like|can i have)\s+)*"
+    r"(?:another(?: one)?|one more|the same again|again|once more|do (?:it|that) again|the same(?: again)?"
+    r"|one more time|repeat that)(?:[\s,]+please)?",
+    re.IGNORECASE,
+)

@@ -1,0 +1,67 @@
+from dataclasses import replace
+
+import pytest
+
+from executive.compiler import compile_mission
+from executive.control import Control
+from executive.conversation import Conversation, Speech
+from executive.language import load_parser, understand
+from executive.mission import mission_from_commands
+
+
+@pytest.fixture(scope="session")
+def parser():
+    return load_parser()
+
+
+@pytest.fixture
+def speech(parser, knowledge, registry):
+    def heard(text, memory):
+        return understand(text, parser=parser, knowledge=knowledge, require_wake=False, memory=memory)
+
+    def compiled(commands, taken):
+        mission = mission_from_commands(commands, world="test", robot_name="Alice")
+        number = 1 + sum(name.startswith(mission.name) for name in taken)
+        named = mission if number == 1 else replace(mission, name=f"{mission.name} {number}")
+        return compile_mission(named, knowledge=knowledge, registry=registry)
+
+    return Speech(knowledge, "Alice", heard, compiled)
+
+
+@pytest.fixture
+def control():
+    return Control(pace=None)
+
+
+@pytest.fixture
+def talk(speech, control):
+    """A conversation beside a run that was begun with a sentence."""
+
+    def begin(sentence="fetch me a coke from the kitchen", **options):
+        conversation = Conversation(speech, control, **options)
+        meant = speech.understand(sentence, None)
+        tree = speech.compile(meant.commands, frozenset())
+        control.begin({"Alice": tree})
+        conversation.begun(tree, memory=meant.memory)
+        return conversation
+
+    return begin
+
+
+@pytest.fixture
+def given(control):
+    """The commands of the missions that were given: first, instead, later."""
+
+    def texts():
+        wishes = control.heed()
+        return {
+            when: [[str(command) for command in tree.commands] for tree in trees]
+            for when, trees in (
+                ("first", wishes.preempts),
+                ("instead", [wish.tree for wish in wishes.instead]),
+                ("later", wishes.later),
+            )
+            if trees
+        }
+
+    return texts

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import cv2
 import numpy as np
@@ -22,6 +22,10 @@ _HALF_HEIGHT_RAD = 0.34
 _CAMERA_HEIGHT_M = 0.5
 _CAMERA_RADIUS_M = 0.22
 _BEARING_LIMIT_RAD = 2.3
+_CELL_M = 0.03
+_WHOLE_M = 0.15
+_LEAST_FILLED = 0.5
+_SPLITS = 5
 
 
 def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
@@ -75,14 +79,36 @@ def surface_boxes(surfaces: Iterable[Surface], X_WB: RigidTransform) -> list[Box
     return [_standing_box(np.asarray(s.polygon_W, dtype=float), 0.05, s.height_m, X_WB) for s in surfaces]
 
 
-def cluster_boxes(clusters: Sequence[Cluster], X_WB: RigidTransform, grow_m: float = 0.01) -> list[Box]:
-    """Things seen on a surface as boxes in the body frame."""
-    boxes = []
-    for cluster in clusters:
-        xy = cluster.points.p_W[:, :2]
-        base, top = cluster.base_m, cluster.base_m + cluster.shape.height_m + grow_m
-        boxes.append(_standing_box(xy, base, top, X_WB, grow_m))
-    return boxes
+def cluster_box(cluster: Cluster, X_WB: RigidTransform, grow_m: float = 0.01) -> Box:
+    """A thing seen on a surface as one box in the body frame."""
+    return _part_box(cluster, cluster.points.p_W[:, :2], X_WB, grow_m)
+
+
+def cluster_boxes(clusters: Iterable[Cluster], X_WB: RigidTransform, grow_m: float = 0.01) -> list[Box]:
+    """Things seen on a surface as boxes in the body frame; several for one that a single box would fill badly."""
+    parts = ((cluster, xy) for cluster in clusters for xy in standing_parts(cluster.points.p_W[:, :2]))
+    return [_part_box(cluster, xy, X_WB, grow_m) for cluster, xy in parts]
+
+
+def standing_parts(xy: FloatArray, depth: int = _SPLITS) -> list[FloatArray]:
+    """Points (N, 2) in groups, each of which fills the rectangle about it; two walls at a corner are two groups.
+
+    A rectangle that is mostly empty is halved along its longer side, and so on, `depth` times at most.
+    """
+    (x, y), (width, height), angle_deg = cv2.minAreaRect((middled := xy - xy.mean(axis=0)).astype(np.float32))
+    cells = np.unique(np.floor(xy / _CELL_M).astype(int), axis=0)
+    filled = len(cells) * _CELL_M**2 >= _LEAST_FILLED * width * height
+    if depth == 0 or filled or max(width, height) < _WHOLE_M:
+        return [xy]
+    along_rad = np.radians(angle_deg + (0.0 if width >= height else 90.0))
+    before = (middled - [x, y]) @ [np.cos(along_rad), np.sin(along_rad)] < 0.0
+    halves = [half for half in (xy[before], xy[~before]) if len(half)]
+    return [part for half in halves for part in standing_parts(half, depth - 1)]
+
+
+def _part_box(cluster: Cluster, xy: FloatArray, X_WB: RigidTransform, grow_m: float) -> Box:
+    top_m = cluster.base_m + cluster.shape.height_m + grow_m
+    return _standing_box(xy, cluster.base_m, top_m, X_WB, grow_m)
 
 
 def _standing_box(xy: FloatArray, bottom_m: float, top_m: float, X_WB: RigidTransform, grow_m: float = 0.0) -> Box:

@@ -16,7 +16,7 @@ from skills.arm.poses import carry_configuration, close_stations, look_configura
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.appearance import load_appearance
 from skills.detect.interim_segmentation import Cluster, SurfaceView, sightings, view_surface
-from skills.detect.looking import cluster_boxes, surface_boxes
+from skills.detect.looking import cluster_box, cluster_boxes, surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, plan_grasp
@@ -282,7 +282,7 @@ def _examine(
     if view is None or cluster is None:
         return None
     others = [each for each in view.clusters if each is not cluster]
-    (target_box,) = cluster_boxes([cluster], X_WB)
+    target_box = cluster_box(cluster, X_WB)
     boxes = (*surface_boxes([_seen_surface(view, surface, cluster.shape.centre)], X_WB), *cluster_boxes(others, X_WB))
     return CloseView(_target(cluster, X_WB), boxes, target_box, X_WB)
 

@@ -78,9 +78,10 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
         return Action(None, being.text)
     roles = read_roles(clause.items, words, describes=False)
     objects = [*([clause.subject.phrase] if clause.subject else []), *roles.objects]
-    places = [*roles.ats, *roles.sources, *roles.goals]
+    places = [*roles.ats, *roles.sources]
     place = next(iter(places), None)
-    fits = len(objects) == 1 and len(places) <= 1 and not roles.unknown and (place or being.existential)
+    simple = len(objects) == 1 and len(places) <= 1 and not roles.goals and not roles.unknown
+    fits = simple and (place or being.existential)
     asked_for = any(t.tag in _QUESTION_TAGS for phrase in objects for t in phrase.tokens)
     before = [clause.subject] if clause.subject else []
     unknown = () if fits and not asked_for else (spoken_words([*before, being, *clause.items]),)
@@ -122,7 +123,7 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     places = [*roles.goals, *roles.ats, *bare, *roles.joined_goals]
     if not places and blank.verb in words.goes_back:
         places = [HERE]
-    extra = [phrase.text for phrase in (roles.recipient, roles.searched) if phrase is not None]
+    extra = [part.text for part in (roles.recipient, roles.searched) if part is not None]
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
     blank = replace(blank, unknown=(*blank.unknown, *extra))
     yield from (replace(blank, goal=place) for place in places) if places else (blank,)
@@ -130,11 +131,11 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
 
 def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
     """One action for each place to look at: "in the kitchen and the hall"."""
-    objects, places = list(roles.objects), [*roles.ats, *roles.sources, *roles.goals]
+    objects, places = list(roles.objects), [*roles.ats, *roles.sources]
     if roles.searched is not None:
         places = [*(Location(phrase) for phrase in objects), *places]
         objects = [roles.searched]
-    extra = [place.text for place in places[1:]]
+    extra = [place.text for place in (*places[1:], *_others([HERE, *roles.goals]))]
     found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
     yield found
     yield from (replace(found, source=place) for place in roles.joined_goals)
@@ -147,8 +148,7 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     """
     goals, sources, ats = list(roles.goals), list(roles.sources), list(roles.ats)
     if roles.recipient is not None:
-        recipient = HERE if roles.recipient.speaker else Location(roles.recipient)
-        goals = [*goals, recipient] if goals and not goals[0].person else [recipient, *goals]
+        goals = [*goals, roles.recipient] if goals and not goals[0].person else [roles.recipient, *goals]
     at_is_goal = blank.kind is VerbKind.PLACE or blank.verb in words.at_is_goal or len(ats) > 1
     if ats and not goals and at_is_goal:
         goals.append(ats.pop())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from executive.language.items import Being, Chunk, Item, Outside, Separator, Verb, Whether
@@ -34,7 +34,30 @@ def split_clauses(items: Iterable[Item]) -> tuple[Clause, ...]:
             found.append(Clause(item))
         else:
             found[-1] = replace(found[-1], items=(*found[-1].items, item))
-    return tuple(clause for clause in found if clause.verb is not None or _content(clause.items))
+    whole = (clause for clause in found if clause.verb is not None or _content(clause.items))
+    return tuple(part for clause in whole for part in _ungapped(clause))
+
+
+def _ungapped(clause: Clause) -> Iterator[Clause]:
+    """Say the verb again where it was left out: "a beer to Robin and a coke to Charlie"."""
+    cut = next((n for n in range(1, len(clause.items) - 1) if _gap(clause.items, n)), None)
+    if cut is None or not isinstance(clause.verb, Verb):
+        yield clause
+        return
+    yield replace(clause, items=clause.items[:cut])
+    first = clause.items[0]
+    recipient = (first,) if isinstance(first, Chunk) and first.role is None and first.phrase.speaker else ()
+    yield from _ungapped(Clause(clause.verb, (*recipient, *clause.items[cut + 1 :])))
+
+
+def _gap(items: Sequence[Item], at: int) -> bool:
+    """Whether a separator stands between two things that each have a place of the same role."""
+    joint, thing, place = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
+    if not (isinstance(joint, Separator) and isinstance(thing, Chunk) and isinstance(place, Chunk)):
+        return False
+    bare = [item for item in items[:at] if isinstance(item, Chunk) and item.role is None and not item.phrase.speaker]
+    roles = [item.role for item in items[:at] if isinstance(item, Chunk) and item.role is not None]
+    return thing.role is None and place.role is not None and bool(bare) and place.role in roles
 
 
 def _content(items: Sequence[Item]) -> bool:

@@ -17,6 +17,8 @@ __all__ = ["Draft", "draft_commands", "spoken_command"]
 
 _GOES_FOR: Final = frozenset({VerbKind.FIND, VerbKind.PICK, VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP})
 
+_TAKES: Final = _GOES_FOR | {VerbKind.PLACE}
+
 
 @dataclass(frozen=True)
 class Draft:
@@ -40,7 +42,7 @@ def draft_commands(deeds: Sequence[Deed]) -> tuple[Draft, ...]:
     """
     drafts: list[Draft] = []
     held: Phrase | None = None
-    for index, deed in enumerate(joined := _join_going(deeds)):
+    for index, deed in enumerate(joined := _one_by_one(_join_going(deeds))):
         later = any(other.again and other.target == deed.target for other in joined[index + 1 :])
         if _goal(deed, later) is None and deed.verb in lexicon().goal_wanted and not later:
             raise RefusalError(f"{deed.verb} {_name(deed)}: where to?", question=True)
@@ -61,6 +63,17 @@ def _join_going(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
             deed = replace(deed, source=before.goal) if takes_source else replace(deed, goal=before.goal)
         joined.append(deed)
     return tuple(joined)
+
+
+def _one_by_one(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
+    """Carry each thing before the next is taken: "take the milk and the cup and put them on the table"."""
+    ordered: list[Deed] = []
+    for deed in deeds:
+        last = next((n for n in range(len(ordered) - 1, -1, -1) if ordered[n].target == deed.target), None)
+        between = [] if last is None else ordered[last + 1 :]
+        taken = deed.again and bool(between) and all(other.kind in _TAKES and other.goal is None for other in between)
+        ordered.insert(len(ordered) if last is None or not taken else last + 1, deed)
+    return tuple(ordered)
 
 
 def _drafts(deed: Deed, held: Phrase | None, later: bool) -> Iterator[Draft]:

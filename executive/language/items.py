@@ -257,9 +257,8 @@ class _Reader:
     def _described(self, phrase: Phrase) -> Phrase:
         """Join what tells somebody or something apart: what they do, what they wear, what it has."""
         while (end := self._description_end(phrase)) > self.at:
-            words = [t.text for t in self.tokens[self.at : end]]
+            phrase = phrase.described(self.tokens[self.at : end])
             self.at = end
-            phrase = phrase.with_extra(*words)
         return phrase
 
     def _description_end(self, phrase: Phrase) -> int:

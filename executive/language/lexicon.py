@@ -55,7 +55,9 @@ class Lexicon:
     fillers: frozenset[Phrase]
     openers: tuple[str, ...]
     requests: tuple[str, ...]
+    refusals: tuple[str, ...]
     searches: tuple[str, ...]
+    short_forms: Mapping[str, str]
     hesitations: tuple[str, ...]
     speaker: frozenset[str]
     pronouns: frozenset[str]
@@ -90,7 +92,9 @@ def lexicon() -> Lexicon:
             for phrase in phrases
         },
         fillers=_phrases(words["fillers"]),
+        refusals=_longest_first(words["refusals"]),
         searches=_longest_first(words["searches"]),
+        short_forms=words["short_forms"],
         hesitations=_longest_first(words["hesitations"]),
         openers=_longest_first(words["openers"]),
         requests=_longest_first(words["requests"]),

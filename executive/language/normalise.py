@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from executive.language.lexicon import lexicon
@@ -36,7 +36,7 @@ def open_commands(text: str) -> str:
     """
     text = _said_once(text)
     text = re.sub(r"^\W*(please\s+)?robot\b[\s,]*", r"\1", text, flags=re.IGNORECASE)
-    for words, command in ((lexicon().searches, "find"), (lexicon().requests, "bring me")):
+    for words, command in _wishes():
         text = re.sub(rf"\b(?:{_any(words)})\s+(?!you\b|to\b)", f", {command} ", text, flags=re.IGNORECASE)
     for something, thing in _SOMETHING.items():
         text = re.sub(something, thing, text, flags=re.IGNORECASE)
@@ -44,8 +44,19 @@ def open_commands(text: str) -> str:
     return text.strip(" ,;:-.")
 
 
+def _wishes() -> Iterator[tuple[Sequence[str], str]]:
+    """The ways to say what one wants, does not want or looks for, with the command that each means."""
+    yield lexicon().refusals, "do not bring"
+    yield lexicon().searches, "find"
+    yield lexicon().requests, "bring me"
+
+
 def _said_once(text: str) -> str:
-    """The text without hesitations, and without the repetition of words that were said twice ("the the")."""
+    """The text in full forms, without hesitations, and with what was said twice ("the the") said once."""
+    full = lexicon().short_forms
+    text = re.sub(
+        rf"(?<![\w'])(?:{_any(list(full))})(?![\w'])", lambda m: full[m[0].lower()], text, flags=re.IGNORECASE
+    )
     text = re.sub(rf"(?<![\w'])(?:{_any(lexicon().hesitations)})(?![\w'])[,.\s]*", " ", text, flags=re.IGNORECASE)
     return re.sub(r"\b(\w+(?:\s\w+){0,2})(?:[\s,]+\1\b)+", r"\1", " ".join(text.split()), flags=re.IGNORECASE)
 

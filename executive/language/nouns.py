@@ -56,7 +56,7 @@ def noun_examples() -> Mapping[str, NounKind]:
 
 @dataclass(frozen=True)
 class NounKinds:
-    """Judges nouns: `weights`, of shape (dimensions + 1, kinds), gives a score for each kind; its last row is constant."""
+    """Judges nouns; `weights`, of shape (dimensions + 1, kinds), gives the scores, its last row being constant."""
 
     examples: Mapping[str, NounKind]
     vector_of: VectorOf

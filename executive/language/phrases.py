@@ -120,7 +120,10 @@ class Phrase:
     @property
     def named_person(self) -> bool:
         """Whether it is a person's name."""
-        return self.head.entity == "PERSON" and self.head.pos == "PROPN" and not self._determined()
+        if self._determined() or self.plural:
+            return False
+        named = self.head.entity == "PERSON" and self.head.pos == "PROPN"
+        return named or (self.head.kind is NounKind.PERSON and len(self.tokens) == 1)
 
     @property
     def universal(self) -> bool:
@@ -170,6 +173,10 @@ class Phrase:
         """The phrase with more words behind the noun."""
         return replace(self, extra=(*self.extra, *words))
 
+    def described(self, tokens: Sequence[Token]) -> Phrase:
+        """The phrase with a description behind the noun, without articles."""
+        return self.with_extra(*(t.text for t in tokens if t.tag != "DT"))
+
     def consisting_of(self, inner: Phrase) -> Phrase:
         """The phrase with "of" and what it consists of behind the noun."""
         return replace(self.with_extra("of", inner.text), of_kind=inner.kind)
@@ -180,10 +187,10 @@ class Phrase:
 
     def instead_of_one(self, meant: Phrase) -> Phrase:
         """The phrase with the noun of `meant` in the place of "one"; its own adjectives hold."""
-        noun = tuple(t for t in meant.tokens if not t.adjective and not _is_determiner(t))
-        return replace(
-            self, tokens=(*self.tokens[:-1], *(noun or meant.tokens[-1:])), extra=(*meant.extra, *self.extra)
-        )
+        noun = [t for t in meant.tokens if not t.adjective and not _is_determiner(t)] or [meant.head]
+        single = self.head.word == "one" and meant.plural
+        last = replace(noun[-1], text=noun[-1].lemma, tag="NN") if single else noun[-1]
+        return replace(self, tokens=(*self.tokens[:-1], *noun[:-1], last), extra=(*meant.extra, *self.extra))
 
     def _determined(self) -> bool:
         return any(t.relation in ("det", "poss") for t in self.tokens)

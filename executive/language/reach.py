@@ -11,7 +11,7 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.reference import Deed
 from executive.language.refusal import RefusalError
-from executive.language.roles import Location
+from executive.language.roles import HERE, Location
 
 __all__ = ["check_reach", "not_understood"]
 
@@ -64,7 +64,8 @@ def _fixture(phrase: Phrase) -> bool:
 def _light(phrase: Phrase, deed: Deed) -> bool:
     """Whether verb and noun are one act, as in "take a picture": the noun is no thing then."""
     acts = lexicon().light_nouns.get(deed.verb.split()[0], frozenset())
-    return phrase.head.lemma in acts and phrase.indefinite and deed.source is None and deed.goal is None
+    elsewhere = deed.goal is not None and deed.goal is not HERE and not deed.goal.person
+    return phrase.head.lemma in acts and phrase.indefinite and deed.source is None and not elsewhere
 
 
 def _outside_place(place: Location | None, deed: Deed) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from executive.language.actions import Action
 from executive.language.lexicon import VerbKind
@@ -12,6 +13,9 @@ from executive.language.refusal import RefusalError
 from executive.language.roles import THERE, Location
 
 __all__ = ["Deed", "Memory", "resolve"]
+
+
+_SEVERAL: Final = frozenset({"them", "they", "these", "those"})
 
 
 @dataclass(frozen=True)
@@ -28,9 +32,13 @@ class Deed:
 
 @dataclass(frozen=True)
 class Memory:
-    """What was last spoken of: things, where they are, a place, a person."""
+    """What was last spoken of: things, where they are, a place, a person.
+
+    `gathered` are all things that were spoken of since one was last carried somewhere.
+    """
 
     things: tuple[Phrase, ...] = ()
+    gathered: tuple[Phrase, ...] = ()
     where: Location | None = None
     place: Location | None = None
     person: Location | None = None
@@ -56,10 +64,12 @@ def _done(action: Action, kind: VerbKind, memory: Memory) -> tuple[list[Deed], M
     again = any(phrase.pronoun for phrase in action.objects)
     things = _things(action, memory)
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
-    source = source or (memory.where if again else None)
+    told = again or any(phrase.stands_for_one for phrase in action.objects)
+    source = source or (memory.where if told else None)
     person = next((place for place in (goal, source) if place is not None and place.person), memory.person)
     after = Memory(
         things=things or memory.things,
+        gathered=() if goal is not None else tuple(dict.fromkeys((*memory.gathered, *things))),
         where=source if again or not things else None,
         place=goal or source or memory.place,
         person=person,
@@ -91,6 +101,8 @@ def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:
         raise RefusalError(f"what does {phrase.text!r} stand for?", [phrase.text], question=True)
     if phrase.stands_for_one:
         return [phrase.instead_of_one(memory.things[-1])]
+    if phrase.head.word in _SEVERAL and len(memory.gathered) > len(memory.things):
+        return memory.gathered
     said = phrase.said_count
     return memory.things if said is None else [thing.with_count(said) for thing in memory.things]
 

@@ -50,11 +50,15 @@ THERE: Final = Location(None, preposition="there")
 
 @dataclass
 class Roles:
-    """What stands behind a verb, sorted: bare noun phrases, places by their prepositions, and what is left over."""
+    """What stands behind a verb, sorted: bare noun phrases, places by their prepositions, and what is left over.
+
+    `first_at` is where the first of the bare phrases is to be found when that is somebody.
+    """
 
     objects: list[Phrase] = field(default_factory=list)
-    recipient: Phrase | None = None
+    recipient: Location | None = None
     searched: Phrase | None = None
+    first_at: Location | None = None
     sources: list[Location] = field(default_factory=list)
     goals: list[Location] = field(default_factory=list)
     ats: list[Location] = field(default_factory=list)
@@ -160,6 +164,9 @@ def _add_bare(roles: Roles, one: _Placed) -> None:
         return
     if one.joint and (roles.goals or roles.ats) and not roles.sources:
         roles.joined_goals.append(one.location)
+    elif one.within is not None and one.chunk.phrase.person and not roles.objects:
+        roles.objects.append(one.chunk.phrase)
+        roles.first_at = one.within
     elif one.within is not None:
         roles.objects.append(one.chunk.phrase)
         roles.ats.append(one.within)
@@ -181,7 +188,7 @@ def _add_at(roles: Roles, one: _Placed) -> None:
 
 def _add_for(roles: Roles, one: _Placed) -> None:
     if one.chunk.phrase.speaker or one.chunk.phrase.person:
-        roles.recipient = one.chunk.phrase
+        roles.recipient = one.location
     else:
         roles.searched = one.chunk.phrase
 
@@ -203,5 +210,9 @@ _ADD: Final = {
 
 def _split_recipient(roles: Roles) -> None:
     """In "give Robin a coke" and "bring me a coke" the first of the bare phrases is the recipient."""
-    if roles.objects and (roles.objects[0].speaker or (len(roles.objects) > 1 and roles.objects[0].person)):
-        roles.recipient = roles.objects.pop(0)
+    first = roles.objects[0] if roles.objects else None
+    if first is not None and (first.speaker or (len(roles.objects) > 1 and first.person)):
+        roles.objects.pop(0)
+        roles.recipient = HERE if first.speaker else Location(first, within=roles.first_at)
+    elif roles.first_at is not None:
+        roles.ats.append(roles.first_at)

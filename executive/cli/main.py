@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Callable
 from functools import partial
@@ -14,14 +13,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from executive.cli.assembly import knowledge_of, open_world
 from executive.cli.check_command import check
 from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run
 from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.new_skill_command import new_skill
-from executive.cli.output import BAD_INPUT, NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.page_view import PageView, queueing
+from executive.cli.parse_command import parse
 from executive.cli.queue_command import queue
 from executive.cli.replay_command import replay
 from executive.cli.requests import Request
@@ -29,9 +28,6 @@ from executive.cli.resume_command import resume
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.cli.tree_command import tree
-from executive.errors import InputError
-from executive.language import Status, Understanding, load_parser, parse_lines
-from executive.mission import DEFAULT_WORLD
 from executive.store.missions import MissionStore
 
 app = typer.Typer(
@@ -53,41 +49,12 @@ PageOf = Callable[[Request], PageView | None]
 
 app.command()(check)
 app.command()(tree)
+app.command()(parse)
 app.command()(log)
 app.command()(replay)
 app.command()(new_skill)
 app.command()(resume)
 app.add_typer(queue)
-
-
-@app.command()
-def parse(
-    sentence: Annotated[str | None, typer.Argument(help="The sentence.", show_default=False)] = None,
-    file: Annotated[Path | None, typer.Option(help="A file with one sentence on each line.")] = None,
-    world: World = None,
-    open_words: Annotated[bool, typer.Option("--open", help="Ground nothing in a world; names as spoken.")] = False,
-    jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each sentence.")] = False,
-    as_json: AsJson = False,
-) -> None:
-    """Show the commands that a sentence means."""
-    with refusals():
-        if (sentence is None) == (file is None):
-            raise InputError("errand parse takes one sentence or --file", mend='try: errand parse "go to the kitchen"')
-        knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))
-        parser = load_parser()
-        lines = [sentence] if sentence is not None else _lines_of(file)
-        told = parse_lines(lines, parser=parser, knowledge=knowledge)
-        if jsonl:
-            for meaning in told:
-                print(json.dumps(meaning.to_json(), ensure_ascii=False), flush=True)
-            return
-        meanings = list(told)
-        for meaning in meanings:
-            _show_meaning(meaning, as_json)
-        if as_json:
-            print_json(meanings[0].to_json() if file is None else {"sentences": [m.to_json() for m in meanings]})
-        if any(meaning.status is not Status.OK for meaning in meanings):
-            raise typer.Exit(BAD_INPUT)
 
 
 @app.command()
@@ -198,22 +165,6 @@ def _run_kept(
             ended(finished.report)
     show_files(out, console)
     return finished, shown
-
-
-def _show_meaning(meaning: Understanding, as_json: bool) -> None:
-    """The commands on standard output, or the reason on standard error."""
-    if meaning.status is not Status.OK:
-        typer.echo(f"errand: {meaning.reason}", err=True)
-    for command in meaning.commands:
-        typer.echo(str(command), err=as_json)
-
-
-def _lines_of(file: Path | None) -> list[str]:
-    assert file is not None
-    try:
-        return file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read it ({error})", mend="name a text file in UTF-8", file=file) from error
 
 
 _COUNTS: Final = ("successes", "referee_successes", "false_claims")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.language.actions import Action
@@ -12,7 +12,7 @@ from executive.language.phrases import Phrase
 from executive.language.refusal import RefusalError
 from executive.language.roles import THERE, Location
 
-__all__ = ["Deed", "Memory", "resolve"]
+__all__ = ["Deed", "Memory", "Resolved", "resolve"]
 
 
 _SEVERAL: Final = frozenset({"them", "they", "these", "those"})
@@ -44,25 +44,32 @@ class Memory:
     person: Location | None = None
 
 
-def resolve(actions: Sequence[Action], memory: Memory) -> tuple[tuple[Deed, ...], Memory]:
-    """The actions as deeds, each on one thing, and what was spoken of last; `memory` is what was spoken of before.
+@dataclass(frozen=True)
+class Resolved:
+    """The deeds of a sentence, what was spoken of last, and each pronoun with what it stood for."""
+
+    deeds: tuple[Deed, ...] = ()
+    memory: Memory = field(default_factory=Memory)
+    meanings: tuple[tuple[str, str], ...] = ()
+
+
+def resolve(actions: Sequence[Action], memory: Memory) -> Resolved:
+    """The actions as deeds, each on one thing; `memory` is what was spoken of before.
 
     Raises:
         RefusalError: a pronoun stands for nothing that was said.
     """
-    deeds: list[Deed] = []
+    resolved = Resolved(memory=memory)
     for action in actions:
-        if action.kind is None:
-            deeds, memory = _stated(action, deeds, memory)
-        else:
-            found, memory = _done(action, action.kind, memory)
-            deeds += found
-    return tuple(deeds), memory
+        kind = action.kind
+        resolved = _stated(action, resolved) if kind is None else _done(action, kind, resolved)
+    return resolved
 
 
-def _done(action: Action, kind: VerbKind, memory: Memory) -> tuple[list[Deed], Memory]:
+def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
+    memory = before.memory
     again = any(phrase.pronoun for phrase in action.objects)
-    things = _things(action, memory)
+    things = tuple(thing for phrase in action.objects for thing in _meant(phrase, memory))
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
     told = again or any(phrase.stands_for_one for phrase in action.objects)
     source = source or (memory.where if told else None)
@@ -74,23 +81,33 @@ def _done(action: Action, kind: VerbKind, memory: Memory) -> tuple[list[Deed], M
         place=goal or source or memory.place,
         person=person,
     )
-    return [Deed(kind, action.verb, thing, source, goal, again) for thing in things or (None,)], after
+    deeds = (Deed(kind, action.verb, thing, source, goal, again) for thing in things or (None,))
+    return Resolved((*before.deeds, *deeds), after, (*before.meanings, *_meanings(action, memory)))
 
 
-def _stated(action: Action, deeds: list[Deed], memory: Memory) -> tuple[list[Deed], Memory]:
+def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
+    """Each pronoun of an action with what it stands for."""
+    for phrase in action.objects:
+        meant = _meant(phrase, memory)
+        if meant != [phrase]:
+            yield phrase.text, " and ".join(thing.text for thing in meant)
+    for place in (action.source, action.goal):
+        found = _place(place, memory)
+        if place is not None and found is not None and found != place:
+            yield (THERE.preposition if place.phrase is None else place.phrase.text), found.text
+
+
+def _stated(action: Action, before: Resolved) -> Resolved:
     """Remember a statement; "it is in the drawer" tells where the thing of an earlier deed is."""
-    where = _place(action.source, memory)
-    memory = replace(memory, where=where, place=where or memory.place)
+    where = _place(action.source, before.memory)
+    memory = replace(before.memory, where=where, place=where or before.memory.place)
     if not any(phrase.pronoun for phrase in action.objects):
-        return deeds, replace(memory, things=action.objects or memory.things)
-    told = [
-        replace(deed, source=where) if deed.target in memory.things and deed.source is None else deed for deed in deeds
-    ]
-    return told, memory
-
-
-def _things(action: Action, memory: Memory) -> tuple[Phrase, ...]:
-    return tuple(thing for phrase in action.objects for thing in _meant(phrase, memory))
+        return replace(before, memory=replace(memory, things=action.objects or memory.things))
+    told = tuple(
+        replace(deed, source=where) if deed.target in memory.things and deed.source is None else deed
+        for deed in before.deeds
+    )
+    return replace(before, deeds=told, memory=memory)
 
 
 def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -31,8 +31,8 @@ __all__ = ["Trace", "trace_sentence"]
 class Trace:
     """What each step made of a sentence, in the order of the fields; steps behind a refusal are empty.
 
-    `notes` say which name was taken for which. `refused_at` names the step that refused. `memory` is what was spoken
-    of before, and afterwards what was spoken of last.
+    `meanings` are pronouns with what each stood for, `notes` say which name was taken for which. `refused_at` names
+    the step that refused. `memory` is what was spoken of before, and afterwards what was spoken of last.
     """
 
     text: str
@@ -43,6 +43,7 @@ class Trace:
     actions: tuple[Action, ...] = ()
     deeds: tuple[Deed, ...] = ()
     drafts: tuple[Draft, ...] = ()
+    meanings: tuple[tuple[str, str], ...] = ()
     commands: tuple[Command, ...] = ()
     notes: tuple[str, ...] = ()
     refusal: RefusalError | None = None
@@ -95,25 +96,24 @@ def _split(trace: Trace, context: _Context) -> Trace:
     return replace(trace, clauses=clauses if context.knowledge else without_name(clauses))
 
 
-def _act(trace: Trace, context: _Context) -> Trace:
-    trace = replace(trace, actions=read_actions(trace.clauses, lexicon()))
-    _check_actions(trace.actions, context.knowledge)
+def _act(trace: Trace, _: _Context) -> Trace:
+    return replace(trace, actions=read_actions(trace.clauses, lexicon()))
+
+
+def _check(trace: Trace, context: _Context) -> Trace:
+    """Refuse the whole sentence when any part of it was not understood."""
+    unknown = tuple(dict.fromkeys(word for action in trace.actions for word in action.unknown))
+    if unknown:
+        raise not_understood(unknown, context.knowledge)
+    if not any(action.kind for action in trace.actions):
+        told = [phrase.text for action in trace.actions for phrase in action.objects]
+        raise RefusalError(f"nothing to do was said; {known_line(context.knowledge)}", told)
     return trace
 
 
-def _check_actions(actions: Sequence[Action], knowledge: Knowledge | None) -> None:
-    """Refuse the whole sentence when any part of it was not understood."""
-    unknown = tuple(dict.fromkeys(word for action in actions for word in action.unknown))
-    if unknown:
-        raise not_understood(unknown, knowledge)
-    if not any(action.kind for action in actions):
-        told = [phrase.text for action in actions for phrase in action.objects]
-        raise RefusalError(f"nothing to do was said; {known_line(knowledge)}", told)
-
-
 def _refer(trace: Trace, context: _Context) -> Trace:
-    deeds, memory = resolve(trace.actions, trace.memory)
-    return replace(trace, deeds=deeds, memory=memory)
+    found = resolve(trace.actions, trace.memory)
+    return replace(trace, deeds=found.deeds, memory=found.memory, meanings=found.meanings)
 
 
 def _reach(trace: Trace, context: _Context) -> Trace:
@@ -139,6 +139,7 @@ _STEPS: Final[dict[str, Callable[[Trace, _Context], Trace]]] = {
     "reading": _read,
     "clauses": _split,
     "actions": _act,
+    "understanding": _check,
     "reference": _refer,
     "reach": _reach,
     "drafts": _draft,

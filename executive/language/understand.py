@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from executive.command import Command
@@ -15,7 +15,7 @@ from executive.language.parser import DependencyParser
 from executive.language.questions import ClarifyingQuestion
 from executive.language.reference import Memory
 from executive.language.similar import Mended, WordFacts, mend_spelling
-from executive.language.steps import trace_sentence
+from executive.language.steps import Trace, trace_sentence
 from executive.language.wake import strip_wake
 
 __all__ = ["Status", "Understanding", "parse_lines", "understand"]
@@ -34,7 +34,8 @@ class Status(enum.Enum):
 class Understanding:
     """What a sentence means: commands when `status` is OK, else the reason in one line.
 
-    `question` is what the robot asks back, `notes` say which name was taken for which, `memory` is what was spoken of.
+    `question` is what the robot asks back, `notes` say which name was taken for which, `memory` is what was spoken of,
+    `trace` how the answer came about.
     """
 
     text: str
@@ -45,6 +46,7 @@ class Understanding:
     question: ClarifyingQuestion | None = None
     notes: tuple[str, ...] = ()
     memory: Memory | None = None
+    trace: Trace | None = field(default=None, compare=False, repr=False)
 
     def to_json(self) -> dict[str, Any]:
         """The answer as JSON values."""
@@ -93,10 +95,10 @@ def understand(
     trace = trace_sentence(mended.text, parser=parser, knowledge=knowledge, memory=memory)
     refusal, notes = trace.refusal, (*mended.notes, *trace.notes)
     if refusal is None:
-        return Understanding(sentence, Status.OK, trace.commands, notes=notes, memory=trace.memory)
+        return Understanding(sentence, Status.OK, trace.commands, notes=notes, memory=trace.memory, trace=trace)
     status = Status.QUESTION if refusal.question else Status.REFUSED
     reason = foreign_reason(wake.text) or refusal.reason
-    return Understanding(sentence, status, (), reason, refusal.unknown, refusal.question, notes)
+    return Understanding(sentence, status, (), reason, refusal.unknown, refusal.question, notes, trace=trace)
 
 
 def parse_lines(

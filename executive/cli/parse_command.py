@@ -1,0 +1,98 @@
+"""`errand parse`: the commands that sentences mean, and how they came about."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from executive.cli.assembly import knowledge_of, open_world
+from executive.cli.output import BAD_INPUT, print_json, refusals
+from executive.errors import InputError
+from executive.language import Status, Understanding, explain, load_parser, parse_lines
+from executive.language.explain_svg import arcs_svg
+from executive.language.explain_text import explanation_lines
+from executive.mission import DEFAULT_WORLD
+
+__all__ = ["parse"]
+
+
+def parse(
+    sentence: Annotated[str | None, typer.Argument(help="The sentence.", show_default=False)] = None,
+    file: Annotated[Path | None, typer.Option(help="A file with one sentence on each line.")] = None,
+    world: Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")] = None,
+    open_words: Annotated[bool, typer.Option("--open", help="Ground nothing in a world; names as spoken.")] = False,
+    jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each sentence.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")
+    ] = False,
+    explained: Annotated[bool, typer.Option("--explain", help="Show each step from words to commands.")] = False,
+    svg: Annotated[
+        Path | None, typer.Option(help="Draw the dependency arcs of the one sentence into this file.")
+    ] = None,
+) -> None:
+    """Show the commands that a sentence means."""
+    with refusals():
+        if (sentence is None) == (file is None):
+            raise InputError("errand parse takes one sentence or --file", mend='try: errand parse "go to the kitchen"')
+        if svg is not None and sentence is None:
+            raise InputError("--svg draws one sentence", mend='try: errand parse "go to the kitchen" --svg arcs.svg')
+        knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))
+        parser = load_parser()
+        lines = [sentence] if sentence is not None else _lines_of(file)
+        told = parse_lines(lines, parser=parser, knowledge=knowledge)
+        if jsonl:
+            for meaning in told:
+                print(json.dumps(_values(meaning, explained), ensure_ascii=False), flush=True)
+            return
+        meanings = list(told)
+        if svg is not None:
+            _draw(meanings[0], svg)
+        for meaning in meanings:
+            _show(meaning, as_json, explained)
+        if as_json:
+            values = [_values(meaning, explained) for meaning in meanings]
+            print_json(values[0] if file is None else {"sentences": values})
+        if any(meaning.status is not Status.OK for meaning in meanings):
+            raise typer.Exit(BAD_INPUT)
+
+
+def _values(meaning: Understanding, explained: bool) -> dict[str, object]:
+    """The answer as JSON values, with its steps where those are asked for."""
+    steps = None if meaning.trace is None else explain(meaning.trace).to_json()
+    return {**meaning.to_json(), "steps": steps} if explained else meaning.to_json()
+
+
+def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
+    """The commands on standard output, with the steps before them, or the reason on standard error."""
+    if explained and meaning.trace is not None:
+        _echo(explanation_lines(explain(meaning.trace)), as_json)
+    elif meaning.commands:
+        _echo(map(str, meaning.commands), as_json)
+    if meaning.status is not Status.OK:
+        typer.echo(f"errand: {meaning.reason}", err=True)
+
+
+def _echo(lines: Iterable[str], as_json: bool) -> None:
+    for line in lines:
+        typer.echo(line, err=as_json)
+
+
+def _draw(meaning: Understanding, file: Path) -> None:
+    if meaning.trace is None or not meaning.trace.tokens:
+        raise InputError("there are no words to draw", mend="give a sentence in English words", file=file)
+    try:
+        file.write_text(arcs_svg(explain(meaning.trace).tokens), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write it ({error})", mend="name a file in a folder that exists", file=file) from error
+
+
+def _lines_of(file: Path | None) -> list[str]:
+    assert file is not None
+    try:
+        return file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read it ({error})", mend="name a text file in UTF-8", file=file) from error

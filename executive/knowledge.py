@@ -43,9 +43,10 @@ class Pose(_Facts):
 
 
 class RobotFacts(_Facts):
-    """The robot: the name by which it is spoken to."""
+    """The robot: the name by which it is spoken to, and the names of other robots that listen, too."""
 
     name: Annotated[str, Field(min_length=1, description='as in "Hey Alice"')]
+    others: tuple[str, ...] = Field(default=(), description="other robots: what is said to them is not for this one")
 
 
 class BatteryFacts(_Facts):

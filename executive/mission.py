@@ -6,11 +6,14 @@ The schema of the files is `executive.missionfile.schema`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from executive.command import Command
 from executive.errors import InputError
 from executive.knowledge import Knowledge
-from executive.language import DependencyParser, Status, understand
+from executive.language import DependencyParser, Status, Understanding
+from executive.language.asking import understand_asking
+from executive.language.questions import Answerer, QuestionPolicy, answer_by
 from executive.missionfile.model import (
     DEFAULT_WORLD,
     Mission,
@@ -41,8 +44,10 @@ __all__ = [
     "load_mission",
     "mission_from_commands",
     "mission_from_file",
+    "mission_from_meaning",
     "mission_from_sentence",
     "overridden",
+    "understood",
 ]
 
 
@@ -59,10 +64,36 @@ def mission_from_sentence(
     Raises:
         InputError: the sentence is refused, leaves a question open or is not for this robot; the message says why.
     """
-    answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=require_wake)
-    if answer.status is not Status.OK:
-        raise InputError(answer.reason or "the sentence was not understood")
-    return mission_from_commands(answer.commands, world=world, robot_name=knowledge.robot.name)
+    meant = understood(sentence, parser=parser, knowledge=knowledge, require_wake=require_wake)
+    return mission_from_meaning(meant, world=world, robot_name=knowledge.robot.name)
+
+
+def understood(
+    sentence: str,
+    *,
+    parser: DependencyParser,
+    knowledge: Knowledge,
+    require_wake: bool = False,
+    answer: Answerer | None = None,
+) -> Understanding:
+    """What a sentence means when it can be done; `answer` is asked where it could mean several things.
+
+    Raises:
+        InputError: it is refused, leaves a question open or is not for this robot; the message says why.
+    """
+    nobody = answer_by(QuestionPolicy.REFUSE)
+    meant = understand_asking(
+        sentence, answer=answer or nobody, parser=parser, knowledge=knowledge, require_wake=require_wake
+    )
+    if meant.status is not Status.OK:
+        raise InputError(meant.reason or "the sentence was not understood")
+    return meant
+
+
+def mission_from_meaning(meant: Understanding, *, world: str, robot_name: str) -> Mission:
+    """The mission of a sentence that was understood."""
+    mission = mission_from_commands(meant.commands, world=world, robot_name=robot_name)
+    return replace(mission, notes=meant.notes)
 
 
 def mission_from_commands(commands: Sequence[Command], *, world: str, robot_name: str) -> Mission:

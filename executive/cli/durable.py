@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from executive.cli.answers import NO_ANSWERS, Answers
 from executive.cli.assembly import take_up_plant
 from executive.cli.report import RunReport
 from executive.cli.requests import Request, filed, said
@@ -26,21 +27,25 @@ STORE: Final = "missions.sqlite"
 
 @dataclass(frozen=True)
 class Asked:
-    """What the user asked for: a file or a sentence, in a world (None: the file's own, or the usual one)."""
+    """What the user asked for: a file or a sentence, in a world (None: the file's own, or the usual one).
+
+    `answers` are to the questions that it leaves open; what is kept of a sentence has them in their places.
+    """
 
     file: Path | None = None
     say: str | None = None
     world: str | None = None
     require_wake: bool = False
+    answers: Answers = NO_ANSWERS
 
     def request(self) -> Request:
         """What it means. Raises InputError."""
         if (self.file is None) == (self.say is None):
             raise InputError("a mission file or --say is needed, and not both", mend='try: --say "Hey Alice, ..."')
         if self.say is not None:
-            return said(self.say, world=self.world, require_wake=self.require_wake)
+            return said(self.say, world=self.world, require_wake=self.require_wake, answers=self.answers)
         assert self.file is not None
-        return filed(self.file, world=self.world)
+        return filed(self.file, world=self.world, answers=self.answers)
 
     def order(self, request: Request, tree: CompiledTree, *, seed: int, out: Path, record: bool) -> Order:
         """The same, complete enough to be taken up by another process in another folder."""
@@ -54,7 +59,7 @@ class Asked:
             out=str(out.resolve()),
             commands=tuple(map(str, request.mission.commands)),
             fingerprint=fingerprint(tree),
-            sentence=self.say,
+            sentence=self.say if request.meant is None else request.meant.text,
             file=None if self.file is None else str(self.file.resolve()),
             text=None if self.file is None else self.file.read_text(encoding="utf-8"),
             require_wake=self.require_wake,

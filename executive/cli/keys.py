@@ -1,4 +1,4 @@
-"""Keys that control a run from the terminal: space, s, x, c and answers to questions."""
+"""Keys that control a run from the terminal: space, s, x, c, answers to questions, and sentences to the robot."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import threading
 import tty
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
@@ -17,16 +18,36 @@ from executive.control import Control, ControlState, Mode
 from executive.questions import OpenQuestion
 
 HELP: Final = "space pause/go on · s step · x stop button · c cancel"
+SAY_HELP: Final = f"{HELP} · : say something"
+_SAY_KEYS: Final = frozenset(":\r\n")
+_LEAVE: Final = "\x1b"
 _ENTER: Final = frozenset("\r\n")
+_LONGEST: Final = 400
 _ERASE: Final = frozenset("\x7f\b")
 
 
-class Keys:
-    """What each key does to a run. While a question waits that any text answers, keys write that text."""
+@dataclass(frozen=True)
+class Typing:
+    """What is being typed: `text` is an answer or, with `saying`, a sentence to the robot; `reply` is its last word.
 
-    def __init__(self, control: Control) -> None:
-        self._control = control
-        self.typed = ""
+    `can_say` tells that there is somebody who understands sentences.
+    """
+
+    text: str = ""
+    saying: bool = False
+    reply: str = ""
+    can_say: bool = False
+
+
+class Keys:
+    """What each key does to a run. While a question waits that any text answers, keys write that text.
+
+    A colon, or Enter, begins a sentence that `say` answers; Enter sends it, Escape leaves it.
+    """
+
+    def __init__(self, control: Control, say: Callable[[str], str] | None = None) -> None:
+        self._control, self._say = control, say
+        self.typing = Typing(can_say=say is not None)
         self._actions: Mapping[str, Callable[[], None]] = MappingProxyType(
             {
                 " ": control.toggle_pause,
@@ -39,22 +60,43 @@ class Keys:
 
     def press(self, key: str) -> None:
         """Do what the key stands for; others do nothing."""
+        if self.typing.saying:
+            self._write_sentence(key)
+            return
         question = next(iter(self._control.state.questions), None)
         if question is not None and not question.options:
             self._write(key, question)
         elif question is not None and key.isdecimal() and 1 <= int(key) <= len(question.options):
             self._answer(question, question.options[int(key) - 1])
+        elif key in _SAY_KEYS and self._say is not None:
+            self.typing = replace(self.typing, saying=True, text="", reply="")
         else:
             self._actions.get(key, _nothing)()
 
+    def _write_sentence(self, key: str) -> None:
+        text = self.typing.text
+        if key in _ENTER or key == _LEAVE:
+            said = key != _LEAVE and self._say is not None and bool(text.strip())
+            self.typing = replace(self.typing, saying=False, text="", reply="…" if said else "")
+            if said and self._say is not None:
+                self.typing = replace(self.typing, reply=self._say(text))
+        else:
+            self._edit(key)
+
+    def _edit(self, key: str) -> None:
+        """Write or erase a letter."""
+        text = self.typing.text
+        if key in _ERASE:
+            self.typing = replace(self.typing, text=text[:-1])
+        elif key.isprintable() and len(text) < _LONGEST:
+            self.typing = replace(self.typing, text=text + key)
+
     def _write(self, key: str, question: OpenQuestion) -> None:
         if key in _ENTER:
-            text, self.typed = self.typed, ""
+            text, self.typing = self.typing.text, replace(self.typing, text="")
             self._answer(question, text)
-        elif key in _ERASE:
-            self.typed = self.typed[:-1]
-        elif key.isprintable():
-            self.typed += key
+        else:
+            self._edit(key)
 
     def _answer(self, question: OpenQuestion, text: str) -> None:
         """Answer, unless the time of the question was over just now."""
@@ -70,14 +112,17 @@ class Keys:
             self._control.stop_button("the stop button is pressed at the terminal")
 
 
-def prompt_lines(state: ControlState, now_s: float, typed: str = "") -> list[str]:
-    """What to say below the tree: why the run is held, what is asked, which keys there are."""
+def prompt_lines(state: ControlState, now_s: float, typing: Typing = Typing()) -> list[str]:
+    """What to say below the tree: why the run is held, what is asked, what is typed and answered, which keys."""
     lines = [f"{state.mode.value.upper()}: {state.reason}"] if state.mode not in _NOTHING_TO_SAY else []
     for waiting in state.questions:
         question, left_s = waiting.question, max(0.0, waiting.until_s - now_s)
         choices = "  ".join(f"[{number}] {option}" for number, option in enumerate(question.options, start=1))
-        lines.append(f"? {question.text}  {choices or typed + '_'}  ('{question.default}' in {left_s:.0f} s)")
-    return [*lines, HELP]
+        lines.append(f"? {question.text}  {choices or typing.text + '_'}  ('{question.default}' in {left_s:.0f} s)")
+    lines += [typing.reply] if typing.reply else []
+    if typing.saying:
+        return [*lines, f": {typing.text}_", "Enter says it · Esc leaves it"]
+    return [*lines, SAY_HELP if typing.can_say else HELP]
 
 
 @contextmanager

@@ -27,19 +27,21 @@ PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 
 
 @contextmanager
-def live_view(tree: CompiledTree, console: Console, control: Control | None = None) -> Iterator[Observer]:
+def live_view(
+    tree: CompiledTree, console: Console, control: Control | None = None, *, say: Callable[[str], str] | None = None
+) -> Iterator[Observer]:
     """Show the tree while the mission runs; without a terminal, one line for each skill that ends.
 
-    Where somebody sits at a terminal, keys control the run.
+    Where somebody sits at a terminal, keys control the run, and `say` answers the sentences that are typed.
     """
     hands = control or Control(pace=None)
-    keys = Keys(hands)
+    keys = Keys(hands, say)
     with keys_pressed(keys) if control is not None else nullcontext(False) as heard:
         if not console.is_terminal:
             yield _Lines(tree, console)
             return
         with Live(console=console, auto_refresh=False, transient=True, vertical_overflow="crop") as live:
-            yield _Picture(live, lambda now_s: prompt_lines(hands.state, now_s, keys.typed) if heard else [])
+            yield _Picture(live, lambda now_s: prompt_lines(hands.state, now_s, keys.typing) if heard else [])
 
 
 class _Picture:
@@ -58,7 +60,7 @@ class _Picture:
         pictures = [to_rich(node_view(tree.root, states)) for tree, states in trees]
         lines = [progress_line(_of_tree(tree, states), progress.now_s) for tree, states in trees]
         prompt = [
-            Text(line, style=HELP_STYLE if line == HELP else PROMPT_STYLE, overflow="fold")
+            Text(line, style=HELP_STYLE if line.startswith(HELP) else PROMPT_STYLE, overflow="fold")
             for line in self._prompt(progress.now_s)
         ]
         below = sum(len(text.split("\n")) for text in (*lines, *prompt))

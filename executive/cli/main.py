@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from executive.cli.answers import Answers
 from executive.cli.check_command import check
 from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run
 from executive.cli.log_command import log
@@ -28,6 +29,7 @@ from executive.cli.resume_command import resume
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.cli.tree_command import tree
+from executive.language.questions import QuestionPolicy
 from executive.store.missions import MissionStore
 
 app = typer.Typer(
@@ -42,6 +44,11 @@ World = Annotated[str | None, typer.Option(help="World by name or folder; flat u
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]
 MissionFile = Annotated[Path | None, typer.Argument(metavar="FILE", help="A mission file.", show_default=False)]
 NoWake = Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")]
+Answer = Annotated[list[str] | None, typer.Option(help="An answer to a question that is asked back; in their order.")]
+Questions = Annotated[
+    QuestionPolicy | None,
+    typer.Option(help="What becomes of other questions; asked at a terminal, else refused, unless a file says."),
+]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 PageOf = Callable[[Request], PageView | None]
@@ -64,6 +71,8 @@ def run(
     world: World = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
     no_wake: NoWake = False,
+    answer: Answer = None,
+    questions: Questions = None,
     out: Annotated[Path, typer.Option(help="Folder for log, tree, recording and pictures.")] = Path("out"),
     as_json: AsJson = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
@@ -84,7 +93,7 @@ def run(
 
     with refusals():
         finished, page = _run_kept(
-            Asked(file, say, world, not no_wake),
+            Asked(file, say, world, not no_wake, Answers(tuple(answer or ()), questions)),
             seed,
             out,
             kept_in,
@@ -161,7 +170,8 @@ def _run_kept(
             start = partial(
                 run_request, request, compiled, seed=seed, out=out, record=record, page=shown, durable=durable
             )
-            finished = show_run(start, request, compiled, console, control=control, quiet=quiet)
+            talk = None if shown is None else shown.conversation
+            finished = show_run(start, request, compiled, console, control=control, quiet=quiet, conversation=talk)
             ended(finished.report)
     show_files(out, console)
     return finished, shown

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +11,13 @@ from rich.console import Console
 from executive.cli.durable import Asked
 from executive.cli.replay_command import served, wait
 from executive.cli.requests import Request
-from executive.compiler import compile_mission
+from executive.cli.talk import LateParser, conversation_of
 from executive.control import Control
+from executive.conversation import ReplyKind
 from executive.errors import InputError
-from executive.language import load_parser
-from executive.language.parser import SpacyParser
-from executive.mission import mission_from_sentence
 from executive.record.event_log import EventLog
 from executive.record.schemas import MAP
 from executive.record.surroundings import map_message
-from executive.registry import built_in_skills
 from executive.runner import Progress
 from executive.store.missions import MissionStore
 from executive.view.actions import Action, RefusedError, control_actions, text_of
@@ -43,18 +39,18 @@ class PageView:
         self._request, self._console, self._port, self._later = request, console, port, later
         self.control = Control(attended=True)
         self._feed = Feed()
-        self._threads = ThreadPoolExecutor(1, thread_name_prefix="errand-parser")
         self._progress = ProgressWatch(self._feed)
-        self._parser: Future[SpacyParser] | None = None
+        self._parser = LateParser()
+        self.conversation = conversation_of(request, self.control, self._parser)
         self._server: PageServer | None = None
         self._watch: ControlWatch | None = None
 
     def begin(self, log: EventLog, simulation: Simulation) -> None:
         """Serve the page and print its address. Raises InputError when the port is taken."""
         log.listen(self._feed)
-        self._parser = self._threads.submit(load_parser)
+        self._parser.load_ahead()
         scene = simulation.show_live()
-        sentences = {"say": said(self._preempt), **({} if self._later is None else {"queue": said(self._later)})}
+        sentences = {"say": said(self._hear), **({} if self._later is None else {"queue": said(self._later)})}
         actions = {**control_actions(self.control), **sentences, "ease": easing(scene)}
         content = PageContent(self._feed, actions, scene_url=scene.url)
         self._server = served(content, self._port)
@@ -83,25 +79,17 @@ class PageView:
 
     def close(self) -> None:
         """Serve no more; idempotent."""
-        self._threads.shutdown(wait=False)
         if self._watch is not None:
             self._watch.close()
         if self._server is not None:
             self._server.close()
 
-    def _preempt(self, sentence: str) -> str:
-        """Have a sentence done before all else; says what it was understood as."""
-        request = self._request
-        mission = mission_from_sentence(
-            sentence,
-            parser=(self._parser or self._threads.submit(load_parser)).result(),
-            knowledge=request.knowledge,
-            world=request.world.name,
-            require_wake=False,
-        )
-        tree = compile_mission(mission, knowledge=request.knowledge, registry=built_in_skills())
-        self.control.preempt(tree)
-        return f"first: {'; '.join(map(str, mission.commands))}"
+    def _hear(self, sentence: str) -> str:
+        """Have what was typed done, or answered; raises InputError with the reason where it cannot be."""
+        reply = self.conversation.hear(sentence)
+        if reply.kind in (ReplyKind.REFUSED, ReplyKind.IGNORED):
+            raise InputError(reply.text)
+        return reply.text
 
 
 def said(do: Callable[[str], str]) -> Action:

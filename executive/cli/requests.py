@@ -5,19 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from executive.cli.answers import NO_ANSWERS, Answers
 from executive.cli.assembly import knowledge_of, open_world
 from executive.compiler import CompiledTree, compile_mission
 from executive.errors import InputError
 from executive.knowledge import Knowledge
-from executive.language import load_parser
+from executive.language import Understanding, load_parser
 from executive.mission import (
     DEFAULT_WORLD,
     Mission,
     MissionFile,
     load_mission,
     mission_from_file,
-    mission_from_sentence,
+    mission_from_meaning,
     overridden,
+    understood,
 )
 from executive.registry import installed_skills
 from plant.worlds.world import World
@@ -25,33 +27,35 @@ from plant.worlds.world import World
 
 @dataclass(frozen=True)
 class Request:
-    """A mission, the world that it runs in, and what is known of that."""
+    """A mission, the world that it runs in, and what is known of that; `meant` is the sentence that it comes from."""
 
     mission: Mission
     world: World
     knowledge: Knowledge
+    meant: Understanding | None = None
 
     def compile(self) -> CompiledTree:
         """The mission's tree. Raises InputError."""
         return compile_mission(self.mission, knowledge=self.knowledge, registry=installed_skills())
 
 
-def said(text: str, *, world: str | None, require_wake: bool) -> Request:
-    """The request of a sentence.
+def said(text: str, *, world: str | None, require_wake: bool, answers: Answers = NO_ANSWERS) -> Request:
+    """The request of a sentence; `answers` are to the questions that it leaves open.
 
     Raises:
         InputError: the world is unknown or its knowledge broken, or the sentence was not understood.
     """
     opened = open_world(world or DEFAULT_WORLD)
     knowledge = knowledge_of(opened)
-    mission = mission_from_sentence(
-        text, parser=load_parser(), knowledge=knowledge, world=opened.name, require_wake=require_wake
+    meant = understood(
+        text, parser=load_parser(), knowledge=knowledge, require_wake=require_wake, answer=answers.answerer(None)
     )
-    return Request(mission, opened, knowledge)
+    mission = mission_from_meaning(meant, world=opened.name, robot_name=knowledge.robot.name)
+    return Request(mission, opened, knowledge, meant)
 
 
-def filed(file: Path, *, world: str | None) -> Request:
-    """The request of a mission file; `world` stands in for the file's own.
+def filed(file: Path, *, world: str | None, answers: Answers = NO_ANSWERS) -> Request:
+    """The request of a mission file; `world` stands in for the file's own, `answers` are to open questions.
 
     Raises:
         InputError: with file and line: the file is broken, its world unknown, or a step not understood.
@@ -59,7 +63,9 @@ def filed(file: Path, *, world: str | None) -> Request:
     loaded = load_mission(file)
     opened = open_world(world) if world is not None else _own_world(loaded)
     knowledge = overridden(loaded, knowledge_of(opened))
-    return Request(mission_from_file(loaded, parser=load_parser(), knowledge=knowledge), opened, knowledge)
+    answer = answers.answerer(loaded.questions)
+    mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
+    return Request(mission, opened, knowledge)
 
 
 def _own_world(loaded: MissionFile) -> World:

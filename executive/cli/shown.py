@@ -10,10 +10,12 @@ from typing import Protocol
 from rich.console import Console
 
 from executive.cli.live import live_view
-from executive.cli.mission_run import Finished
+from executive.cli.mission_run import Finished, both
 from executive.cli.requests import Request
+from executive.cli.talk import LateParser, conversation_of
 from executive.compiler import CompiledTree
 from executive.control import Control
+from executive.conversation import Conversation
 from executive.runner import Observer
 from executive.view.text import to_rich
 
@@ -32,16 +34,30 @@ def control_for(console: Console, *, quiet: bool) -> Control:
 
 
 def show_run(
-    start: Start, request: Request, tree: CompiledTree, console: Console, *, control: Control, quiet: bool
+    start: Start,
+    request: Request,
+    tree: CompiledTree,
+    console: Console,
+    *,
+    control: Control,
+    quiet: bool,
+    conversation: Conversation | None = None,
 ) -> Finished:
-    """Run it, shown on the console and controlled from there."""
+    """Run it, shown on the console and controlled from there; `conversation` is one that goes on elsewhere, too."""
+    for told in request.mission.notes:
+        console.print(f"{told}.", markup=False)
     for command in request.mission.commands:
         console.print(str(command), markup=False)
+    parser = LateParser()
+    talk = conversation or conversation_of(request, control, parser)
+    talk.begun(tree, memory=None if request.meant is None else request.meant.memory)
     if quiet:
-        finished = start(control=control)
+        finished = start(control=control, observer=None if conversation is None else talk.observe)
     else:
-        with live_view(tree, console, control) as observer:
-            finished = start(control=control, observer=observer)
+        with live_view(tree, console, control, say=lambda text: talk.hear(text).text) as observer:
+            if control.attended and conversation is None:
+                parser.load_ahead()
+            finished = start(control=control, observer=both(observer, talk.observe))
         console.print(to_rich(finished.tree, collapsed=False))
     for line in finished.report.lines():
         console.print(line)

@@ -83,7 +83,8 @@ def which(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQues
 
 def perhaps(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
     """Whether an unknown name stands for a known one."""
-    text = f"I know no {slot.value} '{heard}'; do you mean {listing(candidates, last='or')}?"
+    quoted = listing((f"'{name}'" for name in candidates), last="or")
+    text = f"I know no {slot.value} '{heard}'; did you mean {quoted}?"
     return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
 
 

@@ -64,14 +64,15 @@ def heard_wake(transcript: str, name: str, *, others: Collection[str] = ()) -> A
     return Address(None, transcript)
 
 
-def strip_wake(text: str, name: str) -> WakeResult:
-    """Take the wake phrase for the robot called `name` out of `text`, where it stands.
+def strip_wake(text: str, name: str, others: Collection[str] = ()) -> WakeResult:
+    """Take the wake phrase for the robot called `name` out of `text`, where it stands; `others` are other robots.
 
     A bare name at the beginning without a comma is taken out, too, but does not count as addressing.
     """
-    address = addressed_to(text, (name,))
+    address = addressed_to(text, (name, *others))
     if address.name is not None:
-        return WakeResult(address.text, addressed=True)
+        own = address.name == name
+        return WakeResult(address.text if own else text, addressed=own, other_name=None if own else address.name)
     other = re.match(rf"\s*(?i:{_GREETING})\b[\s,]+([A-Z][\w'-]*)\s*,", text)
     bare = re.sub(rf"^\W*{re.escape(name)}\s+(?!{_TOLD_OF})(?=\w)", "", text, count=1, flags=re.IGNORECASE)
     return WakeResult(bare, addressed=False, other_name=other.group(1) if other else None)

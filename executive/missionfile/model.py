@@ -113,7 +113,10 @@ class MissionStep:
 
 @dataclass(frozen=True)
 class Mission:
-    """What one robot is to do in one world. `source` is the line of its name; None when it was spoken."""
+    """What one robot is to do in one world.
+
+    `source` is the line of its name, None when it was spoken; `notes` say which name in a sentence was taken for which.
+    """
 
     name: str
     world: str
@@ -121,6 +124,7 @@ class Mission:
     steps: tuple[MissionStep, ...]
     policy: StepPolicy = StepPolicy()
     source: SourceLine | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def commands(self) -> tuple[Command, ...]:

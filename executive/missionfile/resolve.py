@@ -12,7 +12,9 @@ from typing import Final
 from executive.command import Command
 from executive.errors import InputError, Problems
 from executive.knowledge import Knowledge
-from executive.language import DependencyParser, Status, Understanding, understand
+from executive.language import DependencyParser, Status, Understanding
+from executive.language.asking import understand_asking
+from executive.language.questions import Answerer, QuestionPolicy, answer_by
 from executive.missionfile.model import Mission, MissionStep, SkillCall
 from executive.missionfile.names import typed_command
 from executive.missionfile.overrides import overridden
@@ -39,8 +41,16 @@ def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN) -> MissionFi
     return with_source(validate(MissionFile, source), source)
 
 
-def mission_from_file(file: MissionFile | Path | str, *, parser: DependencyParser, knowledge: Knowledge) -> Mission:
+def mission_from_file(
+    file: MissionFile | Path | str,
+    *,
+    parser: DependencyParser,
+    knowledge: Knowledge,
+    answer: Answerer | None = None,
+) -> Mission:
     """The mission of a file, its sentences understood and its names checked against `knowledge` and its overrides.
+
+    `answer` is asked where a sentence could mean several things; unless given, the file's own policy decides.
 
     Raises:
         InputError: with file, line and mend, also for a sentence that is not understood, for unknown names, and for
@@ -49,7 +59,8 @@ def mission_from_file(file: MissionFile | Path | str, *, parser: DependencyParse
     loaded = file if isinstance(file, MissionFile) else load_mission(file)
     own = overridden(loaded, knowledge)
     chain = () if loaded.source is None else (loaded.source.path.resolve(),)
-    return _Resolver(parser, own, loaded.robot or own.robot.name, loaded.world).mission(loaded, chain)
+    answers = answer or answer_by(loaded.questions or QuestionPolicy.REFUSE)
+    return _Resolver(parser, own, loaded.robot or own.robot.name, loaded.world, answers).mission(loaded, chain)
 
 
 @dataclass
@@ -60,6 +71,7 @@ class _Resolver:
     knowledge: Knowledge
     robot_name: str
     world: str
+    answer: Answerer
     steps_so_far: int = 0
     understood: dict[str, Understanding] = field(default_factory=dict)
 
@@ -71,7 +83,7 @@ class _Resolver:
                 steps.append(self._step(file, index, chain))
         problems.raise_any()
         source = file.source_line(("name",))
-        return Mission(file.name, self.world, self.robot_name, tuple(steps), file.over(None), source)
+        return Mission(file.name, self.world, self.robot_name, tuple(steps), file.over(None), source, self._notes())
 
     def _step(self, file: MissionFile, index: int, chain: tuple[Path, ...]) -> MissionStep:
         step, path = file.steps[index], ("steps", index)
@@ -95,10 +107,19 @@ class _Resolver:
     def _understand(self, sentence: str) -> Understanding:
         """What a sentence means; one that stands there again means the same."""
         if sentence not in self.understood:
-            self.understood[sentence] = understand(
-                sentence, parser=self.parser, knowledge=self.knowledge, require_wake=False, robot_name=self.robot_name
+            self.understood[sentence] = understand_asking(
+                sentence,
+                answer=self.answer,
+                parser=self.parser,
+                knowledge=self.knowledge,
+                require_wake=False,
+                robot_name=self.robot_name,
+                mend=False,
             )
         return self.understood[sentence]
+
+    def _notes(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(note for meant in self.understood.values() for note in meant.notes))
 
     def _used(self, file: MissionFile, index: int, chain: tuple[Path, ...]) -> Mission:
         """The mission of the file that a step uses."""

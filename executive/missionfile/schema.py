@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StrictBool, Stri
 from executive.behaviours.conditions import StaleData
 from executive.command import Task
 from executive.errors import InputError, listing
+from executive.language.questions import QuestionPolicy
 from executive.missionfile.model import (
     DEFAULT_WORLD,
     KeyPath,
@@ -158,6 +159,11 @@ class MissionFile(PolicyFile):
     parameters: dict[str, Scalar] | None = Field(
         None,
         description="Parameters with their defaults, read as ${name} in values; one without a default must be given.",
+    )
+    questions: QuestionPolicy | None = Field(
+        None,
+        description="What becomes of a sentence that could mean several things. ask: who starts the mission is asked. "
+        "first: the likeliest is taken. refuse: the file is refused, as it is unless said.",
     )
     each: PolicyFile | None = Field(None, description="The policy of every step that does not say otherwise.")
     steps: Annotated[tuple[StepFile, ...], Field(min_length=1)] = Field(description="What to do, one after the other.")

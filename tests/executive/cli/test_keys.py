@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from executive.cli.keys import HELP, Keys, keys_available, keys_pressed, prompt_lines
+from executive.cli.keys import HELP, SAY_HELP, Keys, Typing, keys_available, keys_pressed, prompt_lines
 from executive.control import Control, Mode
 from skills.api import Question
 from skills.testing.clock import VirtualClock
@@ -126,3 +126,36 @@ def test_waiting_for_keys_takes_no_time_of_the_processor(control, terminal):
         before = time.process_time()
         control.wait(control.state.version, timeout_s=0.3)
         assert time.process_time() - before < 0.1
+
+
+def said_with(control, keys, answer="all right"):
+    said = []
+    board = Keys(control, lambda text: said.append(text) or answer)
+    for key in keys:
+        board.press(key)
+    return said, board.typing
+
+
+def test_a_sentence_is_typed_behind_a_colon_and_answered(control):
+    said, typing = said_with(control, ":no, the x\x7fhammer\n")
+    assert said == ["no, the hammer"]
+    assert (typing.saying, typing.reply) == (False, "all right")
+    assert control.state.mode is Mode.RUNNING
+
+
+def test_enter_begins_a_sentence_too_and_escape_leaves_it(control):
+    assert said_with(control, "\nstop\x1b") == ([], Typing(can_say=True))
+
+
+def test_an_empty_sentence_is_not_said(control):
+    assert said_with(control, ":  \n")[0] == []
+
+
+def test_keys_act_again_after_a_sentence(control):
+    said_with(control, ":where are you\n ")
+    assert control.state.mode is Mode.PAUSED
+
+
+def test_a_sentence_being_typed_and_its_answer_stand_below_the_tree(control):
+    assert prompt_lines(control.state, 0.0, Typing("go o", True, can_say=True))[0] == ": go o_"
+    assert prompt_lines(control.state, 0.0, Typing(reply="I go on", can_say=True)) == ["I go on", SAY_HELP]

@@ -15,6 +15,7 @@ from websockets.sync.client import connect
 from executive.cli.durable import Asked
 from executive.cli.page_view import PageView, queueing
 from executive.cli.page_view import said as sentence_action
+from executive.control import Mode
 from executive.store.missions import MissionState, MissionStore
 from executive.view.actions import RefusedError
 
@@ -27,13 +28,15 @@ def request_():
 @pytest.fixture
 def page(request_):
     page = PageView(request_, Console(file=io.StringIO()))
-    page.control.begin({"Alice": request_.compile()})
+    tree = request_.compile()
+    page.control.begin({"Alice": tree})
+    page.conversation.begun(tree, memory=request_.meant.memory)
     yield page
     page.close()
 
 
 def test_a_sentence_becomes_a_mission_that_is_done_first(page):
-    say = sentence_action(page._preempt)
+    say = sentence_action(page._hear)
     assert "[bathroom]" in say({"text": "go to the bathroom"})
     (tree,) = page.control.heed().preempts
     assert [command.goal for command in tree.commands] == ["bathroom"]
@@ -45,8 +48,31 @@ def test_a_sentence_becomes_a_mission_that_is_done_first(page):
 )
 def test_a_sentence_that_is_not_understood_is_refused_with_the_reason(page, text, words):
     with pytest.raises(RefusedError, match=words):
-        sentence_action(page._preempt)({"text": text})
+        sentence_action(page._hear)({"text": text})
     assert page.control.heed().preempts == ()
+
+
+def test_remarks_act_at_once_and_are_answered(page):
+    say = sentence_action(page._hear)
+    assert say({"text": "wait"}).startswith("I wait")
+    assert page.control.state.mode is Mode.PAUSED
+    assert say({"text": "go on"}) == "I go on"
+    assert page.control.state.mode is Mode.RUNNING
+    assert "not begun" in say({"text": "where are you"})
+
+
+def test_a_question_is_asked_on_the_page_and_answered_there(page):
+    say = sentence_action(page._hear)
+    assert say({"text": "put the cube on the table"}) == "Which table: kitchen table or coffee table?"
+    assert "[coffee table]" in say({"text": "the coffee table"})
+    (tree,) = page.control.heed().preempts
+    assert tree.commands[-1].goal == "coffee table"
+
+
+def test_a_correction_takes_the_place_of_the_mission(page):
+    assert sentence_action(page._hear)({"text": "no, to the bathroom"}).startswith("instead: ")
+    (wish,) = page.control.heed().instead
+    assert (wish.tree.commands[0].goal, wish.instead_of) == ("bathroom", "go kitchen")
 
 
 def test_a_sentence_is_queued_for_later(request_, tmp_path):

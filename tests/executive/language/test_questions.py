@@ -10,7 +10,7 @@ TABLE = ClarifyingQuestion(
     "kitchen table",
     "table",
 )
-CAKE = ClarifyingQuestion("I know no thing 'cake'; do you mean coke?", Slot.THING, ("coke",), "coke", "cake")
+CAKE = ClarifyingQuestion("I know no thing 'cake'; did you mean 'coke'?", Slot.THING, ("coke",), "coke", "cake")
 
 
 @pytest.mark.parametrize(

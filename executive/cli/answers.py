@@ -1,0 +1,53 @@
+"""Answers to the questions that a sentence leaves open: given beforehand, asked at the terminal, or by a policy."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from typing import Final
+
+import typer
+
+from executive.language.questions import Answerer, ClarifyingQuestion, QuestionPolicy, answer_by
+
+__all__ = ["NO_ANSWERS", "Answers", "ask_at_terminal"]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Answers given beforehand, for the questions in their order, and what becomes of further ones.
+
+    Unless `policy` says, a mission file's own counts; and where that says nothing, who sits at the terminal is asked,
+    while in scripts the sentence is refused.
+    """
+
+    given: tuple[str, ...] = ()
+    policy: QuestionPolicy | None = None
+
+    def answerer(self, own: QuestionPolicy | None) -> Answerer:
+        """Who answers; `own` is the policy of a mission file."""
+        left = iter(self.given)
+        policy = self.policy or own or QuestionPolicy.ASK
+        further = answer_by(policy, ask_at_terminal if _somebody_is_there() else None)
+
+        def answer(question: ClarifyingQuestion) -> str | None:
+            return next(left, None) or further(question)
+
+        return answer
+
+
+def ask_at_terminal(question: ClarifyingQuestion) -> str | None:
+    """Put a question to who sits at the terminal; None for an empty line or the end of the input."""
+    numbers = "  ".join(f"[{number}] {name}" for number, name in enumerate(question.candidates, start=1))
+    typer.echo(f"? {question.text}  {numbers}".rstrip(), err=True)
+    try:
+        return sys.stdin.readline().strip() or None
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+def _somebody_is_there() -> bool:
+    return sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
+
+
+NO_ANSWERS: Final = Answers()

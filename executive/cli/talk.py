@@ -1,0 +1,71 @@
+"""The conversation beside a run of the command line: how its sentences are parsed and compiled."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import replace
+
+from executive.cli.requests import Request
+from executive.command import Command
+from executive.compiler import CompiledTree, compile_mission
+from executive.control import Control
+from executive.conversation import Conversation, Speech
+from executive.language import Understanding, load_parser, understand
+from executive.language.parser import SpacyParser
+from executive.language.reference import Memory
+from executive.mission import mission_from_commands
+from executive.registry import installed_skills
+
+__all__ = ["LateParser", "conversation_of"]
+
+
+class LateParser:
+    """The parser, loaded when it is first needed, or ahead of that in a thread of its own."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._parser: SpacyParser | None = None
+
+    def __call__(self) -> SpacyParser:
+        """The parser. Raises InputError when the model is missing."""
+        with self._lock:
+            if self._parser is None:
+                self._parser = load_parser()
+            return self._parser
+
+    def load_ahead(self) -> None:
+        """Begin to load it."""
+        threading.Thread(target=self, name="errand-parser", daemon=True).start()
+
+
+def conversation_of(
+    request: Request, control: Control, parser: LateParser, *, require_wake: bool = False
+) -> Conversation:
+    """A conversation with the robot of a request, in its world."""
+    speech = Speech(
+        knowledge=request.knowledge,
+        robot_name=request.mission.robot_name,
+        understand=lambda text, memory: _understood(text, memory, request, parser),
+        compile=lambda commands, taken: _compiled(commands, taken, request),
+    )
+    return Conversation(speech, control, require_wake=require_wake, others=request.knowledge.robot.others)
+
+
+def _understood(text: str, memory: Memory | None, request: Request, parser: LateParser) -> Understanding:
+    return understand(
+        text,
+        parser=parser(),
+        knowledge=request.knowledge,
+        require_wake=False,
+        robot_name=request.mission.robot_name,
+        memory=memory,
+    )
+
+
+def _compiled(commands: Sequence[Command], taken: frozenset[str], request: Request) -> CompiledTree:
+    """The tree of a mission of these commands, under a name that is not taken. Raises InputError."""
+    mission = mission_from_commands(commands, world=request.world.name, robot_name=request.mission.robot_name)
+    names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
+    name = next(each for each in names if each not in taken)
+    return compile_mission(replace(mission, name=name), knowledge=request.knowledge, registry=installed_skills())

@@ -58,6 +58,7 @@ class Lexicon:
     refusals: tuple[str, ...]
     searches: tuple[str, ...]
     short_forms: Mapping[str, str]
+    asides: tuple[str, ...]
     hesitations: tuple[str, ...]
     speaker: frozenset[str]
     pronouns: frozenset[str]
@@ -95,6 +96,7 @@ def lexicon() -> Lexicon:
         refusals=_longest_first(words["refusals"]),
         searches=_longest_first(words["searches"]),
         short_forms=words["short_forms"],
+        asides=_longest_first(words["asides"]),
         hesitations=_longest_first(words["hesitations"]),
         openers=_longest_first(words["openers"]),
         requests=_longest_first(words["requests"]),

@@ -57,7 +57,8 @@ def _said_once(text: str) -> str:
     text = re.sub(
         rf"(?<![\w'])(?:{_any(list(full))})(?![\w'])", lambda m: full[m[0].lower()], text, flags=re.IGNORECASE
     )
-    text = re.sub(rf"(?<![\w'])(?:{_any(lexicon().hesitations)})(?![\w'])[,.\s]*", " ", text, flags=re.IGNORECASE)
+    asides = (*lexicon().asides, *lexicon().hesitations)
+    text = re.sub(rf"(?<![\w'])(?:{_any(asides)})(?![\w'])[,.\s]*", " ", text, flags=re.IGNORECASE)
     return re.sub(r"\b(\w+(?:\s\w+){0,2})(?:[\s,]+\1\b)+", r"\1", " ".join(text.split()), flags=re.IGNORECASE)
 
 

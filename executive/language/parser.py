@@ -144,9 +144,11 @@ def _token(token: SpacyToken, kind: NounKind | None) -> Token:
 
 
 def _sinks(tokens: Iterable[Token]) -> tuple[Token, ...]:
-    """The words, where a noun behind nouns that was read as a verb ("the bathroom sink") is a noun again."""
+    """The words, where what was read as a verb is a noun ("the bathroom sink") or an adjective ("clean towels")."""
     found = list(tokens)
     for at in range(1, len(found)):
+        if found[at].pos == "VERB" and is_attribute(found[at].text) and _noun_at(found, at + 1):
+            found[at] = replace(found[at], pos="ADJ", tag="JJ", head=at + 1, relation="amod")
         if _misread(found, at):
             found[at - 1] = replace(found[at - 1], head=at, relation="compound")
             found[at] = replace(found[at], pos="NOUN", tag="NN", relation="obl")
@@ -154,6 +156,10 @@ def _sinks(tokens: Iterable[Token]) -> tuple[Token, ...]:
                 if found[n].head == at - 1:
                     found[n] = replace(found[n], head=at)
     return tuple(found)
+
+
+def _noun_at(tokens: Sequence[Token], at: int) -> bool:
+    return at < len(tokens) and tokens[at].pos == "NOUN"
 
 
 def _misread(tokens: Sequence[Token], at: int) -> bool:

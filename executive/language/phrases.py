@@ -200,6 +200,7 @@ class Phrase:
         return (*(t for t in left if not _is_determiner(t)), head)
 
 
+_VAGUE_NUMBERS: Final = frozenset({"few", "several", "many", "some", "any", "more", "enough", "another"})
 _ONE: Final = frozenset({"one", "ones"})
 _DEFINITE: Final = frozenset(
     {"the", "this", "that", "these", "those", "my", "your", "his", "her", "its", "our", "their"}
@@ -207,7 +208,7 @@ _DEFINITE: Final = frozenset(
 
 
 def _is_determiner(token: Token) -> bool:
-    said_number = _number(token) is not None
+    said_number = _number(token) is not None or token.word in _VAGUE_NUMBERS
     return said_number or token.pos == "DET" or token.tag in ("PRP$", "DT", "PDT", "POS", "WP$") or token.text == "-"
 
 
@@ -226,7 +227,24 @@ def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
             start = _first(head, tokens)
             phrases[start] = Phrase(tuple(tokens[start : head.index + 1]))
             end = start
-    return phrases
+    return _compounds(phrases)
+
+
+def _compounds(phrases: Mapping[int, Phrase]) -> dict[int, Phrase]:
+    """Join nouns that stand side by side without an article: "the kitchen" and "counter" are one place."""
+    joined: dict[int, Phrase] = {}
+    for start, phrase in sorted(phrases.items()):
+        before = joined.get(last := max(joined, default=-1))
+        if before is not None and last + len(before.tokens) == start and _compound(before, phrase):
+            joined[last] = Phrase((*before.tokens, *phrase.tokens))
+        else:
+            joined[start] = phrase
+    return joined
+
+
+def _compound(before: Phrase, phrase: Phrase) -> bool:
+    nouns = before.head.pos == "NOUN" and all(t.pos == "NOUN" for t in phrase.tokens)
+    return nouns and not before.plural and not before.person and before.head.kind is not NounKind.PERSON
 
 
 def _is_head(token: Token, tokens: Sequence[Token]) -> bool:

@@ -52,7 +52,8 @@ def _holdable(phrase: Phrase, deed: Deed) -> bool:
     """Whether it is something to be found, and taken where the deed takes it."""
     if phrase.known:
         return True
-    if deed.kind is not VerbKind.FIND and (_fixture(phrase) or phrase.kind is NounKind.VEHICLE):
+    called = phrase.kind is NounKind.VEHICLE and (phrase.indefinite or deed.kind is not VerbKind.FIND)
+    if called or (deed.kind is not VerbKind.FIND and _fixture(phrase)):
         return False
     return not _light(phrase, deed) and (phrase.kind is None or phrase.kind.within_reach)
 

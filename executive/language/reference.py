@@ -34,7 +34,8 @@ class Deed:
 class Memory:
     """What was last spoken of: things, where they are, a place, a person.
 
-    `gathered` are all things that were spoken of since one was last carried somewhere.
+    `gathered` are all things that were spoken of since one was last carried somewhere, `told` where things were said
+    to be.
     """
 
     things: tuple[Phrase, ...] = ()
@@ -42,6 +43,11 @@ class Memory:
     where: Location | None = None
     place: Location | None = None
     person: Location | None = None
+    told: tuple[tuple[Phrase, Location], ...] = ()
+
+    def where_is(self, thing: Phrase) -> Location | None:
+        """Where a thing of that name was said to be."""
+        return next((place for told, place in reversed(self.told) if told.head.lemma == thing.head.lemma), None)
 
 
 @dataclass(frozen=True)
@@ -80,8 +86,13 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
         where=source if again or not things else None,
         place=goal or source or memory.place,
         person=person,
+        told=memory.told,
     )
-    deeds = (Deed(kind, action.verb, thing, source, goal, again) for thing in things or (None,))
+    looks = kind is not VerbKind.GO
+    deeds = (
+        Deed(kind, action.verb, thing, source or (memory.where_is(thing) if thing and looks else None), goal, again)
+        for thing in things or (None,)
+    )
     return Resolved((*before.deeds, *deeds), after, (*before.meanings, *_meanings(action, memory)))
 
 
@@ -102,12 +113,21 @@ def _stated(action: Action, before: Resolved) -> Resolved:
     where = _place(action.source, before.memory)
     memory = replace(before.memory, where=where, place=where or before.memory.place)
     if not any(phrase.pronoun for phrase in action.objects):
-        return replace(before, memory=replace(memory, things=action.objects or memory.things))
+        return replace(before, memory=_told(action, where, memory))
     told = tuple(
         replace(deed, source=where) if deed.target in memory.things and deed.source is None else deed
         for deed in before.deeds
     )
     return replace(before, deeds=told, memory=memory)
+
+
+def _told(action: Action, where: Location | None, memory: Memory) -> Memory:
+    """The memory after a statement of where somebody or something is."""
+    people = [phrase for phrase in action.objects if phrase.person]
+    if people:
+        return replace(memory, person=Location(people[-1], within=where))
+    told = () if where is None else tuple((phrase, where) for phrase in action.objects)
+    return replace(memory, things=action.objects or memory.things, told=(*memory.told, *told))
 
 
 def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:

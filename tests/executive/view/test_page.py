@@ -13,9 +13,12 @@ import numpy as np
 import pytest
 
 from executive.control import Control, Mode
+from executive.conversation import Conversation, Speech
+from executive.outcome import Glance
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
 from executive.record.surroundings import map_message
+from executive.runner import Progress
 from executive.view.actions import RefusedError, control_actions
 from executive.view.feed import Feed
 from executive.view.model import node_view
@@ -24,6 +27,7 @@ from executive.view.server import PageContent, PageServer
 from executive.view.watch import SEND_LIMIT_S, ControlWatch
 from skills.api import Cause, Failed, Question
 from skills.estimate.grid_map import GridMap
+from skills.robot import Pose2D
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = [
@@ -206,6 +210,32 @@ def test_keys_are_letters_while_a_sentence_is_typed(page, compiled, make):
         playwright_api.expect(page.locator("#said")).to_have_text("first: it")
     assert said == ["pick cups, scan x"]
     assert control.state.mode is Mode.READY
+
+
+def test_remarks_in_the_sentence_box_are_answered_and_act_at_once(page, compiled, make, control, knowledge):
+    def nothing_else(*_):
+        raise AssertionError("a remark is no request")
+
+    tree, feed = compiled(*make.FETCH), Feed()
+    control.begin({"Alice": tree})
+    watch = ControlWatch(control, feed)
+    talk = Conversation(Speech(knowledge, "Alice", nothing_else, nothing_else), control)
+    glances = {"Alice": Glance(Pose2D(4.5, -0.6, 0.0), holding=False)}
+    talk.observe(Progress(1.0, 20, 0, {"Alice": {}}, {"Alice": tree}, glances))
+    feed("tree", 0.0, {"robot": "Alice", "root": node_view(tree.root).structure()})
+    said = {"say": lambda values: talk.hear(values["text"]).text}
+    with PageServer(PageContent(feed, {**control_actions(control), **said})) as server:
+        page.goto(server.url)
+        for text, answer, mode in (
+            ("where are you", "I am in the kitchen, next to the counter", "running"),
+            ("wait", "I wait; say 'go on' when I may go on", "paused"),
+            ("go on", "I go on", "running"),
+        ):
+            page.fill("#sentence", text)
+            page.press("#sentence", "Enter")
+            playwright_api.expect(page.locator("#said")).to_have_text(answer)
+            playwright_api.expect(page.locator("#mode-text")).to_have_text(mode)
+    watch.close()
 
 
 def test_a_refusal_is_shown(page, compiled, make):

@@ -220,7 +220,7 @@ def test_remarks_in_the_sentence_box_are_answered_and_act_at_once(page, compiled
     control.begin({"Alice": tree})
     watch = ControlWatch(control, feed)
     talk = Conversation(Speech(knowledge, "Alice", nothing_else, nothing_else), control)
-    glances = {"Alice": Glance(Pose2D(4.5, -0.6, 0.0), holding=False)}
+    glances = {"Alice": Glance(Pose2D(5.0, -0.9, 0.0), holding=False)}
     talk.observe(Progress(1.0, 20, 0, {"Alice": {}}, {"Alice": tree}, glances))
     feed("tree", 0.0, {"robot": "Alice", "root": node_view(tree.root).structure()})
     said = {"say": lambda values: talk.hear(values["text"]).text}

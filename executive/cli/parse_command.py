@@ -74,6 +74,8 @@ def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
         _echo(map(str, meaning.commands), as_json)
     if meaning.status is not Status.OK:
         typer.echo(f"errand: {meaning.reason}", err=True)
+    else:
+        _echo(meaning.notes, True)
 
 
 def _echo(lines: Iterable[str], as_json: bool) -> None:

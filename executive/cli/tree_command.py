@@ -81,18 +81,29 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
         return read_history(Path(text)).trees(at_s)[-1]
     if at_s is not None:
         raise InputError("--at is for logs", mend="name a log.mcap that a run has written")
-    return node_view(_request(text, say, world).compile().root)
+    request = _request(text, say, world)
+    for note in request.mission.notes:
+        typer.echo(note, err=True)
+    return node_view(request.compile().root)
 
 
 def _request(text: str | None, say: str | None, world: str | None) -> Request:
     if text is not None and say is not None:
         raise InputError("a sentence and --say were given", mend="leave one of them out")
-    if text is not None and (text.endswith((".yaml", ".yml")) or Path(text).is_file()):
+    if text is not None and (text.endswith((".yaml", ".yml")) or _is_file(text)):
         return filed(Path(text), world=world)
     sentence = say if text is None else text
     if sentence is None:
         raise InputError("a mission file, a sentence or a log is needed", mend='try: errand tree "go to the kitchen"')
     return said(sentence, world=world, require_wake=False)
+
+
+def _is_file(text: str) -> bool:
+    """Whether a text is the path of a file; no when the system cannot even look there, as for long sentences."""
+    try:
+        return Path(text).is_file()
+    except OSError:
+        return False
 
 
 def _write(path: Path, text: str) -> None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from typing import Final
 
 from executive.language.questions import ClarifyingQuestion, left_open
 
 __all__ = ["RefusalError"]
+
+
+_LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")
 
 
 class RefusalError(Exception):
@@ -18,7 +23,7 @@ class RefusalError(Exception):
     def __init__(
         self, reason: str, unknown: Iterable[str] = (), *, question: bool | ClarifyingQuestion = False
     ) -> None:
-        super().__init__(reason)
-        self.reason = reason
-        self.unknown = tuple(dict.fromkeys(unknown))
-        self.question = left_open(reason, next(iter(self.unknown), None)) if question is True else question or None
+        self.reason = _LONG_WORD.sub(r"\1…", reason)
+        super().__init__(self.reason)
+        self.unknown = tuple(dict.fromkeys(_LONG_WORD.sub(r"\1…", word) for word in unknown))
+        self.question = left_open(self.reason, next(iter(self.unknown), None)) if question is True else question or None

@@ -107,6 +107,8 @@ def lexicon() -> Lexicon:
     )
 
 
+# Plain words: "on" is no truth value.
+_Loader: Final = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _SOFTNESS: Final = {False: "certain", True: "soft"}
 _WORD_SETS: Final = (
     "speaker",
@@ -131,7 +133,7 @@ def _phrases(texts: Iterable[str]) -> frozenset[Phrase]:
 
 def _read(name: str) -> dict[str, Any]:
     text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-    data: dict[str, Any] = yaml.load(text, Loader=yaml.BaseLoader)  # plain words: "on" is no truth value
+    data: dict[str, Any] = yaml.load(text, Loader=_Loader)
     return data
 
 

@@ -36,7 +36,7 @@ class Token:
 
     `start` is its first character in the text, `pos` the universal part of speech, `tag` the Penn tag, `head` the
     index of the word that it depends on (its own for the root), `relation` how (nsubj, obj, iobj, prep, obl, ...),
-    `entity` what kind of name it is part of (PERSON, ...), `kind` what kind of thing it would stand for as a noun,
+    `entity` what a known name is part of (PERSON), `kind` what kind of thing it would stand for as a noun,
     and `known` whether the world knows the name.
     """
 
@@ -98,8 +98,9 @@ class SpacyParser:
 
     def _vector(self, word: str) -> FloatArray | None:
         """The unit vector of a word; None when it has none."""
-        lexeme = self._pipeline.vocab[word]
-        return lexeme.vector / lexeme.vector_norm if lexeme.has_vector and lexeme.vector_norm else None
+        vector = np.asarray(self._pipeline.vocab.get_vector(word), dtype=np.float64)
+        norm = float(np.sqrt(vector @ vector))
+        return vector / norm if norm else None
 
     def is_word(self, word: str) -> bool:
         """Whether `word` is frequent in English, in lower case or as a name; misspelled words are not."""
@@ -125,7 +126,7 @@ def load_parser() -> SpacyParser:
         raise InputError(f"the language model {_MODEL_PACKAGE!r} is missing", mend="install it with 'make env'")
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"\[W095\]")  # trained with a release a little older
-        return SpacyParser(spacy.load(folders[-1], exclude=["senter"]))
+        return SpacyParser(spacy.load(folders[-1], exclude=["senter", "ner"]))
 
 
 def _token(token: SpacyToken, kind: NounKind | None) -> Token:
@@ -138,7 +139,6 @@ def _token(token: SpacyToken, kind: NounKind | None) -> Token:
         tag=token.tag_,
         head=token.head.i,
         relation=_RELATIONS.get(token.dep_, token.dep_),
-        entity=token.ent_type_,
         kind=kind,
     )
 

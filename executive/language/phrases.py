@@ -122,8 +122,11 @@ class Phrase:
         """Whether it is a person's name."""
         if self._determined() or self.plural:
             return False
-        named = self.head.entity == "PERSON" and self.head.pos == "PROPN"
-        return named or (self.head.kind is NounKind.PERSON and len(self.tokens) == 1)
+        if self.head.known:
+            return self.head.entity == "PERSON"
+        proper = all(t.pos == "PROPN" for t in self.tokens)
+        titled = proper and self.tokens[0].word.rstrip(".") in _TITLES
+        return titled or (self.head.kind is NounKind.PERSON and (proper or len(self.tokens) == 1))
 
     @property
     def universal(self) -> bool:
@@ -201,6 +204,7 @@ class Phrase:
 
 
 _VAGUE_NUMBERS: Final = frozenset({"few", "several", "many", "some", "any", "more", "enough", "another"})
+_TITLES: Final = frozenset({"mr", "mrs", "ms", "miss", "dr", "doctor", "professor", "sir", "madam", "uncle", "aunt"})
 _ONE: Final = frozenset({"one", "ones"})
 _DEFINITE: Final = frozenset(
     {"the", "this", "that", "these", "those", "my", "your", "his", "her", "its", "our", "their"}

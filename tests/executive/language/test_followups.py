@@ -1,0 +1,112 @@
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from executive.command import parse_command
+from executive.language.followups import Amendment, FollowUpKind, amended, follow_up_of, without_fetching
+from skills.api import Thing
+
+FETCH = tuple(
+    map(
+        parse_command,
+        (
+            "Take [Nothing] to [kitchen] and do [grasp] to [coke]",
+            "Take [coke] to [start] and do [Nothing] to [Nothing]",
+        ),
+    )
+)
+CORRECTION, ADDITION, AGAIN = FollowUpKind.CORRECTION, FollowUpKind.ADDITION, FollowUpKind.AGAIN
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "said", "preposition", "old"),
+    [
+        ("no, the hammer", CORRECTION, "the hammer", "", ""),
+        ("No the hammer.", CORRECTION, "the hammer", "", ""),
+        ("no no, I meant the hammer", CORRECTION, "the hammer", "", ""),
+        ("not the coke, the beer", CORRECTION, "the beer", "", "the coke"),
+        ("no, not the coke but the beer", CORRECTION, "the beer", "", "the coke"),
+        ("the beer instead of the coke", CORRECTION, "the beer", "", "the coke"),
+        ("no, to the bedroom", CORRECTION, "the bedroom", "to", ""),
+        ("make that two", CORRECTION, "two", "", ""),
+        ("the beer too", ADDITION, "the beer", "", ""),
+        ("and to the kitchen?", ADDITION, "the kitchen", "to", ""),
+        ("how about the kitchen", ADDITION, "the kitchen", "", ""),
+        ("one more beer please", ADDITION, "beer", "", ""),
+        ("another one", AGAIN, "", "", ""),
+        ("bring me another one please", AGAIN, "", "", ""),
+        ("once more", AGAIN, "", "", ""),
+    ],
+)
+def test_how_a_sentence_goes_on_from_the_one_before(text, kind, said, preposition, old):
+    follow_up = follow_up_of(text)
+    assert (follow_up.kind, follow_up.said, follow_up.preposition) == (kind, said, preposition)
+    assert follow_up.instead_of == old
+
+
+@pytest.mark.parametrize("text", ["", "no", "go to the kitchen", "the hammer", "bring me the coke", "nothing", "stop"])
+def test_a_sentence_of_its_own_goes_on_from_nothing(text):
+    assert follow_up_of(text) is None
+
+
+def texts(commands):
+    return [str(command) for command in commands]
+
+
+@pytest.mark.parametrize(
+    ("by", "commands"),
+    [
+        (
+            Amendment(thing=Thing("hammer")),
+            [
+                "Take [Nothing] to [workshop] and do [grasp] to [hammer]",
+                "Take [hammer] to [start] and do [Nothing] to [Nothing]",
+            ],
+        ),
+        (Amendment(thing=Thing("hammer"), old="beer"), texts(FETCH)),
+        (
+            Amendment(goal="Robin", goal_at="hall"),
+            [str(FETCH[0]), "Take [coke] to [Robin at hall] and do [Nothing] to [Nothing]"],
+        ),
+        (
+            Amendment(goal="bedroom", source=True),
+            ["Take [Nothing] to [bedroom] and do [grasp] to [coke]", str(FETCH[1])],
+        ),
+        (
+            Amendment(count=2),
+            [
+                "Take [Nothing] to [kitchen] and do [grasp] to [2 coke]",
+                "Take [2 coke] to [start] and do [Nothing] to [Nothing]",
+            ],
+        ),
+    ],
+)
+def test_commands_are_amended(knowledge, by, commands):
+    assert texts(amended(FETCH, by, knowledge)) == commands
+
+
+def test_the_place_that_was_named_is_changed(knowledge):
+    assert amended(FETCH, Amendment(goal="bedroom", old="kitchen"), knowledge)[0].goal == "bedroom"
+
+
+def test_a_thing_that_is_held_is_not_gone_for_again(knowledge):
+    assert without_fetching(FETCH, Thing("coke"), knowledge) == FETCH[1:]
+
+
+def test_another_thing_is_put_down_first(knowledge):
+    commands = without_fetching(FETCH, Thing("hammer"), knowledge)
+    assert texts(commands)[0] == "Take [hammer] to [workbench] and do [place] to [hammer]"
+    assert commands[1:] == FETCH
+
+
+def test_with_an_empty_hand_nothing_changes(knowledge):
+    assert without_fetching(FETCH, None, knowledge) == FETCH
+
+
+WORDS = "no not the coke , but instead of too and a to make it another one please again ' - kitchen".split()  # noqa: SIM905
+
+
+@settings(deadline=200)
+@given(st.one_of(st.text(max_size=200), st.lists(st.sampled_from(WORDS), max_size=40).map(" ".join)))
+def test_any_text_is_read_without_an_error_and_soon(text):
+    follow_up_of(text)

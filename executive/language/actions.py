@@ -56,9 +56,8 @@ def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
 
 
 def _only_whether(clause: Clause) -> bool:
-    """Whether only "if" stands behind its verb, as in "see if you can find it"."""
-    content = [item for item in clause.items if not isinstance(item, Separator)]
-    return len(content) == 1 and isinstance(content[0], Whether)
+    """Whether nothing but "if" stands behind its verb, as in "see if you can find it"."""
+    return all(isinstance(item, Separator | Whether) for item in clause.items)
 
 
 def _actions(clause: Clause, words: Lexicon) -> Iterator[Action]:

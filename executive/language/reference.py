@@ -75,7 +75,7 @@ def resolve(actions: Sequence[Action], memory: Memory) -> Resolved:
 def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
     memory = before.memory
     again = any(phrase.pronoun for phrase in action.objects)
-    things = tuple(thing for phrase in action.objects for thing in _meant(phrase, memory))
+    things = _all_meant(action.objects, memory)
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
     told = again or any(phrase.stands_for_one for phrase in action.objects)
     source = source or (memory.where if told else None)
@@ -98,9 +98,9 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
 
 def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
     """Each pronoun of an action with what it stands for."""
-    for phrase in action.objects:
-        meant = _meant(phrase, memory)
-        if meant != [phrase]:
+    for n, phrase in enumerate(action.objects):
+        meant = _all_meant(action.objects[: n + 1], memory)[n:]
+        if meant != (phrase,):
             yield phrase.text, " and ".join(thing.text for thing in meant)
     for place in (action.source, action.goal):
         found = _place(place, memory)
@@ -128,6 +128,14 @@ def _told(action: Action, where: Location | None, memory: Memory) -> Memory:
         return replace(memory, person=Location(people[-1], within=where))
     told = () if where is None else tuple((phrase, where) for phrase in action.objects)
     return replace(memory, things=action.objects or memory.things, told=(*memory.told, *told))
+
+
+def _all_meant(phrases: Sequence[Phrase], memory: Memory) -> tuple[Phrase, ...]:
+    """What the objects of an action stand for; each may stand for one before it ("the big box and the small one")."""
+    things: list[Phrase] = []
+    for phrase in phrases:
+        things += _meant(phrase, replace(memory, things=tuple(things) or memory.things))
+    return tuple(things)
 
 
 def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:

@@ -20,7 +20,8 @@ __all__ = ["Action", "read_actions"]
 class Action:
     """One verb's work: `objects` are what it is done to, `source` where those are, `goal` where they or the robot go.
 
-    `kind` is None for a statement, which only tells where something is. `unknown` are the words that do not fit.
+    `kind` is None for a statement, which only tells where something is. `said` is all that was said of it, `unknown`
+    the words that do not fit.
     """
 
     kind: VerbKind | None
@@ -29,6 +30,7 @@ class Action:
     source: Location | None = None
     goal: Location | None = None
     unknown: tuple[str, ...] = ()
+    said: str = ""
 
 
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
@@ -37,8 +39,14 @@ _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 def read_actions(clauses: Sequence[Clause], words: Lexicon) -> tuple[Action, ...]:
     """The actions of all clauses, in order."""
     merged = list(_without_checks(clauses))
-    found = [action for clause in merged for action in _actions(clause, words)]
+    found = [replace(action, said=_said(clause)) for clause in merged for action in _actions(clause, words)]
     return tuple(action for action in found[:-1] if not _goes_nowhere(action)) + tuple(found[-1:])
+
+
+def _said(clause: Clause) -> str:
+    before = [clause.subject] if clause.subject is not None else []
+    verb = [clause.verb] if clause.verb is not None else []
+    return spoken_words([*before, *verb, *clause.items])
 
 
 def _goes_nowhere(action: Action) -> bool:

@@ -25,15 +25,22 @@ def check_reach(deeds: Sequence[Deed], knowledge: Knowledge | None) -> None:
     people = [f"{d.verb} {d.target.text}" for d in deeds if _carries(d) and d.target is not None and d.target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
-    outside = [part for deed in deeds for part in _outside(deed)]
+    outside = [(part, part) for deed in deeds for part in _outside(deed)]
     if outside:
         raise not_understood(outside, knowledge)
 
 
-def not_understood(parts: Sequence[str], knowledge: Knowledge | None) -> RefusalError:
-    """The refusal that names the parts which lie outside the mission."""
-    quoted = ", ".join(repr(part) for part in dict.fromkeys(parts))
-    return RefusalError(f"I do not understand {quoted}; {known_line(knowledge)}", parts)
+def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None) -> RefusalError:
+    """The refusal that names the parts which lie outside the mission, each with the whole clause that it stands in."""
+    within = {clause: [part for part, other in parts if other == clause] for _, clause in parts}
+    named = (_named(tuple(dict.fromkeys(words)), clause) for clause, words in within.items())
+    return RefusalError(f"I do not understand {', '.join(named)}; {known_line(knowledge)}", [part for part, _ in parts])
+
+
+def _named(words: Sequence[str], clause: str) -> str:
+    """The words in quotes, and the clause, unless that is all the same."""
+    quoted = ", ".join(map(repr, words))
+    return quoted if not clause or clause in words else f"{quoted} in {clause!r}"
 
 
 def _carries(deed: Deed) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from executive.command import Command
+from executive.errors import listing
 from executive.knowledge import Knowledge
 from executive.language.actions import Action, read_actions
 from executive.language.clauses import Clause, split_clauses, without_name
@@ -102,12 +103,13 @@ def _act(trace: Trace, _: _Context) -> Trace:
 
 def _check(trace: Trace, context: _Context) -> Trace:
     """Refuse the whole sentence when any part of it was not understood."""
-    unknown = tuple(dict.fromkeys(word for action in trace.actions for word in action.unknown))
+    unknown = [(word, action.said) for action in trace.actions for word in action.unknown]
     if unknown:
         raise not_understood(unknown, context.knowledge)
     if not any(action.kind for action in trace.actions):
         told = [phrase.text for action in trace.actions for phrase in action.objects]
-        raise RefusalError(f"nothing to do was said; {known_line(context.knowledge)}", told)
+        of = f" of {listing(told)}" if told else ""
+        raise RefusalError(f"nothing to do was said{of}; {known_line(context.knowledge)}", told)
     return trace
 
 

@@ -22,7 +22,7 @@ from typing import Final
 
 import yaml
 
-__all__ = ["SoundMatch", "nearest_by_sound", "sound_distance", "sounds_of"]
+__all__ = ["SoundMatch", "change_cost", "drop_cost", "nearest_by_sound", "sound_distance", "sounds_of"]
 
 
 @dataclass(frozen=True)
@@ -104,21 +104,23 @@ def _edit_cost(a: str, b: str) -> float:
     """The least cost of changing one row of sounds into the other."""
     above = [0.0]
     for sound in b:
-        above.append(above[-1] + _drop_cost(sound))
+        above.append(above[-1] + drop_cost(sound))
     for mine in a:
-        row = [above[0] + _drop_cost(mine)]
+        row = [above[0] + drop_cost(mine)]
         for at, other in enumerate(b):
-            change = above[at] + _change_cost(mine, other)
-            row.append(min(change, above[at + 1] + _drop_cost(mine), row[-1] + _drop_cost(other)))
+            change = above[at] + change_cost(mine, other)
+            row.append(min(change, above[at + 1] + drop_cost(mine), row[-1] + drop_cost(other)))
         above = row
     return above[-1]
 
 
-def _drop_cost(sound: str) -> float:
+def drop_cost(sound: str) -> float:
+    """What it costs to leave a sound out, from 0 to 1."""
     return _WEAK.get(sound, _VOWEL_DROP if sound in _VOWELS else _CONSONANT_DROP)
 
 
-def _change_cost(a: str, b: str) -> float:
+def change_cost(a: str, b: str) -> float:
+    """What it costs to say one sound for another, from 0 to 1."""
     if a == b:
         return 0.0
     if a in _VOWELS and b in _VOWELS:

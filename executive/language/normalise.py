@@ -9,9 +9,10 @@ from typing import Final
 
 from executive.language.lexicon import lexicon
 
-__all__ = ["MAX_WORDS", "clean", "open_commands"]
+__all__ = ["MAX_CHARACTERS", "MAX_WORDS", "clean", "open_commands"]
 
 MAX_WORDS: Final = 60
+MAX_CHARACTERS: Final = 800
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _SOMETHING: Final = {r"\b(?:something|anything) to drink\b": "a drink", r"\b(?:something|anything) to eat\b": "food"}
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")

@@ -76,7 +76,7 @@ class SpacyParser:
 
     def __init__(self, pipeline: Language) -> None:
         self._pipeline = pipeline
-        self._nouns = NounKinds.learn(noun_examples(), self._vector)
+        self._nouns = NounKinds.learn(noun_examples(), self.vector)
         self._kinds: dict[tuple[str, ...], NounKind | None] = {}
         frequent = islice(pipeline.vocab.vectors.keys(), FREQUENT_WORDS)
         self._frequent = np.sort(np.fromiter(frequent, dtype=np.uint64))
@@ -97,8 +97,8 @@ class SpacyParser:
             self._kinds[words] = self._nouns.kind(words[:-1], lemma=words[-1])
         return self._kinds[words]
 
-    def _vector(self, word: str) -> FloatArray | None:
-        """The unit vector of a word; None when it has none."""
+    def vector(self, word: str) -> FloatArray | None:
+        """The unit vector of a word's meaning; None when it has none."""
         vector = np.asarray(self._pipeline.vocab.get_vector(word), dtype=np.float64)
         norm = float(np.sqrt(vector @ vector))
         return vector / norm if norm else None

@@ -17,7 +17,7 @@ from executive.language.items import Item, split_items
 from executive.language.lexicon import lexicon
 from executive.language.mending import mended
 from executive.language.names import name_table, parse_with_names
-from executive.language.normalise import MAX_WORDS, open_commands
+from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS, open_commands
 from executive.language.parser import DependencyParser, Token
 from executive.language.phrases import noun_phrases
 from executive.language.reach import check_reach, not_understood
@@ -78,6 +78,8 @@ def _open(trace: Trace, _: _Context) -> Trace:
     words = trace.text.split()
     if len(words) > MAX_WORDS:
         raise RefusalError(f"{len(words)} words are too many for one sentence; say it in {MAX_WORDS} at most")
+    if len(trace.text) > MAX_CHARACTERS:
+        raise RefusalError(f"{len(trace.text)} characters are too many for one sentence; {MAX_CHARACTERS} at most")
     return replace(trace, opened=open_commands(trace.text))
 
 

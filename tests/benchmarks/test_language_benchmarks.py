@@ -1,15 +1,45 @@
-"""From a sentence to a compiled tree, against loading the parser in the same run."""
+"""Loading the parser, understanding sentences, and from a sentence to a compiled tree."""
 
+import statistics
+import subprocess
+import sys
 import time
+from pathlib import Path
+
+import pytest
+import yaml
 
 from executive.compiler import compile_mission
 from executive.knowledge import load_knowledge
-from executive.language import load_parser
+from executive.language import load_parser, understand
 from executive.mission import mission_from_sentence
 from executive.registry import built_in_skills
 from plant.worlds.world import load_world
 
 SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
+FAMILIES = Path(__file__).parents[1] / "executive" / "language" / "sentences"
+MEDIAN_S = 0.010
+P99_S = 0.040
+LOADING_S = 2.0
+ODD_S = 1.0
+
+
+@pytest.fixture(scope="module")
+def parser():
+    return load_parser()
+
+
+@pytest.fixture(scope="module")
+def sentences():
+    files = (yaml.safe_load(file.read_text(encoding="utf-8")) for file in sorted(FAMILIES.glob("*.yaml")))
+    return [text for kinds in files for rows in kinds.values() for text in rows]
+
+
+def seconds_for(sentence, parser):
+    """The processor's time, which others on the machine do not lengthen as they do the wall's."""
+    begun = time.process_time()
+    understand(sentence, parser=parser, knowledge=None, require_wake=False)
+    return time.process_time() - begun
 
 
 def test_parse_to_compiled_tree(benchmark):
@@ -24,3 +54,25 @@ def test_parse_to_compiled_tree(benchmark):
 
     assert benchmark(compiled).commands
     benchmark.extra_info["sentences in the time of loading the parser"] = round(loading_s / benchmark.stats["median"])
+
+
+def test_a_sentence_takes_milliseconds(parser, sentences):
+    for sentence in sentences[:20]:
+        seconds_for(sentence, parser)
+    times_s = sorted(seconds_for(sentence, parser) for sentence in sentences)
+    assert statistics.median(times_s) <= MEDIAN_S
+    assert times_s[int(0.99 * len(times_s))] <= P99_S
+
+
+def test_the_parser_loads_in_a_fresh_process():
+    program = (
+        "import time; begun = time.process_time(); from executive.language import load_parser; load_parser(); "
+        "print(time.process_time() - begun)"
+    )
+    tried = [subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True) for _ in "ab"]
+    assert min(float(run.stdout) for run in tried) < LOADING_S
+
+
+@pytest.mark.parametrize("sentence", ["fetch " * 10_000, "a" * 100_000, "no, " * 2500, "the " * 59 + "cup", "'" * 9999])
+def test_odd_input_takes_no_longer_than_a_second(parser, sentence):
+    assert seconds_for(sentence, parser) < ODD_S

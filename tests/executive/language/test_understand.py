@@ -1,4 +1,3 @@
-import time
 from pathlib import Path
 
 import pytest
@@ -153,19 +152,25 @@ def test_no_sentence_raises_and_every_command_parses_back(parser, knowledge, sen
         assert str(parse_command(str(command))) == str(command)
 
 
+@settings(max_examples=150, deadline=None)
+@given(st.data(), st.booleans())
+def test_no_understood_sentence_raises_when_it_is_mangled(parser, knowledge, data, is_open):
+    """Words of a good sentence left out, doubled, moved about, run together, and odd characters between them."""
+    words = data.draw(st.sampled_from(UNDERSTOOD))[0].split()
+    words = data.draw(st.permutations(words)) if data.draw(st.booleans()) else words
+    cut = data.draw(st.integers(0, len(words)))
+    odd = data.draw(st.text(alphabet="\x00\x07\u202e🙂饮é\n\t\"'[]{}<>;,.!?-_ ", max_size=6))
+    sentence = (
+        odd.join([*words[:cut], *words[max(cut - 1, 0) :]]) if data.draw(st.booleans()) else " ".join(words[cut:])
+    )
+    answer = understand(sentence, parser=parser, knowledge=None if is_open else knowledge, require_wake=False)
+    assert (answer.status is Status.OK) == bool(answer.commands)
+
+
 @pytest.mark.parametrize(
-    "sentence", ["fetch " * 10_000, "a" * 100_000, "\x00\x07\x1b[31m", "把饮料拿来", "🙂🙂", "[]\"'"]
+    "sentence",
+    ["fetch " * 10_000, "a" * 100_000, "\x00\x07\x1b[31m", "把饮料拿来", "🙂🙂", "[]\"'", "no " * 50, ", " * 5000],
 )
-def test_odd_input_is_refused_at_once(parser, knowledge, sentence):
-    begin = time.process_time()
+def test_odd_input_is_refused(parser, knowledge, sentence):
     answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
     assert answer.status is Status.REFUSED
-    assert time.process_time() - begin < 1.0
-
-
-def test_a_sentence_takes_milliseconds(parser, knowledge):
-    sentences = [text for text, _ in UNDERSTOOD[:20]]
-    begin = time.process_time()
-    for sentence in sentences:
-        understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
-    assert (time.process_time() - begin) / len(sentences) < 0.04

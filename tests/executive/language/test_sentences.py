@@ -1,0 +1,55 @@
+"""Sentences of our own, in families; see the files in `sentences/`."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from executive.command import parse_command
+from executive.language import Status, understand
+
+FAMILIES = {
+    file.stem: yaml.safe_load(file.read_text(encoding="utf-8"))
+    for file in sorted((Path(__file__).parent / "sentences").glob("*.yaml"))
+}
+
+
+def sentences(kind):
+    return [
+        pytest.param(text, expected, id=f"{family}: {text}")
+        for family, kinds in FAMILIES.items()
+        for text, expected in kinds.get(kind, {}).items()
+    ]
+
+
+def answer_to(sentence, parser):
+    return understand(sentence, parser=parser, knowledge=None, require_wake=False)
+
+
+@pytest.mark.parametrize(("sentence", "commands"), sentences("understood"))
+def test_a_sentence_becomes_its_commands(parser, sentence, commands):
+    answer = answer_to(sentence, parser)
+    assert (answer.reason, [str(command) for command in answer.commands]) == (None, commands)
+
+
+@pytest.mark.parametrize(("sentence", "commands"), sentences("understood"))
+def test_its_commands_parse_back(parser, sentence, commands):
+    assert [str(parse_command(command)) for command in commands] == commands
+
+
+@pytest.mark.parametrize(("sentence", "part"), sentences("refused"))
+def test_a_sentence_is_refused_whole_with_the_part_named(parser, sentence, part):
+    answer = answer_to(sentence, parser)
+    assert (answer.status, answer.commands) == (Status.REFUSED, ())
+    assert part in answer.reason
+
+
+@pytest.mark.parametrize(("sentence", "word"), sentences("question"))
+def test_a_sentence_that_leaves_something_open_is_asked_about(parser, sentence, word):
+    answer = answer_to(sentence, parser)
+    assert (answer.status, answer.commands) == (Status.QUESTION, ())
+    assert word in answer.reason
+
+
+def test_there_are_enough_sentences():
+    assert sum(len(rows) for kinds in FAMILIES.values() for rows in kinds.values()) >= 380

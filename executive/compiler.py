@@ -13,7 +13,7 @@ from executive.compiling.assembly import StepPart, assemble, step_name
 from executive.compiling.interrupts import InterruptsPlan, watched
 from executive.compiling.plans import NodePlan, Source
 from executive.compiling.wiring import check_wiring
-from executive.compiling.workshop import Registry, Workshop
+from executive.compiling.workshop import Registry, Workshop, start_key
 from executive.errors import InputError
 from executive.knowledge import Knowledge
 from executive.missionfile.model import DEFAULT_WORLD, Mission, MissionStep
@@ -73,7 +73,8 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
         raise InputError(f"the mission '{mission.name}' has no commands", mend="add at least one step")
     made = assemble(mission, knowledge=knowledge, registry=registry)
     base = made.root.path_id
-    root = watched(Workshop(knowledge, registry, base, f"{base}/start-pose", Command(), mission.source), made.root)
+    start = start_key(mission.robot_name, mission.name)
+    root = watched(Workshop(knowledge, registry, base, start, Command(), mission.source), made.root)
     check_wiring(root)
     return CompiledTree(mission.robot_name, mission.name, mission.commands, root, made.parts)
 

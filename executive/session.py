@@ -10,7 +10,7 @@ from executive.behaviours.board import Board
 from executive.behaviours.context import RunContext
 from executive.behaviours.skill_leaf import ERROR_TOPIC
 from executive.compiler import CompiledTree
-from executive.compiling.workshop import slug
+from executive.compiling.workshop import slug, start_key
 from executive.control import Control
 from executive.journal import Journal
 from executive.lease_keeper import LeaseKeeper
@@ -48,6 +48,7 @@ class Session:
         self._later: tuple[CompiledTree, ...] = ()
         self.result: RobotResult | None = None
         self._pose_due_s = context.clock.now()
+        self._asked_at: Pose2D | None = None
 
     @property
     def name(self) -> str:
@@ -97,6 +98,7 @@ class Session:
         context = self.context
         context.localiser.update(context.robot)
         context.costmap.update(context.robot, context.localiser.estimate())
+        self._asked_at = self._asked_at or self.glance.pose
         if context.clock.now() >= self._pose_due_s - _EPSILON_S:
             self._pose_due_s += POSE_PERIOD_S
             self._publish_pose()
@@ -133,7 +135,7 @@ class Session:
         if self._top.finished and self._later:
             tree, *later = self._later
             self._later = tuple(later)
-            self._begin(tree)
+            self._begin(tree, self._start_of(self._top))
         return changed
 
     def hold(self) -> None:
@@ -150,11 +152,11 @@ class Session:
         self._begin(tree)
 
     def later(self, tree: CompiledTree) -> None:
-        """Begin another mission when the one that the robot began with is done."""
+        """Begin another mission when the one that the robot began with is done; it comes back to the same start."""
         self._later += (tree,)
 
     def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
-        """Give up the mission under way, or not begin one that waits, and have another in its place.
+        """Give up the mission under way, or not begin one that waits, and have another in its place, from its start.
 
         Where the mission called `instead_of` is neither, the other is done first.
         """
@@ -171,7 +173,7 @@ class Session:
         given_up.halt(self._attempt)
         self._stack = self._stack[:-1]
         self._control.mission_ended(self.name)
-        self._begin(tree)
+        self._begin(tree, self._start_of(given_up))
         message = f"given up for '{tree.mission_name}'"
         self._note_result(given_up.judge(Ending(Outcome.CANCELLED, Cause.CANCELLED, message)))
 
@@ -198,9 +200,17 @@ class Session:
     def _top(self) -> TreeRun:
         return self._stack[-1]
 
-    def _begin(self, tree: CompiledTree) -> None:
+    def _start_of(self, run: TreeRun) -> Pose2D | None:
+        """Where a mission began: where it noted that, else where the robot stood at first."""
+        key = start_key(run.tree.robot_name, run.tree.mission_name)
+        start: Pose2D | None = run.context.board.get(key) if key in run.context.board else self._asked_at
+        return start
+
+    def _begin(self, tree: CompiledTree, start: Pose2D | None = None) -> None:
         self._held = False
         context = replace(self.context, board=Board(slug(tree.robot_name)))
+        if start is not None:
+            context.board.put(start_key(tree.robot_name, tree.mission_name), start)
         self._stack = (*self._stack, TreeRun(tree, context))
         self._control.mission_begun(self.name, tree)
 

@@ -17,12 +17,23 @@ from skills.robot import Clock
 class RememberPose(Explained, Behaviour):
     """Writes the robot's present pose in the world to the blackboard. Always SUCCESS once the robot is localised.
 
-    FAILURE with PRECONDITION when the robot does not know where it is for longer than `patience_s`.
+    FAILURE with PRECONDITION when the robot does not know where it is for longer than `patience_s`. With `keep`, a pose
+    that is there already stays: the mission was asked for where another one began.
     """
 
-    def __init__(self, *, path_id: str, name: str, key: str, context: RunContext, patience_s: float = 5.0) -> None:
+    def __init__(
+        self,
+        *,
+        path_id: str,
+        name: str,
+        key: str,
+        context: RunContext,
+        patience_s: float = 5.0,
+        keep: bool = False,
+    ) -> None:
         super().__init__(name)
         self.path_id = path_id
+        self._keep = keep
         self._key, self._context, self._patience_s, self._started_s = key, context, patience_s, 0.0
         self.clear_explanation()
 
@@ -33,6 +44,9 @@ class RememberPose(Explained, Behaviour):
 
     def update(self) -> Status:
         """Write the pose, or wait for one."""
+        if self._keep and self._key in self._context.board:
+            self.message = "began before"
+            return Status.SUCCESS
         if self._context.localiser.estimate().localised:
             pose = self._context.for_skill(self.path_id).pose()
             self._context.board.put(self._key, pose)

@@ -14,7 +14,7 @@ from executive.compiling.search import surfaces_elsewhere
 from executive.compiling.skill_steps import skill_plan
 from executive.compiling.steps import START, step_plan
 from executive.compiling.trips import are_trips, refuse_several, trips_plan
-from executive.compiling.workshop import Registry, Workshop, slug
+from executive.compiling.workshop import Registry, Workshop, slug, start_key
 from executive.errors import InputError, Problems
 from executive.knowledge import Knowledge
 from executive.missionfile.model import Mission, MissionStep, StepPolicy
@@ -79,7 +79,7 @@ def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> A
         InputError: unknown names, ports wired wrongly, commands that cannot be carried out; all in `others`.
     """
     base = f"{slug(mission.robot_name)}/{slug(mission.name)}"
-    site = _Site(knowledge, registry, f"{base}/start-pose")
+    site = _Site(knowledge, registry, start_key(mission.robot_name, mission.name))
     plans, parts = _level(mission, base, site)
     remember = tuple(_remember(base, site.start_key, mission))
     name, source = mission.name, mission.source
@@ -230,7 +230,7 @@ def _remember(base: str, key: str, mission: Mission) -> Iterator[NodePlan]:
     policies = (mission.policy, *(step.policy for step in mission.walk()), *_used_policies(mission))
     if any(map(needs_way_back, policies)) or any(command.goal == START for command in mission.commands):
         path_id = f"{base}/remember-start"
-        yield RememberPosePlan(path_id=path_id, name="where it starts", source=mission.source, key=key)
+        yield RememberPosePlan(path_id=path_id, name="where it starts", source=mission.source, key=key, keep=True)
 
 
 def _used_policies(mission: Mission) -> Iterator[StepPolicy]:

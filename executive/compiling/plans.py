@@ -139,10 +139,11 @@ class SkillPlan(NodePlan):
 
 @dataclass(frozen=True, kw_only=True)
 class RememberPosePlan(NodePlan):
-    """Writes the robot's pose to the blackboard."""
+    """Writes the robot's pose to the blackboard; with `keep`, one that stands there already stays."""
 
     kind: ClassVar[str] = "remember"
     key: str
+    keep: bool = False
 
     def writes(self) -> Mapping[str, Any]:
         """The pose."""
@@ -150,7 +151,7 @@ class RememberPosePlan(NodePlan):
 
     def build(self, context: RunContext) -> Behaviour:
         """A RememberPose leaf."""
-        return RememberPose(path_id=self.path_id, name=self.name, key=self.key, context=context)
+        return RememberPose(path_id=self.path_id, name=self.name, key=self.key, context=context, keep=self.keep)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,6 +25,11 @@ def slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "unnamed"
 
 
+def start_key(robot_name: str, mission_name: str) -> str:
+    """The blackboard key of the pose at which a mission began."""
+    return f"{slug(robot_name)}/{slug(mission_name)}/start-pose"
+
+
 def pose_2d(pose: Pose) -> Pose2D:
     """A pose of the knowledge file as the skills take it."""
     return Pose2D(pose.x, pose.y, pose.yaw)

@@ -8,7 +8,7 @@ from py_trees.common import Status
 from executive.control import Control, Mode
 from executive.outcome import Outcome
 from skills.api import Cause, Failed, Question, Running, Succeeded, nobody_to_ask
-from skills.robot import Lease
+from skills.robot import Lease, Pose2D
 
 GRASP = "alice/fetch-drink/1-kitchen/grasp"
 GO = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
@@ -504,3 +504,36 @@ def test_an_observer_sees_where_the_robot_is_and_what_it_holds(compiled, run_tre
     )
     assert (glances[0].pose.x_m, glances[0].pose.y_m, glances[0].holding) == (0.0, 0.0, False)
     assert glances[-1].holding
+
+
+@pytest.mark.parametrize("give", ["replace", "then"])
+def test_a_mission_in_place_of_another_or_after_it_comes_back_to_the_same_start(
+    compiled, run_tree, make, control, robot, script, registry, give
+):
+    goals = []
+
+    def gone(skill):
+        goals.append((skill.inputs.goal.x_m, skill.inputs.goal.y_m))
+        robot.standing = Pose2D(skill.inputs.goal.x_m, skill.inputs.goal.y_m, 0.0)
+        return Succeeded("there")
+
+    script.ends["navigate"] = gone
+    other = compiled("Take [Nothing] to [start] and do [Nothing] to [Nothing]", name="come back")
+    actions = {12: lambda: getattr(control, give)(other)}
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
+    assert goals[0] != (0.0, 0.0)
+    assert goals[-1] == (0.0, 0.0)
+
+
+def test_a_mission_that_comes_first_begins_where_the_robot_stands(compiled, run_tree, make, control, robot, script):
+    goals = []
+
+    def gone(skill):
+        goals.append((skill.inputs.goal.x_m, skill.inputs.goal.y_m))
+        robot.standing = Pose2D(skill.inputs.goal.x_m, skill.inputs.goal.y_m, 0.0)
+        return Succeeded("there")
+
+    script.ends["navigate"] = gone
+    other = compiled("Take [Nothing] to [start] and do [Nothing] to [Nothing]", name="come back")
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({8: lambda: control.preempt(other)}))
+    assert goals[1] == goals[0] != (0.0, 0.0)

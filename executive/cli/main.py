@@ -16,6 +16,7 @@ from rich.table import Table
 from executive.cli.answers import Answers
 from executive.cli.check_command import check
 from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run
+from executive.cli.listen_command import listen
 from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.new_skill_command import new_skill
@@ -57,6 +58,7 @@ PageOf = Callable[[Request], PageView | None]
 app.command()(check)
 app.command()(tree)
 app.command()(parse)
+app.command()(listen)
 app.command()(log)
 app.command()(replay)
 app.command()(new_skill)

@@ -1,0 +1,182 @@
+"""`errand listen`: what recordings, or a microphone, say, and the commands that it means."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from executive.cli.assembly import knowledge_of, open_world
+from executive.cli.output import BAD_INPUT, console_for, refusals
+from executive.errors import InputError
+from executive.knowledge import Knowledge
+from executive.language import Status, Understanding, load_parser
+from executive.mission import DEFAULT_WORLD
+from executive.speech.activity import load_detector
+from executive.speech.hearing import SpeechReader, spoken_phrases
+from executive.speech.listener import HeardUtterance, Listener, Recording
+from executive.speech.microphone import Hearing, follow, microphone_blocks
+from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
+from executive.speech.voice import Voice, installed_voice
+from executive.speech.whisper import load_whisper
+
+__all__ = ["answer_line", "heard_sentence", "listen", "listener_for", "show_hearing"]
+
+_METER_WIDTH = 24
+_QUIETEST_DB = -60.0
+
+
+def listen(
+    files: Annotated[list[Path] | None, typer.Argument(metavar="FILE.wav...", show_default=False)] = None,
+    mic: Annotated[bool, typer.Option("--mic", help="Listen to the microphone until Ctrl-C.")] = False,
+    world: Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")] = None,
+    open_words: Annotated[bool, typer.Option("--open", help="Ground nothing in a world; names as spoken.")] = False,
+    no_wake: Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")] = False,
+    vocabulary: Annotated[
+        Path | None, typer.Option(help="A text file with one name on each line, in place of the world's names.")
+    ] = None,
+    robot: Annotated[str | None, typer.Option(help="The robot's name; the world's robot unless said.")] = None,
+    jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each file.")] = False,
+) -> None:
+    """Recognise what is said in wav files or at the microphone, and show the commands that it means."""
+    with refusals():
+        if mic == bool(files):
+            raise InputError("errand listen takes wav files or --mic", mend="try: errand listen request.wav")
+        knowledge = knowledge_of(open_world(world or DEFAULT_WORLD))
+        listener = listener_for(
+            knowledge, open_words=open_words, require_wake=not no_wake, vocabulary=vocabulary, robot_name=robot
+        )
+        if mic:
+            _follow_microphone(listener)
+            return
+        answers = [_answer(listener, file, jsonl=jsonl) for file in files or ()]
+    if any(answer is None or not (jsonl or answer.status is Status.OK) for answer in answers):
+        raise typer.Exit(BAD_INPUT)
+
+
+def listener_for(
+    knowledge: Knowledge,
+    *,
+    open_words: bool = False,
+    require_wake: bool = True,
+    vocabulary: Path | None = None,
+    robot_name: str | None = None,
+) -> Listener:
+    """A listener for the robot of a world, with the recogniser loaded.
+
+    Args:
+        knowledge: what is known of the world: its names, and the robot's own.
+        open_words: whether names stay as they were spoken, grounded in no world.
+        require_wake: whether the robot must be called by its name.
+        vocabulary: a file of names, in place of those of the world.
+        robot_name: the robot's name, in place of the one in `knowledge`.
+
+    Raises:
+        InputError: the extra `speech` is not installed, or the vocabulary cannot be read.
+    """
+    name = robot_name or knowledge.robot.name
+    called = name if require_wake else None
+    words = of_world(knowledge, called=require_wake) if vocabulary is None else read_vocabulary(vocabulary, called)
+    heard = Vocabulary(words.names, called)
+    reader = SpeechReader(load_parser(), None if open_words else knowledge, heard, name, require_wake)
+    return Listener(load_whisper(), load_detector, reader, spoken_phrases(heard))
+
+
+def heard_sentence(wav: Path, listener: Listener) -> str:
+    """What was said in a recording, in words that can be typed instead.
+
+    Raises:
+        InputError: it cannot be read, or nobody is heard to speak.
+    """
+    recording = listener.file(wav)
+    if not recording.heard:
+        raise InputError(recording.reason or "", mend="speak louder, or nearer to the microphone", file=wav)
+    return " ".join(one.meant.understanding.text for one in recording.decisive)
+
+
+def answer_line(meaning: Understanding) -> str:
+    """What the robot says to a request, in one line."""
+    if meaning.status is Status.OK:
+        return "All right: " + "; ".join(map(str, meaning.commands))
+    return (meaning.reason or "I did not understand.").split(";")[0]
+
+
+def show_hearing(hearings: Iterable[Hearing], console: Console, voice: Voice) -> None:
+    """Show the level and what is being said, block by block, and answer each sentence that ends."""
+    with Live(console=console, refresh_per_second=8, transient=True) as live:
+        for hearing in hearings:
+            live.update(_meter(hearing))
+            if hearing.finished is not None:
+                _show_heard(hearing.finished, console, voice)
+
+
+def _show_heard(heard: HeardUtterance, console: Console, voice: Voice) -> None:
+    meaning = heard.meant.understanding
+    console.print(Text(f"{heard.start_s:7.1f} s  {heard.text}"))
+    console.print(Text(f"           {answer_line(meaning)}", style="green" if meaning.commands else "yellow"))
+    if meaning.status is not Status.NOT_ADDRESSED:
+        voice.say(_aloud(meaning))
+
+
+def _aloud(meaning: Understanding) -> str:
+    """The answer without the form of the commands, which nobody wants read out."""
+    return "All right." if meaning.status is Status.OK else answer_line(meaning)
+
+
+def _meter(hearing: Hearing) -> Text:
+    """A bar for the level, and the sentence under way."""
+    share = max(0.0, 1.0 - hearing.level_db / _QUIETEST_DB)
+    filled = min(round(share * _METER_WIDTH), _METER_WIDTH)
+    bar = Text("█" * filled + "░" * (_METER_WIDTH - filled), style="green" if hearing.speaking else "dim")
+    return bar.append(f" {hearing.level_db:6.1f} dB  ").append(hearing.partial, style="italic")
+
+
+def _follow_microphone(listener: Listener) -> None:
+    console = console_for(as_json=False)
+    called = f'"Hey {listener.reader.robot_name}, ..."' if listener.reader.require_wake else "your request"
+    console.print(f"Listening; say {called}. Ctrl-C ends.", markup=False)
+    with closing(microphone_blocks()) as blocks, suppress(KeyboardInterrupt):
+        show_hearing(follow(blocks, listener), console, installed_voice())
+
+
+def _answer(listener: Listener, file: Path, *, jsonl: bool) -> Recording | None:
+    """Show what was heard in a file; None when it could not be listened to."""
+    try:
+        recording = listener.file(file)
+    except InputError as error:
+        typer.echo(f"errand: {error}", err=True)
+        if jsonl:
+            _print(_unheard(file, error))
+        return None
+    if jsonl:
+        _print(recording.to_json())
+    else:
+        _show_recording(recording)
+    return recording
+
+
+def _show_recording(recording: Recording) -> None:
+    """The transcript and the commands on standard output, or the reason on standard error."""
+    typer.echo(f"{recording.file}: {recording.transcript}")
+    for note in recording.notes:
+        typer.echo(f"  {note}")
+    if recording.status is not Status.OK:
+        typer.echo(f"errand: {recording.file}: {recording.reason}", err=True)
+    for command in recording.commands:
+        typer.echo(f"  {command}")
+
+
+def _unheard(file: Path, error: InputError) -> dict[str, Any]:
+    nothing = {"transcript": "", "addressed": False, "status": Status.REFUSED.value, "commands": []}
+    return {"file": str(file), **nothing, "reason": str(error), "notes": [], "utterances": []}
+
+
+def _print(answer: dict[str, Any]) -> None:
+    print(json.dumps(answer, ensure_ascii=False), flush=True)

@@ -1,0 +1,1 @@
+"""Speech: from sound to the words that were said."""

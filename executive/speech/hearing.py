@@ -1,0 +1,98 @@
+"""From recognised sound to commands: who is called, what is asked for, and which words were misheard."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+from executive.command import Command
+from executive.knowledge import Knowledge
+from executive.language import DependencyParser, Status, Understanding, understand
+from executive.language.lexicon import lexicon
+from executive.language.wake import heard_wake
+from executive.speech.alikes import SoundAlikes
+from executive.speech.repair import Reading
+from executive.speech.vocabulary import Vocabulary
+
+__all__ = ["Meant", "SpeechReader", "spoken_phrases"]
+
+_GREETINGS: Final = ("Hey", "Hi", "OK")
+_ARTICLES: Final = ("the", "a", "an", "my", "from the", "to the", "on the", "in the")
+_NUMBERS: Final = ("two", "three", "four", "five")
+_CALL_WORDS: Final = 3
+
+
+@dataclass(frozen=True)
+class Meant:
+    """What a heard sentence means, and whether the robot was called by its name.
+
+    The text of `understanding` is the sentence with the robot's name spelled right, so that it can be typed instead.
+    """
+
+    understanding: Understanding
+    addressed: bool
+
+
+@dataclass(frozen=True)
+class SpeechReader:
+    """Reads heard sentences for one robot.
+
+    `knowledge` None keeps names as spoken; then names outside the vocabulary, where there is one, do not fit.
+    """
+
+    parser: DependencyParser
+    knowledge: Knowledge | None
+    vocabulary: Vocabulary
+    robot_name: str
+    require_wake: bool
+    other_robots: Collection[str] = ()
+
+    def read(self, text: str) -> Reading[Meant]:
+        """What `text` means; it fits when it becomes commands in known names."""
+        address = heard_wake(text, self.robot_name, others=self.other_robots)
+        addressed = address.name is not None
+        understood = understand(
+            address.text if addressed else text,
+            parser=self.parser,
+            knowledge=self.knowledge,
+            require_wake=self.require_wake and not addressed,
+            robot_name=self.robot_name,
+        )
+        typed = f"Hey {self.robot_name}, {address.text}" if addressed else text
+        meant = Meant(replace(understood, text=typed), addressed)
+        if understood.status is Status.NOT_ADDRESSED:
+            return Reading(meant, fits=False, suspects=tuple(text.split()[:_CALL_WORDS]))
+        if understood.status is not Status.OK:
+            return Reading(meant, fits=False, suspects=understood.unknown_words)
+        strange = () if self.knowledge else tuple(self._strange(understood.commands))
+        return Reading(meant, fits=not strange, suspects=strange)
+
+    def _strange(self, commands: tuple[Command, ...]) -> Iterator[str]:
+        """Names in the commands that the vocabulary does not know; none is strange where there is no vocabulary."""
+        known = {_plain(name) for name in self.vocabulary.names}
+        spoken = (name for command in commands for name in _names(command))
+        yield from (name for name in dict.fromkeys(spoken) if known and _plain(name) not in known)
+
+
+def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
+    """All that a misheard word may have been: the names, also in the plural, and the words of requests."""
+    words = lexicon()
+    verbs = [" ".join(verb) for verb in words.verbs]
+    prepositions = [" ".join(preposition) for preposition in words.prepositions]
+    calls = [f"{greeting} {vocabulary.robot_name}" for greeting in _GREETINGS] if vocabulary.robot_name else []
+    names = [form for name in vocabulary.names for form in (name, f"{name}s")]
+    small = [*words.pronouns, *words.here, *words.there, *words.speaker, *_ARTICLES, *_NUMBERS]
+    return SoundAlikes(names, [*calls, *verbs, *prepositions, *words.openers, *words.requests, *small])
+
+
+def _names(command: Command) -> Iterator[str]:
+    things = (thing.name for thing in (command.item, command.object) if thing is not None)
+    goals = (goal for goal in (command.goal, command.goal_at) if goal is not None and goal != "start")
+    yield from (*things, *goals)
+
+
+def _plain(name: str) -> str:
+    """A name by which singular and plural are the same, without case and signs."""
+    return re.sub(r"(?:(?<=[sxz])es|(?<=ch)es|(?<=sh)es|(?<!s)s)$", "", re.sub(r"[^\w ]", "", name.lower()))

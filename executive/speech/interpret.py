@@ -1,0 +1,78 @@
+"""Which of the readings of a sound was meant: the likeliest one that makes sense, mended by sound where none does."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, Generic, TypeVar
+
+from executive.speech.alikes import SoundAlikes
+from executive.speech.recogniser import Recognition
+from executive.speech.repair import Reading, Repair, repairs
+
+__all__ = ["Interpretation", "interpret"]
+
+Meaning = TypeVar("Meaning")
+
+_OTHER_READING: Final = 6.0
+"""How many times e less likely another of the recogniser's own readings may be than the first."""
+_MENDED_READING: Final = 9.0
+"""The same for a reading mended by sound; these are compared without telling the recogniser what to expect."""
+_MOST_MENDED: Final = 4
+_PER_SOUND: Final = 2.0
+"""How much log likelihood a changed sound is worth."""
+
+
+@dataclass(frozen=True)
+class Interpretation(Generic[Meaning]):
+    """What was heard in the end and what it means, and what the recogniser had made of it at first."""
+
+    text: str
+    meaning: Meaning
+    first_text: str
+
+
+def interpret(
+    recognition: Recognition, read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes
+) -> Interpretation[Meaning] | None:
+    """The likeliest reading that fits, or else the likeliest; None when nothing was said."""
+    transcripts = recognition.transcripts
+    if not transcripts:
+        return None
+    first = transcripts[0]
+    heard = list[Repair[Meaning]]()
+    for transcript in transcripts:
+        text, behind = once(transcript.text), first.likelihood - transcript.likelihood
+        if behind > _OTHER_READING or any(_same(text, other.text) for other in heard):
+            continue
+        heard.append(Repair(text, behind / _PER_SOUND, read(text)))
+        if heard[-1].reading.fits:
+            return Interpretation(text, heard[-1].reading.meaning, first.text)
+    best = _mended(recognition, heard, read, alikes) or heard[0]
+    return Interpretation(best.text, best.reading.meaning, first.text)
+
+
+def _mended(
+    recognition: Recognition,
+    heard: Sequence[Repair[Meaning]],
+    read: Callable[[str], Reading[Meaning]],
+    alikes: SoundAlikes,
+) -> Repair[Meaning] | None:
+    """The likeliest of the sentences that fit and sound like one of the readings, if it is likely at all."""
+    fitting = repairs(heard, read, alikes, most=_MOST_MENDED)
+    if not fitting:
+        return None
+    unmended, *likelihoods = recognition.likelihoods([heard[0].text, *(repair.text for repair in fitting)])
+    weighed = zip(likelihoods, fitting, strict=True)
+    best, repair = max(weighed, key=lambda pair: pair[0] - _PER_SOUND * pair[1].cost)
+    return repair if best >= unmended - _MENDED_READING else None
+
+
+def _same(first: str, second: str) -> bool:
+    return first.rstrip(" .?!").lower() == second.rstrip(" .?!").lower()
+
+
+def once(text: str) -> str:
+    """The text without what a speaker said twice on starting anew ("grab the, grab the cup")."""
+    return re.sub(r"\b(\w+(?:[ ']\w+){1,9})[ ,.;]+(?=\1\b)", "", text, flags=re.IGNORECASE)

@@ -1,0 +1,171 @@
+"""Listens to a whole recording or to a microphone: utterances, recognised and understood one after another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from executive.command import Command
+from executive.errors import InputError
+from executive.language import Status
+from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
+from executive.speech.alikes import SoundAlikes
+from executive.speech.hearing import Meant, SpeechReader
+from executive.speech.interpret import interpret
+from executive.speech.recogniser import Recogniser
+from executive.speech.sound import Loudness, Samples, joined
+from executive.speech.vocabulary import Vocabulary
+from executive.speech.wav import read_wav
+
+__all__ = ["HeardUtterance", "Listener", "Recording", "together"]
+
+NOBODY_SPOKE: Final = "nobody is heard to speak"
+SILENT: Final = "the recording is silent"
+CLIPPED: Final = "the recording is clipped (too loud for its scale): words may be lost"
+
+
+@dataclass(frozen=True)
+class HeardUtterance:
+    """What was said between two pauses (s from the beginning of the sound), and what it means."""
+
+    start_s: float
+    end_s: float
+    text: str
+    meant: Meant
+
+
+@dataclass(frozen=True)
+class Listener:
+    """All that it takes to turn sound into commands. `new_detector` gives a detector that has heard nothing yet."""
+
+    recogniser: Recogniser
+    new_detector: Callable[[], SpeechDetector]
+    reader: SpeechReader
+    alikes: SoundAlikes
+    rules: PauseRules = field(default_factory=PauseRules)
+
+    @property
+    def vocabulary(self) -> Vocabulary:
+        """The names that are listened for."""
+        return self.reader.vocabulary
+
+    def file(self, wav: Path) -> Recording:
+        """Listen to a recording of any length; only seconds of it are in memory.
+
+        Raises:
+            InputError: see `read_wav`.
+        """
+        loudness = Loudness()
+
+        def measured() -> Iterator[Samples]:
+            nonlocal loudness
+            for block in read_wav(wav):
+                loudness = loudness.with_block(block)
+                yield block
+
+        heard = tuple(filter(None, map(self.hear, together(self.utterances(measured()), self.rules.most_s))))
+        if not loudness.count:
+            raise InputError("it holds no sound", mend="record again", file=wav)
+        return Recording(str(wav), heard, loudness)
+
+    def utterances(self, blocks: Iterable[Samples]) -> Iterator[Utterance]:
+        """The utterances in a stream of sound."""
+        endpointer = Endpointer(self.new_detector(), self.rules)
+        for block in blocks:
+            yield from endpointer.push(block)
+        yield from endpointer.flush()
+
+    def hear(self, utterance: Utterance) -> HeardUtterance | None:
+        """Recognise and understand what was said; None when it was no speech after all."""
+        recognition = self.recogniser.transcribe(utterance.samples, self.vocabulary)
+        best = interpret(recognition, self.reader.read, self.alikes)
+        if best is None:
+            return None
+        return HeardUtterance(utterance.start_s, utterance.end_s, best.text, best.meaning)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What was heard in a recording."""
+
+    file: str
+    heard: tuple[HeardUtterance, ...]
+    loudness: Loudness
+
+    @property
+    def transcript(self) -> str:
+        """All that was said."""
+        return " ".join(one.text for one in self.heard)
+
+    @property
+    def addressed(self) -> bool:
+        """Whether the robot was called."""
+        return any(one.meant.addressed for one in self.heard)
+
+    @property
+    def decisive(self) -> tuple[HeardUtterance, ...]:
+        """The utterances that count: those to the robot, or all when none is."""
+        told = tuple(o for o in self.heard if o.meant.understanding.status is not Status.NOT_ADDRESSED)
+        return told or self.heard[:1]
+
+    @property
+    def status(self) -> Status:
+        """OK when all that was said to the robot is, else what became of the first that is not."""
+        states = [one.meant.understanding.status for one in self.decisive]
+        return next((state for state in states if state is not Status.OK), Status.OK if states else Status.REFUSED)
+
+    @property
+    def commands(self) -> tuple[Command, ...]:
+        """What is to be done; nothing when any part of it was not understood."""
+        if self.status is not Status.OK:
+            return ()
+        return tuple(command for one in self.decisive for command in one.meant.understanding.commands)
+
+    @property
+    def reason(self) -> str | None:
+        """Why there are no commands."""
+        if not self.heard:
+            return SILENT if self.loudness.silent else NOBODY_SPOKE
+        return next(filter(None, (one.meant.understanding.reason for one in self.decisive)), None)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What may be wrong with the sound, and which name was taken for which."""
+        clipped = (CLIPPED,) if self.loudness.much_clipped else ()
+        return (*clipped, *(note for one in self.decisive for note in one.meant.understanding.notes))
+
+    def to_json(self) -> dict[str, Any]:
+        """The answer as JSON values."""
+        return {
+            "file": self.file,
+            "transcript": self.transcript,
+            "addressed": self.addressed,
+            "status": self.status.value,
+            "commands": [command.to_json() for command in self.commands],
+            "reason": self.reason,
+            "notes": list(self.notes),
+            "utterances": [
+                {"start_s": round(one.start_s, 2), "end_s": round(one.end_s, 2), "text": one.text} for one in self.heard
+            ],
+        }
+
+
+def together(utterances: Iterable[Utterance], most_s: float) -> Iterator[Utterance]:
+    """The utterances as one when all of them last no longer than `most_s`: a request with pauses for thought.
+
+    In a longer recording each stands for itself.
+    """
+    held = list[Utterance]()
+    length_s = 0.0
+    rest = iter(utterances)
+    for utterance in rest:
+        held.append(utterance)
+        length_s += utterance.length_s
+        if length_s > most_s:
+            yield from held
+            yield from rest
+            return
+    if held:
+        yield Utterance(joined(one.samples for one in held), held[0].start_s, held[-1].end_s)

@@ -1,0 +1,115 @@
+"""Mends what was heard by sound: words that fit nowhere become known words that sound alike ("ranch" -> wrench).
+
+The search goes from the transcripts outwards, the change that is least to the ear first, and only changes words that
+the reader of the sentence found fault with, or their neighbours. Which of the sentences that then make sense was
+meant, and whether any, the sound itself decides (see `interpret.py`).
+"""
+
+from __future__ import annotations
+
+import heapq
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import Final, Generic, TypeVar
+
+from executive.speech.alikes import Alike, SoundAlikes
+
+__all__ = ["Reading", "Repair", "repairs"]
+
+Meaning = TypeVar("Meaning")
+
+
+@dataclass(frozen=True)
+class Reading(Generic[Meaning]):
+    """What a sentence means, whether that fits, and else the words that are to blame (none: any may be)."""
+
+    meaning: Meaning
+    fits: bool
+    suspects: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Repair(Generic[Meaning]):
+    """A sentence, what it means, and how far it sounds from what was heard (0 the same, about 1 a changed sound)."""
+
+    text: str
+    cost: float
+    reading: Reading[Meaning]
+
+
+def repairs(
+    heard: Sequence[Repair[Meaning]], read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes, *, most: int = 3
+) -> list[Repair[Meaning]]:
+    """At most so many sentences that fit and sound like one of those that were heard, the likest first."""
+    order = count()
+    known = {repair.text: repair.reading for repair in heard}
+    queue = [(repair.cost, next(order), 0, tuple(repair.text.split())) for repair in heard]
+    heapq.heapify(queue)
+    seen, found = {words for *_, words in queue}, list[Repair[Meaning]]()
+    for _ in range(_MOST_READINGS):
+        if not queue or len(found) == most:
+            break
+        cost, _, changes, words = heapq.heappop(queue)
+        sentence = " ".join(words)
+        reading = known.get(sentence) or read(sentence)
+        if reading.fits:
+            found.append(Repair(sentence, cost, reading))
+        elif changes < _MOST_CHANGES:
+            for more, changed in _changed(words, reading.suspects, alikes):
+                if changed not in seen and cost + more <= _MOST_COST:
+                    seen.add(changed)
+                    heapq.heappush(queue, (cost + more, next(order), changes + 1, changed))
+    return found
+
+
+def _changed(
+    words: tuple[str, ...], suspects: Sequence[str], alikes: SoundAlikes
+) -> Iterator[tuple[float, tuple[str, ...]]]:
+    """The sentences with one group of words changed, and the cost of that."""
+    for start, end in _spans(len(words), _blamed(words, suspects)):
+        spoken = " ".join(map(_bare, words[start:end]))
+        tail = re.sub(r".*[\w']", "", words[end - 1])
+        price = _PER_CHANGE + _PER_KNOWN_WORD * sum(alikes.knows(word) for word in spoken.split())
+        for alike in alikes.of(spoken):
+            if _stands(words[:start], alike):
+                yield alike.cost + price, (*words[:start], *f"{alike.phrase}{tail}".split(), *words[end:])
+
+
+def _stands(before: Sequence[str], alike: Alike) -> bool:
+    """Whether the phrase may stand behind these words: behind an article or a number only a name may."""
+    return alike.name or not before or before[-1].lower() not in _BEFORE_NAMES
+
+
+def _blamed(words: Sequence[str], suspects: Sequence[str]) -> set[int]:
+    """The positions of the words to blame; all when none is named."""
+    bare = [_bare(word).lower() for word in words]
+    blamed = set[int]()
+    for suspect in suspects:
+        parts = [_bare(part).lower() for part in suspect.split()]
+        for at in range(len(bare) - len(parts) + 1):
+            if parts and bare[at : at + len(parts)] == parts:
+                blamed |= set(range(at, at + len(parts)))
+    return blamed or set(range(len(words)))
+
+
+def _spans(count: int, blamed: set[int]) -> Iterator[tuple[int, int]]:
+    """Groups of one to three of so many words, at least one of them to blame."""
+    for length in range(1, _MOST_WORDS + 1):
+        for start in range(count - length + 1):
+            if blamed & set(range(start, start + length)):
+                yield start, start + length
+
+
+def _bare(word: str) -> str:
+    return re.sub(r"['’]s$", "", word.strip(" ,.;:!?\"'"))
+
+
+_MOST_WORDS: Final = 3
+_MOST_CHANGES: Final = 3
+_MOST_READINGS: Final = 32
+_MOST_COST: Final = 4.5
+_PER_CHANGE: Final = 0.3
+_PER_KNOWN_WORD: Final = 0.4
+_BEFORE_NAMES: Final = frozenset({"the", "a", "an", "my", "two", "three", "four", "five"})

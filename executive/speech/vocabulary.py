@@ -1,0 +1,67 @@
+"""The names that may be said: the recogniser expects them, and what it heard is matched to them by sound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from executive.errors import InputError
+from executive.knowledge import Knowledge
+
+__all__ = ["Vocabulary", "of_world", "read_vocabulary"]
+
+_MOST_NAMES = 5_000
+_MOST_LETTERS = 80
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """Names of things, places and people as they are spoken, the most usual last, and the robot's own name.
+
+    Without `robot_name` nobody need call the robot.
+    """
+
+    names: tuple[str, ...] = ()
+    robot_name: str | None = None
+
+    @property
+    def prompt(self) -> str:
+        """What the recogniser is told was said before: the names, and the turns in which people ask."""
+        call = ("Hey {0}, could", "Hi {0}, would", "OK {0}, grab", "{0}, please") if self.robot_name else _UNCALLED
+        turns = (
+            f"{call[0]} you get me one? {call[1]} you please go there. {call[2]} it. "
+            f"{call[3]} pick it up, move it from here and give it to me."
+        ).format(self.robot_name)
+        return f"{', '.join(self.names)}. {turns}" if self.names else turns
+
+
+def of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:
+    """All names of a world; `called` says whether the robot is to be called by its name."""
+    groups = (knowledge.surfaces, knowledge.places, knowledge.things, knowledge.people)
+    aliases = [alias for group in groups for facts in group.values() for alias in facts.aliases]
+    names = [name for group in groups for name in group]
+    robot = knowledge.robot.name
+    everything = dict.fromkeys([*aliases, *names, *knowledge.categories(), *([robot] if called else [])])
+    return Vocabulary(tuple(everything), robot if called else None)
+
+
+def read_vocabulary(file: Path, robot_name: str | None) -> Vocabulary:
+    """The names in a text file, one on each line; empty lines are left out.
+
+    Raises:
+        InputError: it cannot be read, is no text, or holds more than 5000 names or one of more than 80 letters.
+    """
+    try:
+        lines = [" ".join(line.split()) for line in file.read_text(encoding="utf-8-sig").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read it ({error})", mend="name a text file in UTF-8", file=file) from error
+    for number, line in enumerate(lines, 1):
+        if len(line) > _MOST_LETTERS:
+            raise InputError("the name is too long", mend="write one name on each line", file=file, line=number)
+    names = tuple(dict.fromkeys(filter(None, lines)))
+    if len(names) > _MOST_NAMES:
+        raise InputError(f"{len(names)} names are too many", mend=f"keep {_MOST_NAMES} at most", file=file)
+    return Vocabulary((*names, *([robot_name] if robot_name else [])), robot_name)
+
+
+_UNCALLED = ("Could", "Would", "Grab", "Please")

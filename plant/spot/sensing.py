@@ -10,11 +10,12 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import FrameId, QueryObject, SceneGraph
+from pydrake.geometry import FrameId, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from plant.models.spot.description import arm_joint_names, spot_facts
+from plant.scene import RENDERER, Scene
 from plant.sensors.battery import BatteryModel, BatterySpec
 from plant.sensors.camera import Camera
 from plant.sensors.camera_spec import load_cameras
@@ -54,20 +55,19 @@ class SpotSensors:
         self,
         model: SpotModel,
         scene_graph: SceneGraph,
-        root_context: Context,
         context: Context,
         *,
         seed: int,
-        renderer: str,
+        scene: Scene | None = None,
         dock: Pose2D | None = None,
         charge: float = 1.0,
     ) -> None:
-        """`context` is the plant's part of `root_context`. The seed and the robot's name give the noise.
+        """`context` is the plant's. The seed and the robot's name give the noise. Without a scene, cameras are blind.
 
         The battery begins at `charge` (0 to 1) and charges while the body stands still at `dock`.
         """
         self._model, self._scene_graph, self._dock = model, scene_graph, dock
-        self._root_context, self._context = root_context, context
+        self._scene, self._context = scene, context
         self._index = model.index()
         self._kinematics = model.plant.CreateDefaultContext()
         rngs = _generators(seed, model.name)
@@ -79,7 +79,7 @@ class SpotSensors:
         self._battery_model = BatteryModel(next(rngs), charge, BatterySpec(runtime_s=body["runtime"]))
         self._lidar = self._make_lidar(next(rngs))
         self._cameras = {
-            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=renderer)
+            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER)
             for name, spec in load_cameras(CAMERAS).items()
         }
         self._scan: Scan | None = None
@@ -176,13 +176,12 @@ class SpotSensors:
         return self._battery
 
     def image(self, source: str) -> Image:
-        """Take a picture now. Raises ValueError for an unknown source."""
+        """Take a picture now. Raises ValueError for an unknown source, LookupError when nothing is rendered."""
         if source not in self._cameras:
             raise ValueError(f"{self._model.name} has no camera {source!r}; it has {', '.join(self._cameras)}")
-        query = self._scene_graph.get_query_output_port().Eval(
-            self._scene_graph.GetMyContextFromRoot(self._root_context)
-        )
-        assert isinstance(query, QueryObject)
+        if self._scene is None:
+            raise LookupError("nothing is rendered: build the Diagram with render=True")
+        query = self._scene.query_at(self._model.plant.GetPositions(self._context))
         return self._cameras[source].take(query, self._now_s, self._frames())
 
     def _frames(self) -> FrameTree:

@@ -8,8 +8,8 @@ from itertools import zip_longest
 from typing import Final
 
 from executive.language.clauses import Clause
-from executive.language.items import Being, Outside, Separator, Unknown, Verb, Whether, spoken_words
-from executive.language.lexicon import Lexicon, VerbKind
+from executive.language.items import Being, Chunk, Outside, Separator, Unknown, Verb, Whether, spoken_words
+from executive.language.lexicon import Lexicon, VerbKind, lexicon
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, Location, Roles, read_roles
 
@@ -38,7 +38,7 @@ _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 def read_actions(clauses: Sequence[Clause], words: Lexicon) -> tuple[Action, ...]:
     """The actions of all clauses, in order."""
-    merged = list(_without_checks(clauses))
+    merged = list(_without_checks(_without_reasons(clauses)))
     found = [replace(action, said=_said(clause)) for clause in merged for action in _actions(clause, words)]
     return tuple(action for action in found[:-1] if not _goes_nowhere(action)) + tuple(found[-1:])
 
@@ -52,6 +52,17 @@ def _said(clause: Clause) -> str:
 def _goes_nowhere(action: Action) -> bool:
     """Whether it is the "go" of "go and find", which says nothing of its own."""
     return action.kind is VerbKind.GO and action.goal is None and action.unknown == (action.verb,)
+
+
+def _without_reasons(clauses: Sequence[Clause]) -> Sequence[Clause]:
+    """Leave out what the speakers say that they are about to do themselves, before they say what is to be done."""
+    if len(clauses) < 3 or clauses[0].verb is not None or not isinstance(clauses[2].verb, Verb):
+        return clauses
+    first, act = clauses[0].items, clauses[1].verb
+    wants = [item.word for item in first if isinstance(item, Unknown)]
+    speaker = bool(first) and isinstance(first[0], Chunk) and first[0].phrase.speaker
+    own = isinstance(act, Outside) and act.word.lower() not in lexicon().asks
+    return clauses[2:] if speaker and own and wants[-1:] == ["to"] else clauses
 
 
 def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
@@ -83,6 +94,8 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     """A status check ("is there a hammer in the workshop"), or a statement ("there is a hammer in the workshop")."""
     if _is_state(clause):
         return Action(None, being.text)
+    if clause.subject is not None and clause.subject.phrase.speaker and not being.asked:
+        return _lacking(clause, being, words)
     roles = read_roles(clause.items, words, describes=False)
     objects = [*([clause.subject.phrase] if clause.subject else []), *roles.objects]
     places = [*roles.ats, *roles.sources]
@@ -94,6 +107,14 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     unknown = () if fits and not asked_for else (spoken_words([*before, being, *clause.items]),)
     asked = being.asked or clause.whether
     return Action(VerbKind.FIND if asked else None, "be", tuple(objects[:1]), place, unknown=unknown)
+
+
+def _lacking(clause: Clause, being: Being, words: Lexicon) -> Action:
+    """What the speaker lacks ("we are out of napkins"), or where they are ("I am in the hall")."""
+    roles = read_roles(clause.items, words, describes=False)
+    lacked = [place.phrase for place in roles.sources if place.phrase is not None]
+    place = next(iter(roles.ats), None)
+    return Action(None, being.text, tuple(lacked), place, unknown=(*roles.unknown, *(p.spoken for p in roles.objects)))
 
 
 def _is_state(clause: Clause) -> bool:
@@ -140,7 +161,8 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
     """One action for each place to look at: "in the kitchen and the hall"."""
     objects, places = list(roles.objects), [*roles.ats, *roles.sources]
     if roles.searched is not None:
-        places = [*(Location(phrase) for phrase in objects), *places]
+        within, places = (places[0], places[1:]) if objects and places else (None, places)
+        places = [*(Location(phrase, within=within) for phrase in objects), *places]
         objects = [roles.searched]
     extra = [place.text for place in (*places[1:], *_others([HERE, *roles.goals]))]
     found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)

@@ -6,12 +6,10 @@ which place plays which role.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final
 
-from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
-from executive.language.parser import Token
+from executive.language.lexicon import PrepositionRole, VerbKind
 from executive.language.phrases import Phrase
 
 __all__ = [
@@ -26,16 +24,8 @@ __all__ = [
     "Unknown",
     "Verb",
     "Whether",
-    "split_items",
     "spoken_words",
 ]
-
-_SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
-_VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
-_LONGEST: Final = 6
-_RELATIVE: Final = frozenset({"that", "which", "what"})
-_WHO: Final = frozenset({"who", "that", "which"})
-_IS: Final = frozenset({"is", "'s", "are", "'re"})
 
 
 @dataclass(frozen=True)
@@ -123,237 +113,6 @@ class Correction:
 
 
 Item = Verb | Chunk | Adverb | Being | Whether | Separator | Unknown | Outside | Negation | Correction
-
-
-@dataclass
-class _Reader:
-    """Reads the row from left to right."""
-
-    tokens: Sequence[Token]
-    phrases: Mapping[int, Phrase]
-    words: Lexicon
-    at: int = 0
-
-    def read(self) -> Iterable[Item]:
-        steps = (self._mark, self._told, self._verb, self._being, self._chunk, self._small, self._outside)
-        items: list[Item] = []
-        while self.at < len(self.tokens):
-            item = next((found for step in steps if (found := step(items)) is not None), None)
-            items.append(item if item is not None else self._unknown())
-        return items
-
-    def _match(self, phrases: Container[tuple[str, ...]]) -> tuple[str, ...] | None:
-        """The longest of the phrases that stands here."""
-        for length in range(_LONGEST, 0, -1):
-            piece = self.tokens[self.at : self.at + length]
-            spoken = tuple(t.word for t in piece)
-            if len(piece) == length and spoken in phrases:
-                return spoken
-        return None
-
-    def _mark(self, items: list[Item]) -> Item | None:
-        """What takes something back: "not", "no, the hammer"."""
-        correction, negation = self._match(self.words.corrections), self._match(self.words.negations)
-        if correction is not None and len(correction) >= len(negation or ()) and self._is_correction(len(correction)):
-            self.at += len(correction)
-            return Correction(" ".join(correction), self.words.corrections[correction])
-        if negation is not None:
-            self.at += len(negation)
-            return Negation(" ".join(negation))
-        return None
-
-    def _is_correction(self, length: int) -> bool:
-        """Whether "no" is none that belongs to a noun ("no milk")."""
-        behind = self.tokens[self.at + length : self.at + length + 1]
-        return self.tokens[self.at].word != "no" or length > 1 or not behind or behind[0].pos not in ("NOUN", "ADJ")
-
-    def _told(self, items: list[Item]) -> Item | None:
-        """ "I left it in the hall" tells where a thing is; behind a noun it tells only which one is meant."""
-        subject = items[-1] if items else None
-        if not isinstance(subject, Chunk) or self.tokens[self.at].word not in self.words.told:
-            return None
-        phrase = subject.phrase
-        if subject.role is not None or not (phrase.head.word in self.words.subjects or phrase.named_person):
-            return None
-        items.pop()
-        text = self._words(1)
-        if items and isinstance(items[-1], Unknown) and items[-1].word.lower() in _RELATIVE:
-            items.pop()
-        relative = bool(items) and isinstance(items[-1], Chunk)
-        return Separator("") if relative else Being(text, existential=True, asked=False)
-
-    def _verb(self, items: list[Item]) -> Item | None:
-        found = self._match(self.words.verbs) or self._gerund(items)
-        if found is None or not self._is_verb(items, len(found)):
-            return None
-        self.at += len(found)
-        return Verb(" ".join(found), self.words.verbs[found])
-
-    def _gerund(self, items: list[Item]) -> tuple[str, ...] | None:
-        """A verb that stands as "bringing" where a command begins, as behind "would you mind"."""
-        first = self.tokens[self.at]
-        if first.tag != "VBG" or not _command_position(items):
-            return None
-        spoken = (first.lemma, *(t.word for t in self.tokens[self.at + 1 : self.at + _LONGEST]))
-        return next((spoken[:n] for n in range(len(spoken), 0, -1) if spoken[:n] in self.words.verbs), None)
-
-    def _is_verb(self, items: list[Item], length: int) -> bool:
-        token = self.tokens[self.at]
-        inside = any(start < self.at < start + len(p.tokens) for start, p in self.phrases.items())
-        if token.pos == "VERB" and token.tag in _VERB_TAGS and not inside:
-            return True
-        following = self.tokens[self.at + length : self.at + length + 1]
-        return _command_position(items) and bool(following) and following[0].word not in _SEPARATORS
-
-    def _being(self, items: list[Item]) -> Item | None:
-        token = self.tokens[self.at]
-        after = self.tokens[self.at + 1 : self.at + 2]
-        modal = int(token.tag == "MD" and bool(after) and after[0].word == "be")
-        if modal or (token.lemma == "be" and token.pos in ("AUX", "VERB") and self._match(self.words.fillers) is None):
-            second = self.tokens[self.at + 1 + modal : self.at + 2 + modal]
-            existential = bool(second) and second[0].tag == "EX"
-            return Being(self._words(1 + modal + existential), existential, asked=not modal)
-        if token.tag == "EX" or (token.word == "there" and after and after[0].lemma == "be"):
-            verb = next((t.index for t in self.tokens[self.at + 1 : self.at + 4] if t.lemma == "be"), self.at)
-            return Being(self._words(verb + 1 - self.at), existential=True, asked=False)
-        return None
-
-    def _words(self, count: int) -> str:
-        """The next words, which are then read."""
-        self.at += count
-        return " ".join(t.text for t in self.tokens[self.at - count : self.at])
-
-    def _chunk(self, items: list[Item]) -> Item | None:
-        preposition = self._match(self.words.prepositions) or ()
-        start = self.at + len(preposition)
-        phrase = self._phrase_at(start)
-        if phrase is None:
-            return None
-        self.at = start + len(phrase.tokens)
-        if phrase.negative:
-            return Unknown(phrase.spoken)
-        phrase = self._described(self._of(phrase))
-        role = self.words.prepositions[preposition] if preposition else None
-        return Chunk(phrase, " ".join(preposition), role)
-
-    def _phrase_at(self, start: int) -> Phrase | None:
-        """The noun phrase that begins at `start`, also when what came before took its first words."""
-        whole = self.phrases.get(start)
-        if whole is not None:
-            return whole
-        cut = next((p for first, p in self.phrases.items() if first < start < first + len(p.tokens)), None)
-        return None if cut is None else Phrase(tuple(t for t in cut.tokens if t.index >= start))
-
-    def _of(self, phrase: Phrase) -> Phrase:
-        """Join "of wine" to a bottle, and "of cups" to "two" or "a couple"."""
-        while self.at < len(self.tokens) and self.tokens[self.at].word == "of":
-            inner = self._phrase_at(self.at + 1)
-            if inner is None:
-                break
-            self.at += 1 + len(inner.tokens)
-            phrase = phrase.counting(inner) if phrase.counts else phrase.consisting_of(inner)
-        return phrase
-
-    def _described(self, phrase: Phrase) -> Phrase:
-        """Join what tells somebody or something apart: what they do, what they wear, what it has."""
-        while (end := self._description_end(phrase)) > self.at:
-            phrase = phrase.described(self.tokens[self.at : end])
-            self.at = end
-        return phrase
-
-    def _description_end(self, phrase: Phrase) -> int:
-        """Where a description that begins here ends."""
-        if self.at >= len(self.tokens):
-            return self.at
-        if phrase.person:
-            self._skip_relative()
-        token = self.tokens[self.at]
-        if phrase.person and token.tag == "VBG":
-            return self._doing_end()
-        joins = token.word == "with" or (phrase.person and token.word in ("in", "wearing") and self._worn())
-        inner = self._phrase_at(self.at + 1) if joins else None
-        if inner is None or inner.person or inner.speaker or inner.pronoun:
-            return self.at
-        return self.at + 1 + len(inner.tokens)
-
-    def _skip_relative(self) -> None:
-        """Leave out "who is" before what somebody does or wears."""
-        here = tuple(t.word for t in self.tokens[self.at : self.at + 2])
-        after = self.tokens[self.at + 2 : self.at + 3]
-        if len(here) == 2 and here[0] in _WHO and here[1] in _IS and after and after[0].tag in ("VBG", "IN"):
-            self.at += 2
-
-    def _worn(self) -> bool:
-        """Whether what stands behind the next word is worn: clothes, or a colour."""
-        inner = self._phrase_at(self.at + 1)
-        return inner is not None and inner.head.lemma in self.words.worn
-
-    def _doing_end(self) -> int:
-        """The end of "raising their left arm" or "wearing a blue shirt": what is done, and in which direction."""
-        end = self.at + 1
-        inner = self._phrase_at(end)
-        if inner is not None and not inner.person:
-            end += len(inner.tokens)
-        while end < len(self.tokens) and (more := self._directional(end)):
-            end += more
-        return end
-
-    def _directional(self, start: int) -> int:
-        """How many words from `start` on tell a direction or a posture."""
-        if self.tokens[start].relation == "prt":
-            return 1
-        preposition = int(self.tokens[start].pos in ("ADP", "PART"))
-        phrase = self._phrase_at(start + preposition)
-        if phrase is None or phrase.head.lemma not in self.words.directions:
-            return 0
-        return preposition + len(phrase.tokens)
-
-    def _small(self, items: list[Item]) -> Item | None:
-        token = self.tokens[self.at]
-        if token.word in self.words.here or token.word in self.words.there:
-            self.at += 1
-            return Adverb(here=token.word in self.words.here)
-        if token.word in ("if", "whether"):
-            self.at += 1
-            return Whether()
-        filler = self._particle(items) or self._match(self.words.fillers)
-        if filler is None:
-            return None
-        self.at += len(filler)
-        return Separator(" ".join(filler))
-
-    def _particle(self, items: list[Item]) -> tuple[str, ...] | None:
-        """Join a particle to its verb: "put the cup down"."""
-        at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Verb)), None)
-        verb = None if at is None else items[at]
-        particle = self.tokens[self.at].word
-        if at is None or not isinstance(verb, Verb) or (*verb.text.split(), particle) not in self.words.verbs:
-            return None
-        items[at] = Verb(f"{verb.text} {particle}", self.words.verbs[(*verb.text.split(), particle)])
-        return (particle,)
-
-    def _outside(self, items: list[Item]) -> Item | None:
-        """A verb that the robot does not know, where a clause may begin."""
-        token = self.tokens[self.at]
-        if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (_command_position(items) or token.tag == "VB"):
-            return None
-        self.at += 1
-        return Outside(token.text)
-
-    def _unknown(self) -> Unknown:
-        token = self.tokens[self.at]
-        self.at += 1
-        return Unknown(token.text)
-
-
-def _command_position(items: Sequence[Item]) -> bool:
-    """Whether a command may begin behind these items."""
-    return not items or isinstance(items[-1], Separator)
-
-
-def split_items(tokens: Sequence[Token], phrases: Mapping[int, Phrase], words: Lexicon) -> tuple[Item, ...]:
-    """The sentence as items, in order; every word is in one of them."""
-    return tuple(_Reader(tokens, phrases, words).read())
 
 
 def spoken_words(items: Iterable[Item]) -> str:

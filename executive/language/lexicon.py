@@ -72,6 +72,7 @@ class Lexicon:
     fixtures: frozenset[str]
     somebody: frozenset[str]
     subjects: frozenset[str]
+    asks: frozenset[str]
     told: frozenset[str]
     negations: frozenset[Phrase]
     corrections: Mapping[Phrase, bool]
@@ -123,6 +124,7 @@ _WORD_SETS: Final = (
     "fixtures",
     "somebody",
     "subjects",
+    "asks",
     "told",
 )
 

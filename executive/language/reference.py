@@ -134,7 +134,9 @@ def _all_meant(phrases: Sequence[Phrase], memory: Memory) -> tuple[Phrase, ...]:
     """What the objects of an action stand for; each may stand for one before it ("the big box and the small one")."""
     things: list[Phrase] = []
     for phrase in phrases:
-        things += _meant(phrase, replace(memory, things=tuple(things) or memory.things))
+        meant = _meant(phrase, replace(memory, things=tuple(things) or memory.things))
+        again = phrase.stands_for_one and bool(things) and meant[0].text == things[-1].text
+        things += [] if again else meant
     return tuple(things)
 
 

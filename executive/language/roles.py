@@ -8,6 +8,7 @@ from typing import Final
 
 from executive.language.items import Adverb, Chunk, Item, Separator, Unknown, Whether
 from executive.language.lexicon import Lexicon, PrepositionRole
+from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 
 __all__ = ["HERE", "THERE", "Location", "Roles", "read_roles"]
@@ -52,13 +53,15 @@ THERE: Final = Location(None, preposition="there")
 class Roles:
     """What stands behind a verb, sorted: bare noun phrases, places by their prepositions, and what is left over.
 
-    `first_at` is where the first of the bare phrases is to be found when that is somebody.
+    `first_at` is where the first of the bare phrases is to be found when that is somebody, `listed` says that "and"
+    stands between them.
     """
 
     objects: list[Phrase] = field(default_factory=list)
     recipient: Location | None = None
     searched: Phrase | None = None
     first_at: Location | None = None
+    listed: bool = False
     sources: list[Location] = field(default_factory=list)
     goals: list[Location] = field(default_factory=list)
     ats: list[Location] = field(default_factory=list)
@@ -162,6 +165,7 @@ def _tells_closer(one: _Spoken, before: Chunk) -> bool:
 def _add_bare(roles: Roles, one: _Placed) -> None:
     if one.joint == "or" and roles.objects:
         return
+    roles.listed = roles.listed or (bool(one.joint) and bool(roles.objects))
     if one.joint and (roles.goals or roles.ats) and not roles.sources:
         roles.joined_goals.append(one.location)
     elif one.within is not None and one.chunk.phrase.person and not roles.objects:
@@ -208,10 +212,15 @@ _ADD: Final = {
 }
 
 
+def _receives(first: Phrase, roles: Roles) -> bool:
+    """Whether the first of several bare phrases is given the others: somebody, or an animal."""
+    return first.person or (first.kind is NounKind.PERSON and not roles.listed)
+
+
 def _split_recipient(roles: Roles) -> None:
     """In "give Robin a coke" and "bring me a coke" the first of the bare phrases is the recipient."""
     first = roles.objects[0] if roles.objects else None
-    if first is not None and (first.speaker or (len(roles.objects) > 1 and first.person)):
+    if first is not None and (first.speaker or (len(roles.objects) > 1 and _receives(first, roles))):
         roles.objects.pop(0)
         roles.recipient = HERE if first.speaker else Location(first, within=roles.first_at)
     elif roles.first_at is not None:

@@ -13,7 +13,7 @@ from executive.language.actions import Action, read_actions
 from executive.language.clauses import Clause, split_clauses, without_name
 from executive.language.drafts import Draft, draft_commands, spoken_command
 from executive.language.grounding import ground_noted, known_line
-from executive.language.items import Item, split_items
+from executive.language.items import Item
 from executive.language.lexicon import lexicon
 from executive.language.mending import mended
 from executive.language.names import name_table, parse_with_names
@@ -21,6 +21,7 @@ from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS, open_command
 from executive.language.parser import DependencyParser, Token
 from executive.language.phrases import noun_phrases
 from executive.language.reach import check_reach, not_understood
+from executive.language.reading import split_items
 from executive.language.reference import Deed, Memory, resolve
 from executive.language.refusal import RefusalError
 from executive.language.similar import WordFacts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import Final
 
 from executive.command import Command, Task, Thing
@@ -17,6 +18,7 @@ __all__ = ["Draft", "draft_commands", "spoken_command"]
 
 _GOES_FOR: Final = frozenset({VerbKind.FIND, VerbKind.PICK, VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP})
 
+_FETCHES: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.PICK})
 _TAKES: Final = _GOES_FOR | {VerbKind.PLACE}
 
 
@@ -42,7 +44,7 @@ def draft_commands(deeds: Sequence[Deed]) -> tuple[Draft, ...]:
     """
     drafts: list[Draft] = []
     held: Phrase | None = None
-    for index, deed in enumerate(joined := _one_by_one(_join_going(deeds))):
+    for index, deed in enumerate(joined := _one_by_one(_join_going(_without_wishes(deeds)))):
         later = any(other.again and other.target == deed.target for other in joined[index + 1 :])
         if _goal(deed, later) is None and deed.verb in lexicon().goal_wanted and not later:
             raise RefusalError(f"{deed.verb} {_name(deed)}: where to?", question=True)
@@ -63,6 +65,19 @@ def _join_going(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
             deed = replace(deed, source=before.goal) if takes_source else replace(deed, goal=before.goal)
         joined.append(deed)
     return tuple(joined)
+
+
+def _without_wishes(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
+    """Leave out a wish when the next words say how it is to be met: "I would like a tea, can you get me one"."""
+    followed = zip_longest(deeds, deeds[1:])
+    return tuple(deed for deed, after in followed if after is None or not _meets(after, deed))
+
+
+def _meets(deed: Deed, wish: Deed) -> bool:
+    """Whether a deed goes once more for what a wish asks to be brought."""
+    same = deed.target is not None and wish.target is not None and deed.target.tokens == wish.target.tokens
+    wished = wish.kind is VerbKind.ROUND_TRIP and wish.goal is HERE and wish.source is None and not wish.again
+    return same and wished and deed.again and deed.kind in _FETCHES
 
 
 def _one_by_one(deeds: Sequence[Deed]) -> tuple[Deed, ...]:

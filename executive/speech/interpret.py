@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
 from executive.speech.alikes import SoundAlikes
-from executive.speech.recogniser import Recognition
+from executive.speech.recogniser import Recognition, Transcript
 from executive.speech.repair import Reading, Repair, repairs
 
 __all__ = ["Interpretation", "interpret"]
@@ -41,16 +41,31 @@ def interpret(
     if not transcripts:
         return None
     first = transcripts[0]
-    heard = list[Repair[Meaning]]()
+    heard = _read(transcripts, first.likelihood, [], read)
+    if not heard[-1].reading.fits:
+        heard = _read(recognition.more(), first.likelihood, heard, read)
+    if heard[-1].reading.fits:
+        return Interpretation(heard[-1].text, heard[-1].reading.meaning, first.text)
+    best = _mended(recognition, heard, read, alikes) or heard[0]
+    return Interpretation(best.text, best.reading.meaning, first.text)
+
+
+def _read(
+    transcripts: Sequence[Transcript],
+    best: float,
+    known: Sequence[Repair[Meaning]],
+    read: Callable[[str], Reading[Meaning]],
+) -> list[Repair[Meaning]]:
+    """Those known and, read in order, those that are not much less likely than the best, up to one that fits."""
+    heard = [*known]
     for transcript in transcripts:
-        text, behind = once(transcript.text), first.likelihood - transcript.likelihood
+        text, behind = once(transcript.text), max(best - transcript.likelihood, 0.0)
         if behind > _OTHER_READING or any(_same(text, other.text) for other in heard):
             continue
         heard.append(Repair(text, behind / _PER_SOUND, read(text)))
         if heard[-1].reading.fits:
-            return Interpretation(text, heard[-1].reading.meaning, first.text)
-    best = _mended(recognition, heard, read, alikes) or heard[0]
-    return Interpretation(best.text, best.reading.meaning, first.text)
+            break
+    return heard
 
 
 def _mended(

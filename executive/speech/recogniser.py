@@ -28,6 +28,10 @@ class Recognition(Protocol):
         """The readings, likeliest first; none when nothing was said."""
         ...
 
+    def more(self) -> Sequence[Transcript]:
+        """The readings that a wider and slower search finds, likeliest first."""
+        ...
+
     def likelihoods(self, texts: Sequence[str]) -> Sequence[float]:
         """The log likelihood of each text given the sound.
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Final, Generic, TypeVar
 
+from executive.command import is_attribute
 from executive.speech.alikes import Alike, SoundAlikes
 
 __all__ = ["Reading", "Repair", "repairs"]
@@ -78,19 +79,22 @@ def _changed(
 
 
 def _stands(before: Sequence[str], alike: Alike) -> bool:
-    """Whether the phrase may stand behind these words: behind an article or a number only a name may."""
-    return alike.name or not before or before[-1].lower() not in _BEFORE_NAMES
+    """Whether the phrase may stand behind these words: behind an article, a number or an adjective only a name may."""
+    last = before[-1].lower() if before else ""
+    return alike.name or not (last in _BEFORE_NAMES or is_attribute(last))
 
 
 def _blamed(words: Sequence[str], suspects: Sequence[str]) -> set[int]:
-    """The positions of the words to blame; all when none is named."""
-    bare = [_bare(word).lower() for word in words]
+    """The positions of the words to blame, articles between them included; all when none is named."""
+    bare = [(at, _bare(word).lower()) for at, word in enumerate(words)]
+    plain = [(at, word) for at, word in bare if word not in _ARTICLES]
     blamed = set[int]()
     for suspect in suspects:
-        parts = [_bare(part).lower() for part in suspect.split()]
-        for at in range(len(bare) - len(parts) + 1):
-            if parts and bare[at : at + len(parts)] == parts:
-                blamed |= set(range(at, at + len(parts)))
+        parts = [part for part in map(str.lower, map(_bare, suspect.split())) if part not in _ARTICLES]
+        for first in range(len(plain) - len(parts) + 1):
+            found = plain[first : first + len(parts)]
+            if parts and [word for _, word in found] == parts:
+                blamed |= set(range(found[0][0], found[-1][0] + 1))
     return blamed or set(range(len(words)))
 
 
@@ -112,4 +116,5 @@ _MOST_READINGS: Final = 32
 _MOST_COST: Final = 4.5
 _PER_CHANGE: Final = 0.3
 _PER_KNOWN_WORD: Final = 0.4
-_BEFORE_NAMES: Final = frozenset({"the", "a", "an", "my", "two", "three", "four", "five"})
+_ARTICLES: Final = frozenset({"the", "a", "an"})
+_BEFORE_NAMES: Final = _ARTICLES | {"my", "two", "three", "four", "five"}

@@ -31,6 +31,7 @@ _SHA256: Final = "d01c3014881c9c6f3133c182f3d2887eb6ca1c789a7538c5c007196857a0a6
 _SMALL_FILES: Final = ("config.json", "vocabulary.txt", "tokenizer.json")
 _THREADS: Final = 2
 _BEAM: Final = 5
+_WIDE_BEAM: Final = 10
 _PADDING_S: Final = 10.0
 """So much silence is heard behind the sound. Whisper was trained on 30 s throughout; with less than some seconds it
 repeats itself, and with all 30 the encoder takes three times as long."""
@@ -134,8 +135,11 @@ class WhisperRecognition:
     @cached_property
     def transcripts(self) -> tuple[Transcript, ...]:
         """The readings, likeliest first; none when nothing was said."""
-        found = self._owner.search(self._encoded, self._vocabulary.prompt, beam=_BEAM)
-        return tuple({t.text: t for t in reversed(found)}.values())[::-1]
+        return self._owner.search(self._encoded, self._vocabulary.prompt, beam=_BEAM)
+
+    def more(self) -> tuple[Transcript, ...]:
+        """The readings that a wider and slower search finds, likeliest first."""
+        return self._owner.search(self._encoded, self._vocabulary.prompt, beam=_WIDE_BEAM)
 
     def likelihoods(self, texts: Sequence[str]) -> list[float]:
         """The log likelihood of each text given the sound."""

@@ -29,6 +29,8 @@ def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
     for at in range(1, len(found)):
         if _attribute(found, at):
             found[at] = replace(found[at], pos="ADJ", tag="JJ", head=at + 1, relation="amod")
+        elif found[at].word == "no" and _pos(found, at + 1) not in ("NOUN", "ADJ"):
+            found[at] = replace(found[at], pos="INTJ", tag="UH", relation="intj")
         elif _container(found, at) or _noun(found, at):
             _join_noun(found, at)
         elif _name(found, at):
@@ -53,7 +55,7 @@ def _noun(tokens: Sequence[Token], at: int) -> bool:
     """Whether a verb stands right behind a noun, has nothing to do there, and is a good name for a place or a thing."""
     token = tokens[at]
     verb = token.pos == "VERB" and token.tag in ("VB", "VBP") and _pos(tokens, at - 1) == "NOUN"
-    alone = _pos(tokens, at + 1) in _AFTER_NOUN
+    alone = _pos(tokens, at + 1) in _AFTER_NOUN and not _begins_command(tokens, at)
     return verb and alone and token.kind in (NounKind.PLACE, NounKind.THING)
 
 
@@ -64,8 +66,13 @@ def _name(tokens: Sequence[Token], at: int) -> bool:
 
 def _command(tokens: Sequence[Token], at: int) -> bool:
     """Whether a noun behind a noun is a known verb before its object ("the counter look for the bowl")."""
-    if tokens[at].pos != "NOUN" or _pos(tokens, at - 1) != "NOUN":
-        return False
+    before = tokens[at - 1]
+    noun = before.pos == "NOUN" or (before.pos == "ADJ" and before.kind in (NounKind.PLACE, NounKind.THING))
+    return tokens[at].pos == "NOUN" and noun and not is_attribute(before.text) and _begins_command(tokens, at)
+
+
+def _begins_command(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a verb that the robot knows, with its particles, and an object stand here."""
     words = tuple(t.word for t in tokens[at : at + 3])
     lengths = (n for n in range(len(words), 0, -1) if words[:n] in lexicon().verbs)
     length = next(lengths, None)
@@ -89,7 +96,7 @@ def _join_noun(tokens: list[Token], at: int) -> None:
 def _part_verb(tokens: list[Token], at: int) -> None:
     """Make a word a verb, and the noun before it a noun of its own with what stood before both."""
     tokens[at] = replace(tokens[at], pos="VERB", tag="VB")
-    tokens[at - 1] = replace(tokens[at - 1], relation="obl", head=at)
+    tokens[at - 1] = replace(tokens[at - 1], pos="NOUN", tag="NN", relation="obl", head=at)
     for n in range(at - 1):
         if tokens[n].head == at and tokens[n].relation in _BEFORE_NOUN:
             tokens[n] = replace(tokens[n], head=at - 1)

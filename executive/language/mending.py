@@ -111,6 +111,8 @@ def _corrected_index(clause: Sequence[Item], new: Chunk | Adverb) -> int | None:
 def _corrects(new: Chunk | Adverb, old: Item) -> bool:
     if isinstance(new, Adverb):
         return isinstance(old, Adverb) or (isinstance(old, Chunk) and old.role is PrepositionRole.GOAL)
+    if isinstance(old, Adverb):
+        return new.role in _WHERE_TO
     if not isinstance(old, Chunk):
         return False
     if new.role is not None:

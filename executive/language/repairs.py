@@ -48,7 +48,8 @@ def _attribute(tokens: Sequence[Token], at: int) -> bool:
 def _container(tokens: Sequence[Token], at: int) -> bool:
     """Whether "can" behind a noun is no auxiliary: no verb and no subject follows ("the trash can")."""
     can = tokens[at].word == "can" and tokens[at].tag == "MD"
-    return can and _pos(tokens, at - 1) == "NOUN" and _pos(tokens, at + 1) in _AFTER_NOUN
+    alone = _pos(tokens, at - 1) == "NOUN" and _pos(tokens, at + 1) in _AFTER_NOUN
+    return can and (alone or tokens[at - 1].tag in ("DT", "PRP$"))
 
 
 def _noun(tokens: Sequence[Token], at: int) -> bool:
@@ -86,7 +87,8 @@ def _pos(tokens: Sequence[Token], at: int) -> str:
 
 def _join_noun(tokens: list[Token], at: int) -> None:
     """Make a word a noun, to which the noun before it and what depends on that belong."""
-    tokens[at - 1] = replace(tokens[at - 1], head=at, relation="compound")
+    relation = "compound" if tokens[at - 1].pos == "NOUN" else "det"
+    tokens[at - 1] = replace(tokens[at - 1], head=at, relation=relation)
     tokens[at] = replace(tokens[at], pos="NOUN", tag="NN", relation="obl")
     for n in range(at - 1):
         if tokens[n].head == at - 1:

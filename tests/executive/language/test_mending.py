@@ -1,0 +1,37 @@
+import pytest
+
+from executive.language.items import spoken_words
+from executive.language.lexicon import lexicon
+from executive.language.mending import mended
+from executive.language.phrases import noun_phrases
+from executive.language.reading import split_items
+
+
+def mend(parser, text):
+    tokens = parser.parse(text)
+    return spoken_words(mended(split_items(tokens, noun_phrases(tokens), lexicon())))
+
+
+@pytest.mark.parametrize(
+    ("text", "meant"),
+    [
+        ("bring the wrench , no , the hammer", "bring the hammer"),
+        ("go to the hall , i mean to the kitchen", "go to the kitchen"),
+        ("go to the hall , no , the kitchen", "go to the kitchen"),
+        ("bring it to Sarah , no , to David", "bring it to David"),
+        ("bring the cup , no wait , go to the hall", "go to the hall"),
+        ("get the cup here , no , to the hall", "get the cup to the hall"),
+        ("bring the cup , not the plate or the fork", "bring the cup"),
+        ("do not bring the cup , bring the plate", "bring the plate"),
+        ("do not go to the hall but to the kitchen", "go to the kitchen"),
+        ("no , bring the cup", "bring the cup"),
+        ("sorry , bring the cup", "bring the cup"),
+    ],
+)
+def test_what_is_taken_back_is_gone(parser, text, meant):
+    assert mend(parser, text) == meant
+
+
+@pytest.mark.parametrize("text", ["bring the cup not", "bring the cup , no", "is the cup not here"])
+def test_what_takes_back_nothing_is_an_unknown_word(parser, text):
+    assert {"not", "no"} & set(mend(parser, text).split())

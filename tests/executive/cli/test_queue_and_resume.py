@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from executive.cli import main, queue_run, requests, resume_command
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
+from executive.errors import InputError
 from executive.journal import TickNote
 from executive.snapshot import NodeState, Transition
 from executive.store.missions import MissionStore
@@ -208,7 +209,7 @@ def test_a_tree_that_is_no_longer_the_same_is_refused(errand, mission, plant, tm
 
 def test_a_run_that_cannot_begin_leaves_no_mission_behind(errand, mission, monkeypatch, states):
     def refuse(*_, **__):
-        raise main.InputError("the world is full")
+        raise InputError("the world is full")
 
     monkeypatch.setattr(main, "run_request", refuse)
     assert errand("run", mission("alone"), "--quiet").exit_code == 2

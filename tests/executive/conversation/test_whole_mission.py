@@ -1,4 +1,4 @@
-"""A whole mission in the plant, corrected by a sentence while the robot drives; the referee judges what was said last."""
+"""A whole mission in the plant, corrected while the robot drives; the referee judges what was said last."""
 
 import pytest
 

@@ -120,7 +120,7 @@ class Phrase:
     @property
     def named_person(self) -> bool:
         """Whether it is a person's name."""
-        if self._determined() or self.plural:
+        if self._determined() or (self.plural and self.head.kind is not NounKind.PERSON):
             return False
         if self.head.known:
             return self.head.entity == "PERSON"

@@ -59,10 +59,17 @@ def _holdable(phrase: Phrase, deed: Deed) -> bool:
     """Whether it is something to be found, and taken where the deed takes it."""
     if phrase.known:
         return True
+    if deed.kind is VerbKind.FIND and _anybody(phrase) and deed.source is None:
+        return False
     called = phrase.kind is NounKind.VEHICLE and (phrase.indefinite or deed.kind is not VerbKind.FIND)
     if called or (deed.kind is not VerbKind.FIND and _fixture(phrase)):
         return False
     return not _light(phrase, deed) and (phrase.kind is None or phrase.kind.within_reach)
+
+
+def _anybody(phrase: Phrase) -> bool:
+    """Whether it is any one of some trade ("a good dentist"), who is not looked for in a house."""
+    return phrase.kind is NounKind.PERSON and phrase.indefinite and not phrase.named_person
 
 
 def _fixture(phrase: Phrase) -> bool:

@@ -44,8 +44,11 @@ class Trial:
 
 
 def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path) -> Trial:
-    """Run, kill, resume; a mission that has ended before the moment is killed at an earlier one."""
-    out.mkdir(parents=True, exist_ok=True)
+    """Run, kill, resume; a mission that has ended before the moment is killed at an earlier one.
+
+    Raises FileExistsError when `out` is there already, since what lies in it would be taken for this run's.
+    """
+    out.mkdir(parents=True)
     begun = time.perf_counter()
     command = [sys.executable, "-m", "executive.cli"]
     asked = ["run", "--say", sentence, "--seed", str(seed), "--out", str(out), "--no-record", "--quiet", "--json"]

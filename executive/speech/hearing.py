@@ -24,7 +24,6 @@ _ARTICLES: Final = ("the", "a", "an", "my", "from the", "to the", "on the", "in 
 _NUMBERS: Final = ("two", "three", "four", "five")
 _BEINGS: Final = ("it's", "they're", "there's", "it is", "they are", "there is", "there are", "he is", "she is")
 _UNRESOLVED: Final = frozenset({"her", "him"})
-_CALL_WORDS: Final = 3
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class SpeechReader:
         typed = f"Hey {self.robot_name}, {address.text}" if addressed else text
         meant = Meant(replace(understood, text=typed), addressed)
         if understood.status is Status.NOT_ADDRESSED:
-            return Reading(meant, fits=False, suspects=tuple(text.split()[:_CALL_WORDS]))
+            return Reading(meant, fits=False, mendable=False)
         if understood.status is not Status.OK:
             return Reading(meant, fits=False, suspects=understood.unknown_words)
         strange = () if self.knowledge else tuple(self._strange(understood.commands))
@@ -106,7 +105,8 @@ def _knows(known: Collection[str], name: str) -> bool:
     words = _plain(name).split()
     while words and " ".join(words) not in known and is_attribute(words[0]):
         words = words[1:]
-    return " ".join(words) in known or set(words) <= lexicon().people - _UNRESOLVED
+    people = lexicon().people - _UNRESOLVED
+    return bool(words) and (" ".join(words) in known or people.issuperset(words))
 
 
 def _plain(name: str) -> str:

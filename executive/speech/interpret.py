@@ -36,28 +36,47 @@ class Interpretation(Generic[Meaning]):
 def interpret(
     recognition: Recognition, read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes
 ) -> Interpretation[Meaning] | None:
-    """The likeliest reading that fits, or else the likeliest; None when nothing was said."""
+    """The likeliest reading that fits, or else the likeliest; None when nothing was said.
+
+    Where the likeliest had better be left as it is (the robot was not called), no other is looked for.
+    """
     transcripts = recognition.transcripts
     if not transcripts:
         return None
     first = transcripts[0]
-    heard = _read(transcripts, first.likelihood, [], read)
-    if not heard[-1].reading.fits:
-        heard = _read(recognition.more(), first.likelihood, heard, read)
-    if heard[-1].reading.fits:
-        return Interpretation(heard[-1].text, heard[-1].reading.meaning, first.text)
-    best = _mended(recognition, heard, read, alikes) or heard[0]
+    heard = [Repair(once(first.text), 0.0, read(once(first.text)))]
+    if heard[0].reading.mendable:
+        heard = _searched(recognition, heard, read, alikes)
+    best = next((one for one in heard if one.reading.fits), heard[0])
     return Interpretation(best.text, best.reading.meaning, first.text)
+
+
+def _searched(
+    recognition: Recognition,
+    heard: list[Repair[Meaning]],
+    read: Callable[[str], Reading[Meaning]],
+    alikes: SoundAlikes,
+) -> list[Repair[Meaning]]:
+    """The readings, and where the first does not fit, the others up to one that does, or else that mended by sound."""
+    likeliest = recognition.transcripts[0].likelihood
+    if not heard[-1].reading.fits:
+        heard = _read(recognition.transcripts, likeliest, heard, read)
+    if not heard[-1].reading.fits:
+        heard = _read(recognition.more(), likeliest, heard, read)
+    if not heard[-1].reading.fits:
+        repair = _mended(recognition, [one for one in heard if one.reading.mendable], read, alikes)
+        return heard if repair is None else [*heard, repair]
+    return heard
 
 
 def _read(
     transcripts: Sequence[Transcript],
     best: float,
-    known: Sequence[Repair[Meaning]],
+    heard: list[Repair[Meaning]],
     read: Callable[[str], Reading[Meaning]],
 ) -> list[Repair[Meaning]]:
-    """Those known and, read in order, those that are not much less likely than the best, up to one that fits."""
-    heard = [*known]
+    """Those heard and, read in order, those that are not much less likely than the best, up to one that fits."""
+    heard = [*heard]
     for transcript in transcripts:
         text, behind = once(transcript.text), max(best - transcript.likelihood, 0.0)
         if behind > _OTHER_READING or any(_same(text, other.text) for other in heard):

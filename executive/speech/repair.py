@@ -24,11 +24,15 @@ Meaning = TypeVar("Meaning")
 
 @dataclass(frozen=True)
 class Reading(Generic[Meaning]):
-    """What a sentence means, whether that fits, and else the words that are to blame (none: any may be)."""
+    """What a sentence means, whether that fits, and else the words that are to blame (none: any may be).
+
+    One that is not `mendable` is better left as it was heard.
+    """
 
     meaning: Meaning
     fits: bool
     suspects: tuple[str, ...] = ()
+    mendable: bool = True
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
 from executive.speech.voice import Voice, installed_voice
 from executive.speech.whisper import load_whisper
 
-__all__ = ["answer_line", "heard_sentence", "listen", "listener_for", "show_hearing"]
+__all__ = ["answer_line", "hear_request", "heard_sentence", "listen", "listener_for", "show_hearing"]
 
 _METER_WIDTH = 24
 _QUIETEST_DB = -60.0
@@ -85,7 +85,8 @@ def listener_for(
     called = name if require_wake else None
     words = of_world(knowledge, called=require_wake) if vocabulary is None else read_vocabulary(vocabulary, called)
     heard = Vocabulary(words.names, called)
-    reader = SpeechReader(load_parser(), None if open_words else knowledge, heard, name, require_wake)
+    world = None if open_words else knowledge
+    reader = SpeechReader(load_parser(), world, heard, name, require_wake, knowledge.robot.others)
     return Listener(load_whisper(), load_detector, reader, spoken_phrases(heard))
 
 
@@ -99,6 +100,22 @@ def heard_sentence(wav: Path, listener: Listener) -> str:
     if not recording.heard:
         raise InputError(recording.reason or "", mend="speak louder, or nearer to the microphone", file=wav)
     return " ".join(one.meant.understanding.text for one in recording.decisive)
+
+
+def hear_request(
+    wav: Path, other: Path | str | None, *, world: str | None, require_wake: bool, console: Console
+) -> str:
+    """The sentence in a recording, shown on the console; `other` is what else was asked for, which must be nothing.
+
+    Raises:
+        InputError: there is another request, the extra `speech` is not installed, or see `heard_sentence`.
+    """
+    if other is not None:
+        raise InputError("--listen stands alone", mend="leave out --say and the mission file")
+    listener = listener_for(knowledge_of(open_world(world or DEFAULT_WORLD)), require_wake=require_wake)
+    sentence = heard_sentence(wav, listener)
+    console.print(Text(f"heard: {sentence}"))
+    return sentence
 
 
 def answer_line(meaning: Understanding) -> str:

@@ -16,7 +16,7 @@ from rich.table import Table
 from executive.cli.answers import Answers
 from executive.cli.check_command import check
 from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run
-from executive.cli.listen_command import listen
+from executive.cli.listen_command import hear_request, listen
 from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.new_skill_command import new_skill
@@ -70,6 +70,7 @@ app.add_typer(queue)
 def run(
     file: MissionFile = None,
     say: Say = None,
+    listen_to: Annotated[Path | None, typer.Option("--listen", help="A wav file that says it.")] = None,
     world: World = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
     no_wake: NoWake = False,
@@ -94,6 +95,8 @@ def run(
         return PageView(request, console, port=view_port, later=later) if wants_page else None
 
     with refusals():
+        if listen_to is not None:
+            say = hear_request(listen_to, file or say, world=world, require_wake=not no_wake, console=console)
         finished, page = _run_kept(
             Asked(file, say, world, not no_wake, Answers(tuple(answer or ()), questions)),
             seed,

@@ -6,6 +6,7 @@ import numpy as np
 
 from plant.models.builder.outlines import curve
 from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_tube
+from plant.models.families.containers import Bottle, Can, make_bottle, make_can
 from plant.models.families.distractors.common import (
     Made,
     any_colour,
@@ -16,7 +17,6 @@ from plant.models.families.distractors.common import (
     turn,
 )
 from plant.models.families.draft import Draft, pick, shade
-from plant.models.families.drinks import Bottle, Can, make_bottle, make_can
 
 
 def wine_bottle(draft: Draft) -> Made:

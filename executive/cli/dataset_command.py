@@ -1,0 +1,79 @@
+"""`errand dataset`: pictures from the plant to learn and to judge a detector by."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from executive.cli.output import console_for, print_json, refusals
+from executive.errors import InputError
+from plant.dataset.errors import DatasetError
+from plant.dataset.shards import Summary, render
+
+__all__ = ["dataset"]
+
+dataset = typer.Typer(name="dataset", help="Pictures with labels, made in the plant.", no_args_is_help=True)
+
+
+@dataset.callback()
+def _group() -> None:
+    """Pictures with labels, made in the plant."""
+
+
+@dataset.command(name="render")
+def render_command(
+    out: Annotated[Path, typer.Option(help="Folder for the data set; one begun before is gone on with.")],
+    images: Annotated[int, typer.Option(min=1, help="How many pictures.")],
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same pictures.")] = 1,
+    jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
+) -> None:
+    """Render pictures of things in random rooms, with boxes and masks as COCO files."""
+    console = console_for(as_json)
+    began = time.monotonic()
+    with refusals():
+        summary = _rendered(out, images, seed, jobs or os.cpu_count() or 1, console)
+    _show(console, out, summary, time.monotonic() - began)
+    if as_json:
+        print_json({"out": str(out), **asdict(summary)})
+
+
+def _rendered(out: Path, images: int, seed: int, jobs: int, console: Console) -> Summary:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("scenes", total=None)
+
+        def told(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        try:
+            return render(out, images=images, seed=seed, jobs=jobs, progress=told)
+        except DatasetError as error:
+            raise InputError(error.message, mend=error.mend) from error
+
+
+def _show(console: Console, out: Path, summary: Summary, seconds: float) -> None:
+    table = Table("class", *summary.images)
+    for name in next(iter(summary.labels.values())):
+        table.add_row(name, *(str(found[name]) for found in summary.labels.values()))
+    table.add_section()
+    table.add_row("pictures", *(str(count) for count in summary.images.values()))
+    console.print(table)
+    console.print(
+        f"{out}: {sum(summary.images.values())} pictures, {summary.empty_images} of them with nothing to find, "
+        f"{summary.ignored} labels to ignore; {seconds:.0f} s"
+    )

@@ -1,0 +1,11 @@
+"""What can go wrong with a data set, told in a sentence."""
+
+from __future__ import annotations
+
+
+class DatasetError(Exception):
+    """The folder or the wishes cannot be used; the message says why, `mend` what to do."""
+
+    def __init__(self, message: str, mend: str) -> None:
+        self.message, self.mend = message, mend
+        super().__init__(f"{message}; {mend}")

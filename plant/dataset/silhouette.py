@@ -1,0 +1,74 @@
+"""What a thing alone would cover: its triangles drawn without anything before them, also beyond the picture's edge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar, cast
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.robot import Intrinsics
+
+FloatArray = NDArray[np.float64]
+FunctionT = TypeVar("FunctionT", bound=Callable[..., object])
+NEAR_M = 0.05
+
+
+def _compiled(function: FunctionT) -> FunctionT:
+    return cast(FunctionT, numba.njit(cache=True, error_model="numpy")(function))
+
+
+@dataclass(frozen=True)
+class Silhouette:
+    """Pixels inside of the picture, and in all (also beyond its edges)."""
+
+    inside_px: int
+    whole_px: int
+
+
+def project(points_C: FloatArray, camera: Intrinsics) -> FloatArray:
+    """Pixels (N, 2) of points (N, 3) in the camera's frame; whole numbers are pixel centres."""
+    z = np.maximum(points_C[:, 2], 1e-6)
+    u = camera.fx * points_C[:, 0] / z + camera.cx
+    v = camera.fy * points_C[:, 1] / z + camera.cy
+    return np.column_stack([u, v])
+
+
+def silhouette(points_C: FloatArray, faces: NDArray[np.int64], camera: Intrinsics) -> Silhouette:
+    """How many pixels a mesh covers. Triangles that reach behind the camera are left out.
+
+    The canvas reaches one picture beyond every edge; what lies still farther out does not count.
+    """
+    before = np.all(points_C[faces][..., 2] > NEAR_M, axis=1)
+    pixels = project(points_C, camera)
+    width, height = camera.width, camera.height
+    canvas = np.zeros((3 * height, 3 * width), dtype=np.uint8)
+    _draw(canvas, pixels[:, 0] + width, pixels[:, 1] + height, faces[before])
+    inside = int(canvas[height : 2 * height, width : 2 * width].sum())
+    return Silhouette(inside, int(canvas.sum()))
+
+
+@_compiled
+def _draw(canvas: NDArray[np.uint8], u: FloatArray, v: FloatArray, faces: NDArray[np.int64]) -> None:
+    """Set every pixel whose centre lies in a triangle."""
+    height, width = canvas.shape
+    for t in range(faces.shape[0]):
+        x0, x1, x2 = u[faces[t, 0]], u[faces[t, 1]], u[faces[t, 2]]
+        y0, y1, y2 = v[faces[t, 0]], v[faces[t, 1]], v[faces[t, 2]]
+        top = max(int(np.ceil(min(y0, y1, y2))), 0)
+        bottom = min(int(np.floor(max(y0, y1, y2))), height - 1)
+        for row in range(top, bottom + 1):
+            left, right = 1e9, -1e9
+            for a, b, c, d in ((x0, y0, x1, y1), (x1, y1, x2, y2), (x2, y2, x0, y0)):
+                if min(b, d) <= row <= max(b, d):
+                    if abs(d - b) < 1e-12:
+                        left, right = min(left, a, c), max(right, a, c)
+                    else:
+                        x = a + (row - b) / (d - b) * (c - a)
+                        left, right = min(left, x), max(right, x)
+            first, last = max(int(np.ceil(left)), 0), min(int(np.floor(right)), width - 1)
+            for column in range(first, last + 1):
+                canvas[row, column] = 1

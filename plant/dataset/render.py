@@ -74,7 +74,7 @@ def render_scene(seed: int, index: int) -> list[Shot]:
     scene = compose(rng, index, for_training=not is_validation(index))
     lighting = random_lighting(rng, scene.room)
     with tempfile.TemporaryDirectory(prefix="errand-scene-") as folder:
-        stage = _Stage(scene, lighting, Path(folder), float(rng.uniform(0.5, 1.57)))
+        stage = Stage(scene, lighting, Path(folder), float(rng.uniform(0.5, 1.57)))
         views = _views(rng, scene)
         return [_shot(rng, stage, view, scene, lighting, index, number) for number, view in enumerate(views)]
 
@@ -97,7 +97,7 @@ def _views(rng: np.random.Generator, scene: Scene) -> list[View]:
     return [hand_view(rng, view) if k in shown else view for k, view in enumerate(views)]
 
 
-class _Stage:
+class Stage:
     """The scene in Drake, to be seen from any view."""
 
     def __init__(self, scene: Scene, lighting: Lighting, folder: Path, opening_rad: float) -> None:
@@ -198,7 +198,7 @@ def _png(picture: Picture) -> bytes:
 
 
 def _shot(
-    rng: np.random.Generator, stage: _Stage, view: View, scene: Scene, lighting: Lighting, index: int, number: int
+    rng: np.random.Generator, stage: Stage, view: View, scene: Scene, lighting: Lighting, index: int, number: int
 ) -> Shot:
     clean, labels = stage.take(view)
     how = Degradation.drawn(rng)

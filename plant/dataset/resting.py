@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from plant.models.families import ObjectModel
+from plant.models.families.model import read_model
 
 FloatArray = NDArray[np.float64]
 
@@ -31,9 +33,15 @@ class Resting:
     upright: bool
 
 
-@lru_cache(maxsize=2048)
 def resting_poses(model: ObjectModel) -> tuple[Resting, ...]:
     """All stable poses; the one that stands as it was made comes first when there is one."""
+    return _poses_of(model.folder)
+
+
+@lru_cache(maxsize=2048)
+def _poses_of(folder: Path) -> tuple[Resting, ...]:
+    """Kept by the folder, so that no model's triangles stay in memory for it."""
+    model = read_model(folder)
     points, com = model.surface.points, np.array(model.com_m)
     if model.family == "person":
         return (Resting(np.eye(3), -float(points[:, 2].min()), 1.0, True),)

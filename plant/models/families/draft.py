@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,8 @@ from plant.models.builder.pictures import Picture, to_picture
 from plant.models.builder.shapes import Box, Capsule, Cylinder, MassProperties, Shape, Sphere
 
 FloatArray = NDArray[np.float64]
+
+PROUD_M = 0.0003
 
 STEEL, WOOD, GLASS, PLASTIC, RUBBER, WATER = 7850.0, 650.0, 2500.0, 1050.0, 1150.0, 1000.0
 ALUMINIUM, CERAMIC, PAPER, FLESH = 2700.0, 2300.0, 700.0, 1000.0
@@ -82,6 +85,10 @@ class Draft:
         """Add collision shapes."""
         self._collisions += shapes
 
+    def _feet(self) -> list[Shape]:
+        """Small spheres at corners and rims, a little proud: a box or drum on a plane has but one contact point."""
+        return [foot for shape in self._collisions for foot in feet_of(shape)]
+
     def collide_box(self, low: ArrayLike, high: ArrayLike) -> None:
         """Add a box between two corners."""
         a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
@@ -118,7 +125,7 @@ class Draft:
         x, y, z = (float(v) for v in high - low)
         used = {material.texture for name, material in self.materials.items() if name in _names(moved)}
         pictures = {name: picture for name, picture in self._pictures.items() if name in used}
-        shapes = tuple(_moved(shape, -origin) for shape in self._collisions)
+        shapes = tuple(_moved(shape, -origin) for shape in [*self._collisions, *self._feet()])
         return Finished(moved, pictures, shapes, mass, (x, y, z))
 
 
@@ -143,6 +150,23 @@ def outward(part: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> Me
 
 def _names(mesh: Mesh) -> set[str]:
     return {name for name, *_ in mesh.groups()}
+
+
+def feet_of(shape: Shape) -> list[Shape]:
+    """Spheres that reach `PROUD_M` beyond the corners of a box or the rims of a cylinder."""
+    match shape:
+        case Box(size=size):
+            half = np.array(size) / 2
+            small = min(0.004, float(half.min()) / 2)
+            places = [(half + PROUD_M - small) * signs for signs in itertools.product((-1, 1), repeat=3)]
+        case Cylinder(radius=radius, length=length):
+            small = min(0.004, radius / 2, length / 4)
+            up, out, angles = length / 2 + PROUD_M - small, radius - small, np.arange(8) * np.pi / 4
+            places = [np.array([out * np.cos(a), out * np.sin(a), z]) for z in (-up, up) for a in angles]
+        case _:
+            return []
+    centres = [shape.rotation() @ place + np.array(shape.p) for place in places]
+    return [Sphere(radius=small, p=(float(c[0]), float(c[1]), float(c[2]))) for c in centres]
 
 
 def _moved(shape: Shape, by: FloatArray) -> Shape:

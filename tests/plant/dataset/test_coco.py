@@ -1,0 +1,107 @@
+"""Labels in the COCO form: run lengths, boxes, what is ignored."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+from executive.class_ids import CLASS_IDS
+from plant.dataset.coco import annotation, box_of, categories, counts, document, mask_of, run_lengths
+from plant.dataset.silhouette import Silhouette
+
+
+@given(arrays(bool, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=12)))
+def test_run_lengths_give_the_mask_back(mask: np.ndarray) -> None:
+    assert np.array_equal(mask_of(run_lengths(mask)), mask)
+
+
+def test_run_lengths_go_down_the_columns_and_begin_with_zeros() -> None:
+    mask = np.array([[1, 0], [1, 1]], dtype=bool)
+    assert run_lengths(mask) == {"size": [2, 2], "counts": [0, 2, 1, 1]}
+
+
+def test_run_lengths_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(ValueError, match="fill 3 pixels, not 2 x 2"):
+        mask_of({"size": [2, 2], "counts": [1, 2]})
+
+
+@given(st.integers(0, 7), st.integers(0, 7), st.integers(1, 8), st.integers(1, 8))
+def test_a_box_holds_its_mask_tightly(x: int, y: int, w: int, h: int) -> None:
+    mask = np.zeros((16, 16), dtype=bool)
+    mask[y : y + h, x : x + w] = True
+    assert box_of(mask) == (x, y, w, h)
+
+
+def test_an_empty_mask_has_no_box() -> None:
+    with pytest.raises(ValueError, match="empty"):
+        box_of(np.zeros((3, 3), dtype=bool))
+
+
+def label(seen: int, inside: int, whole: int, side: int = 20) -> dict[str, Any] | None:
+    """`seen` pixels of a square mask of 20 rows."""
+    mask = np.zeros((100, 100), dtype=bool)
+    mask[:side, :].reshape(-1)[:0] = True
+    rows = -(-seen // side)
+    mask[10 : 10 + rows, 10 : 10 + side] = True
+    extra = rows * side - seen
+    if extra:
+        mask[10 + rows - 1, 10 + side - extra : 10 + side] = False
+    return annotation(mask=mask, alone=Silhouette(inside, whole), class_id=4, instance="hammer_001", distance_m=1.0)
+
+
+# seen, alone in the picture, alone in all -> visibility, truncation, ignored
+@pytest.mark.parametrize(
+    ("seen", "inside", "whole", "visibility", "truncation", "ignored"),
+    [
+        (400, 400, 400, 1.0, 0.0, 0),
+        (200, 400, 400, 0.5, 0.0, 0),
+        (400, 400, 800, 1.0, 0.5, 0),
+        (80, 400, 400, 0.2, 0.0, 1),
+        (200, 400, 1000, 0.5, 0.6, 1),
+        (420, 400, 400, 1.0, 0.0, 0),
+    ],
+)
+def test_visibility_and_truncation(
+    seen: int, inside: int, whole: int, visibility: float, truncation: float, ignored: int
+) -> None:
+    found = label(seen, inside, whole)
+    assert found is not None
+    assert found["visibility"] == pytest.approx(visibility)
+    assert found["truncation"] == pytest.approx(truncation)
+    assert (found["ignore"], found["iscrowd"]) == (ignored, ignored)
+    assert found["area"] == seen
+
+
+def test_what_is_too_small_to_be_judged_is_ignored_and_a_few_pixels_are_no_label() -> None:
+    small = label(9, 9, 9, side=3)
+    assert small is not None
+    assert small["ignore"] == 1
+    assert label(4, 4, 4, side=2) is None
+
+
+def test_categories_have_the_project_s_class_ids() -> None:
+    assert {entry["name"]: entry["id"] for entry in categories()} == {
+        name: CLASS_IDS[name] for name in (entry["name"] for entry in categories())
+    }
+    assert len(categories()) == 9
+
+
+def test_a_document_numbers_pictures_and_labels_and_joins_them() -> None:
+    one, two = label(400, 400, 400), label(80, 400, 400)
+    assert one is not None
+    assert two is not None
+    shots = [
+        {"image": {"file_name": "a.jpg", "width": 100, "height": 100}, "annotations": [one, two]},
+        {"image": {"file_name": "b.jpg", "width": 100, "height": 100}, "annotations": [one]},
+    ]
+    made = document({"seed": 1}, shots)
+    assert [image["id"] for image in made["images"]] == [1, 2]
+    assert [(entry["id"], entry["image_id"]) for entry in made["annotations"]] == [(1, 1), (2, 1), (3, 2)]
+    needed = {"category_id", "bbox", "area", "segmentation", "iscrowd", "visibility", "truncation", "distance_m"}
+    assert all(needed <= set(entry) for entry in made["annotations"])
+    assert counts(made["annotations"])["hammer"] == 2

@@ -1,0 +1,107 @@
+"""Boxes and masks of the renderer agree with an independent projection; silhouettes count as they should."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from plant.dataset.compose import Placed, Scene
+from plant.dataset.lighting import Lighting
+from plant.dataset.render import Stage, label_view
+from plant.dataset.room import Room
+from plant.dataset.silhouette import silhouette
+from plant.dataset.views import View, roll_deg
+from plant.models.builder.mesh import Material, Mesh
+from plant.models.families import ObjectModel, instance
+from plant.pictures import look_at
+from plant.worlds.lights import render_parameters
+from skills.robot import Intrinsics
+
+CAMERA = Intrinsics(320, 240, 276.0, 276.0, 160.0, 120.0)
+EYE = np.array([0.0, -1.0, 0.6])
+
+
+@pytest.fixture(scope="module")
+def cubes(tmp_path_factory: pytest.TempPathFactory) -> tuple[ObjectModel, ObjectModel]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ERRAND_MODEL_CACHE", str(tmp_path_factory.mktemp("models")))
+        return instance("cube", 0), instance("cylinder", 2)
+
+
+def empty_room() -> Room:
+    mesh = Mesh({"floor": Material((0.5, 0.5, 0.5))})
+    mesh.add_rectangle("floor", (-3, -3, 0), (6, 0, 0), (0, 6, 0))
+    return Room((6.0, 6.0, 2.5), mesh, (), (), (), False)
+
+
+def labels_of(things: tuple[Placed, ...], folder: Path) -> list[dict[str, object]]:
+    scene = Scene(empty_room(), things, None, ())
+    stage = Stage(scene, Lighting("plain", render_parameters()), folder, 1.0)
+    view = View("hand", look_at(EYE, (0, 0, 0.05)), CAMERA, False, False)
+    _, labels = stage.take(view)
+    return label_view(stage.labelled, labels, view, stage.hand_pose(view))
+
+
+def projected_box(model: ObjectModel, X_WO: RigidTransform) -> tuple[float, float, float, float]:
+    """The box of all corner points, by the pinhole's equations."""
+    X_CW = look_at(EYE, (0, 0, 0.05)).inverse()
+    x, y, z = np.asarray((X_CW @ X_WO) @ model.surface.points.T)
+    u, v = CAMERA.fx * x / z + CAMERA.cx, CAMERA.fy * y / z + CAMERA.cy
+    return float(u.min()), float(v.min()), float(u.max()), float(v.max())
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.1), (0.3, 0.4), (-0.25, -0.1)])
+def test_boxes_agree_with_the_projection_of_all_corners(
+    cubes: tuple[ObjectModel, ObjectModel], place: tuple[float, float], tmp_path: Path
+) -> None:
+    cube = cubes[0]
+    X_WO = RigidTransform([*place, cube.size_m[2] / 2])
+    (found,) = labels_of((Placed(cube, X_WO),), tmp_path)
+    x, y, w, h = found["bbox"]  # type: ignore[misc]
+    expected = projected_box(cube, X_WO)
+    np.testing.assert_allclose((x - 0.5, y - 0.5, x + w - 0.5, y + h - 0.5), expected, atol=1.5)
+    assert found["visibility"] > 0.97  # type: ignore[operator]
+    assert found["truncation"] == 0.0
+    assert found["instance"] == "cube_000"
+
+
+def test_what_stands_before_a_thing_takes_from_its_visibility(
+    cubes: tuple[ObjectModel, ObjectModel], tmp_path: Path
+) -> None:
+    cube, cylinder = cubes
+    behind = Placed(cube, RigidTransform([0.0, 0.3, cube.size_m[2] / 2]))
+    before = Placed(cylinder, RigidTransform([cube.size_m[0] / 2, 0.3 - cube.size_m[1], cylinder.size_m[2] / 2]))
+    found = {str(entry["instance"]): entry for entry in labels_of((behind, before), tmp_path)}
+    assert found["cylinder_002"]["visibility"] > 0.97  # type: ignore[operator]
+    assert 0.1 < found["cube_000"]["visibility"] < 0.9  # type: ignore[operator]
+
+
+def test_distractors_have_no_label(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ERRAND_MODEL_CACHE", str(tmp_path / "models"))
+    mug = instance("mug", 0)
+    assert labels_of((Placed(mug, RigidTransform([0, 0, 0.05])),), tmp_path) == []
+
+
+# A square of 0.2 m at 1 m, seen with 100 pixels per radian: 20 x 20 pixels, centred at some column.
+@pytest.mark.parametrize(("shift_m", "inside", "whole"), [(0.0, 400, 400), (1.6, 200, 400), (3.0, 0, 400)])
+def test_a_silhouette_counts_pixels_inside_and_beyond_the_picture(shift_m: float, inside: int, whole: int) -> None:
+    camera = Intrinsics(320, 240, 100.0, 100.0, 159.5, 119.5)
+    corners = np.array([(-0.1, -0.1, 1.0), (0.1, -0.1, 1.0), (0.1, 0.1, 1.0), (-0.1, 0.1, 1.0)]) + [shift_m, 0, 0]
+    found = silhouette(corners, np.array([(0, 1, 2), (0, 2, 3)]), camera)
+    assert found.inside_px == pytest.approx(inside, abs=25)
+    assert found.whole_px == pytest.approx(whole, abs=45)
+
+
+def test_triangles_behind_the_camera_do_not_count() -> None:
+    corners = np.array([(-0.1, -0.1, -1.0), (0.1, -0.1, -1.0), (0.1, 0.1, 1.0)])
+    assert silhouette(corners, np.array([(0, 1, 2)]), CAMERA).whole_px == 0
+
+
+def test_the_roll_of_an_upright_and_of_a_turned_camera() -> None:
+    upright = look_at(EYE, (0, 0, 0.05))
+    assert roll_deg(upright) == pytest.approx(0.0, abs=1e-6)
+    quarter = RigidTransform(np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]))
+    assert abs(roll_deg(upright @ quarter)) == pytest.approx(90.0, abs=1e-6)

@@ -1,0 +1,123 @@
+"""Scenes: things rest stably where they are, nothing overlaps, training and validation share nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.geometry import Box
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from plant.dataset.degrade import Degradation, degraded
+from plant.dataset.render import is_validation
+from plant.dataset.resting import choose, resting_poses
+from plant.dataset.room import random_room
+from plant.dataset.textures import ROLES, numbers, texture
+from plant.dataset.views import any_view, camera_specs
+from plant.models.families import instance
+
+
+@pytest.fixture(autouse=True, scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ERRAND_MODEL_CACHE", str(tmp_path_factory.mktemp("models")))
+        yield
+
+
+@pytest.mark.parametrize("family", ["hammer", "screwdriver", "wrench", "beer", "cube", "extinguisher", "kettle"])
+def test_a_thing_rests_on_three_points_under_its_centre_of_mass(family: str) -> None:
+    model = instance(family, 1)
+    for pose in resting_poses(model):
+        points = model.surface.points @ pose.R.T
+        np.testing.assert_allclose(pose.R @ pose.R.T, np.eye(3), atol=1e-9)
+        assert points[:, 2].min() + pose.height_m == pytest.approx(0.0, abs=1e-6)
+        low = points[points[:, 2] < points[:, 2].min() + 6e-4][:, :2]
+        com = (pose.R @ np.array(model.com_m))[:2]
+        assert len(low) >= 3
+        assert np.all(low.min(axis=0) <= com)
+        assert np.all(com <= low.max(axis=0))
+
+
+def test_a_bottle_stands_or_lies_and_a_person_only_stands() -> None:
+    bottle, rng = instance("beer", 0), np.random.default_rng(1)
+    upright = [choose(rng, bottle, resting_poses(bottle)).upright for _ in range(60)]
+    assert 0.5 < np.mean(upright) < 0.9
+
+
+@pytest.mark.parametrize("family", ["cube", "cylinder", "coke"])
+def test_drake_leaves_a_standing_thing_where_it_was_put(family: str) -> None:
+    model = instance(family, 1)
+    pose = resting_poses(model)[0]
+    builder = DiagramBuilder()
+    config = MultibodyPlantConfig(time_step=0.004, discrete_contact_approximation="sap")
+    plant, _ = AddMultibodyPlant(config, builder)
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform([0, 0, -0.5]), Box(4, 4, 1), "floor", CoulombFriction(0.8, 0.8)
+    )
+    Parser(plant).AddModels(str(model.path))
+    body = plant.GetBodyByName(family)
+    X_WO = RigidTransform([0, 0, pose.height_m + 0.0005])
+    plant.SetDefaultFloatingBaseBodyPose(body, X_WO)
+    plant.Finalize()
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(0.8)
+    X_WE = body.EvalPoseInWorld(plant.GetMyContextFromRoot(simulator.get_context()))
+    assert float(X_WE.rotation().matrix()[2, 2]) > 0.99
+    np.testing.assert_allclose(X_WE.translation(), X_WO.translation(), atol=0.006)
+
+
+def test_rooms_for_validation_share_no_texture_with_those_for_training() -> None:
+    assert not set(numbers(for_training=True)) & set(numbers(for_training=False))
+    for seed in range(3):
+        for training in (True, False):
+            room = random_room(np.random.default_rng(seed), for_training=training)
+            assert {number for _, number in room.textures} <= set(numbers(for_training=training))
+
+
+def test_a_sixth_of_the_scenes_is_for_validation() -> None:
+    assert sum(is_validation(index) for index in range(60)) == 10
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_a_texture_is_the_same_for_its_number_and_another_for_another(role: str) -> None:
+    assert np.array_equal(texture(role, 3), texture(role, 3))
+    assert not np.array_equal(texture(role, 3), texture(role, 4))
+    assert texture(role, 3).std() >= 0.0
+
+
+def test_supports_lie_inside_the_room_and_obstacles_do_not_overlap() -> None:
+    for seed in range(4):
+        room = random_room(np.random.default_rng(seed), for_training=True)
+        width, depth, _ = room.size_m
+        for support in room.supports:
+            assert -0.01 <= support.centre[0] <= width + 0.01
+            assert -0.01 <= support.centre[1] <= depth + 0.01
+            assert 0.0 <= support.height_m < 2.2
+
+
+def test_cameras_are_in_the_room_and_out_of_furniture() -> None:
+    rng = np.random.default_rng(5)
+    room = random_room(rng, for_training=True)
+    for _ in range(20):
+        eye = any_view(rng, room, camera_specs()).X_WC.translation()
+        assert np.all(eye[:2] > 0)
+        assert np.all(eye[:2] < room.size_m[:2])
+
+
+def test_a_degraded_picture_keeps_its_size_and_grey_has_one_channel(tmp_path: Path) -> None:
+    clean = np.full((48, 64, 3), 90, dtype=np.uint8)
+    how = Degradation.drawn(np.random.default_rng(2))
+    assert degraded(clean, how, np.random.default_rng(0), grey=False).shape == (48, 64, 3)
+    assert degraded(clean, how, np.random.default_rng(0), grey=True).shape == (48, 64)
+
+
+def test_degrading_is_the_same_for_the_same_seed() -> None:
+    clean = np.random.default_rng(1).integers(0, 255, (48, 64, 3)).astype(np.uint8)
+    how = Degradation.drawn(np.random.default_rng(2))
+    first, second = (degraded(clean, how, np.random.default_rng(0), grey=False) for _ in range(2))
+    assert np.array_equal(first, second)

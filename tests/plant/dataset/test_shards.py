@@ -1,0 +1,145 @@
+"""A data set's folder: goes on after a break, is the same then, and says what is wrong with it."""
+
+from __future__ import annotations
+
+import errno
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plant.dataset import shards
+from plant.dataset.errors import DatasetError
+from plant.dataset.render import VIEWS_PER_SCENE, Shot, is_validation
+from plant.dataset.shards import Summary, render
+
+
+def fake_scene(seed: int, index: int) -> list[Shot]:
+    """A scene without a renderer: noise from seed and number, one label for each picture."""
+    rng = np.random.default_rng([seed, index])
+    shots = []
+    for number in range(VIEWS_PER_SCENE):
+        picture = rng.integers(0, 255, (24, 32, 3)).astype(np.uint8)
+        facts = {"width": 32, "height": 24, "split": "val" if is_validation(index) else "train", "view": number}
+        label = {"category_id": 1 + index % 9, "bbox": [1, 1, 9, 9], "ignore": 0, "instance": "hammer_001"}
+        shots.append(Shot(picture, 90, facts, [label]))
+    return shots
+
+
+@pytest.fixture(autouse=True)
+def no_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shards, "render_scene", fake_scene)
+
+
+def run(out: Path, images: int = 50, seed: int = 4, progress: Callable[[int, int], None] | None = None) -> Summary:
+    return render(out, images=images, seed=seed, jobs=1, progress=progress or (lambda done, total: None))
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+class BreakOffError(RuntimeError):
+    """Stands for a kill."""
+
+
+def test_a_run_that_was_broken_off_goes_on_to_the_same_set(tmp_path: Path) -> None:
+    run(tmp_path / "whole")
+
+    def stop(done: int, total: int) -> None:
+        if done == 3:
+            raise BreakOffError
+
+    with pytest.raises(BreakOffError):
+        run(tmp_path / "broken", progress=stop)
+    made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "broken" / "scenes").iterdir()}
+    assert len(made) == 3
+    half = tmp_path / "broken" / "scenes" / ".making-left"
+    half.mkdir()
+    (half / "0.jpg").write_bytes(b"half")
+    run(tmp_path / "broken")
+    assert content(tmp_path / "broken") == content(tmp_path / "whole")
+    for name, stamp in made.items():
+        assert (tmp_path / "broken" / "scenes" / name).stat().st_mtime_ns == stamp
+
+
+def test_a_set_can_grow_and_keeps_its_first_pictures(tmp_path: Path) -> None:
+    run(tmp_path / "set", images=20)
+    before = json.loads((tmp_path / "set" / "train.json").read_text())
+    summary = run(tmp_path / "set", images=60)
+    after = json.loads((tmp_path / "set" / "train.json").read_text())
+    assert after["images"][:20] == before["images"]
+    assert summary.images == {"train": 52, "val": 8}
+
+
+def test_only_the_wished_number_of_pictures_is_listed(tmp_path: Path) -> None:
+    summary = run(tmp_path / "set", images=50)
+    assert sum(summary.images.values()) == 50
+    assert sum(sum(found.values()) for found in summary.labels.values()) == 50
+    assert (tmp_path / "set" / "contact_sheet.png").is_file()
+
+
+def test_progress_begins_with_what_is_there_already(tmp_path: Path) -> None:
+    run(tmp_path / "set", images=16)
+    told: list[tuple[int, int]] = []
+    run(tmp_path / "set", images=32, progress=lambda done, total: told.append((done, total)))
+    assert told == [(2, 4), (3, 4), (4, 4)]
+
+
+def test_a_folder_of_another_seed_is_refused(tmp_path: Path) -> None:
+    run(tmp_path / "set", images=8, seed=4)
+    with pytest.raises(DatasetError, match=r"has seed 4, not 5; give --seed 4"):
+        run(tmp_path / "set", images=8, seed=5)
+
+
+def test_a_folder_of_another_version_is_refused(tmp_path: Path) -> None:
+    run(tmp_path / "set", images=8)
+    path = tmp_path / "set" / "dataset.json"
+    path.write_text(path.read_text().replace(shards.digest(), "0123456789"))
+    with pytest.raises(DatasetError, match="another version"):
+        run(tmp_path / "set", images=8)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", ""])
+def test_a_damaged_manifest_is_named(tmp_path: Path, text: str) -> None:
+    run(tmp_path / "set", images=8)
+    (tmp_path / "set" / "dataset.json").write_text(text)
+    with pytest.raises(DatasetError, match=r"dataset\.json: is damaged"):
+        run(tmp_path / "set", images=8)
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("mine")
+    with pytest.raises(DatasetError, match=r"holds other files and no dataset\.json"):
+        run(tmp_path, images=8)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_damaged_scene_is_named_with_the_mend(tmp_path: Path) -> None:
+    run(tmp_path / "set", images=16)
+    (tmp_path / "set" / "scenes" / "000001" / "shots.json").write_text("{")
+    with pytest.raises(DatasetError, match=r"000001.*damaged.*remove .*000001"):
+        run(tmp_path / "set", images=16)
+    shutil.rmtree(tmp_path / "set" / "scenes" / "000001")
+    assert sum(run(tmp_path / "set", images=16).images.values()) == 16
+
+
+def test_a_file_in_the_place_of_the_folder_is_told(tmp_path: Path) -> None:
+    (tmp_path / "set").write_text("a file")
+    with pytest.raises(DatasetError, match="cannot be written"):
+        run(tmp_path / "set", images=8)
+
+
+def test_a_full_disk_is_told_and_leaves_whole_scenes_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run(tmp_path / "set", images=8)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(shards, "_write_shot", full)
+    with pytest.raises(DatasetError, match="the disk is full; make room; the same command goes on"):
+        run(tmp_path / "set", images=16)
+    assert [path.name for path in (tmp_path / "set" / "scenes").iterdir()] == ["000000"]

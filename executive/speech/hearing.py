@@ -53,7 +53,7 @@ class SpeechReader:
 
     def read(self, text: str) -> Reading[Meant]:
         """What `text` means; it fits when it becomes commands in known names."""
-        address = heard_wake(text, self.robot_name, others=self.other_robots)
+        address = heard_wake(_with_pause(text, self.robot_name), self.robot_name, others=self.other_robots)
         addressed = address.name is not None
         understood = understand(
             address.text if addressed else text,
@@ -88,6 +88,13 @@ def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
     told = [f"{being} {where}" for being in _BEINGS for where in ("at", "by", "in", "on")]
     small = [*told, *_BEINGS, *words.pronouns, *words.here, *words.there, *words.speaker, *_ARTICLES, *_NUMBERS]
     return SoundAlikes(names, [*calls, *verbs, *prepositions, *words.openers, *words.requests, *small])
+
+
+def _with_pause(text: str, name: str) -> str:
+    """The text with a comma between the name at its beginning and a verb that asks: a pause is not always heard."""
+    call = re.match(rf"({re.escape(name)})\s+(\w+)", text, re.IGNORECASE)
+    asks = call is not None and any(verb[0] == call.group(2).lower() for verb in lexicon().verbs)
+    return f"{name}, {text[len(name) :].lstrip()}" if asks else text
 
 
 def _names(command: Command) -> Iterator[str]:

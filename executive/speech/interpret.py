@@ -61,8 +61,9 @@ def _searched(
     likeliest = recognition.transcripts[0].likelihood
     if not heard[-1].reading.fits:
         heard = _read(recognition.transcripts, likeliest, heard, read)
-    if not heard[-1].reading.fits:
-        heard = _read(recognition.more(), likeliest, heard, read)
+    more = recognition.more()
+    while not heard[-1].reading.fits and (readings := next(more, None)) is not None:
+        heard = _read(readings, likeliest, heard, read)
     if not heard[-1].reading.fits:
         repair = _mended(recognition, [one for one in heard if one.reading.mendable], read, alikes)
         return heard if repair is None else [*heard, repair]

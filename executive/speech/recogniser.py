@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -28,8 +28,8 @@ class Recognition(Protocol):
         """The readings, likeliest first; none when nothing was said."""
         ...
 
-    def more(self) -> Sequence[Transcript]:
-        """The readings that a wider and slower search finds, likeliest first."""
+    def more(self) -> Iterator[Sequence[Transcript]]:
+        """The readings of further searches, each slower than the one before; each set has its likeliest first."""
         ...
 
     def likelihoods(self, texts: Sequence[str]) -> Sequence[float]:

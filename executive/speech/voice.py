@@ -46,6 +46,11 @@ class EspeakVoice:
         except OSError:
             self._speaking = None
 
+    def wait(self) -> None:
+        """Wait until it has said all."""
+        if self._speaking is not None:
+            self._speaking.wait()
+
 
 def installed_voice(*, which: Callable[[str], str | None] = shutil.which) -> Voice:
     """The voice of this machine; silence when `espeak-ng` is not installed."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from importlib import resources
 from typing import Any, Final
@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from executive.errors import InputError
+from executive.speech.denoise import less_noisy
 from executive.speech.extra import speech_module
 from executive.speech.recogniser import Transcript
 from executive.speech.sound import RATE_HZ, Samples
@@ -76,11 +77,11 @@ class WhisperRecogniser:
 
     def transcribe(self, sound: Samples, vocabulary: Vocabulary) -> WhisperRecognition:
         """Recognise at most 30 s of sound at RATE_HZ."""
-        return WhisperRecognition(self, self._encoded(sound), len(sound) / RATE_HZ, vocabulary)
+        return WhisperRecognition(self, sound, vocabulary)
 
     def draft(self, sound: Samples, vocabulary: Vocabulary) -> str:
         """A quick first reading of a sentence that is still being spoken."""
-        return next((t.text for t in self.search(self._encoded(sound), vocabulary.prompt, beam=1)), "")
+        return next((t.text for t in self.search(self.encoded(sound), vocabulary.prompt, beam=1)), "")
 
     def search(self, encoded: Any, prompt: str, *, beam: int) -> tuple[Transcript, ...]:
         """The likeliest texts for an encoded sound, found with a beam of that width."""
@@ -119,7 +120,8 @@ class WhisperRecogniser:
         start: list[int] = self._whisper.get_prompt(self._tokens, told, without_timestamps=True)
         return start
 
-    def _encoded(self, sound: Samples) -> Any:
+    def encoded(self, sound: Samples) -> Any:
+        """The sound as the encoder hears it, some silence behind it."""
         heard = self._whisper.feature_extractor(sound)
         frames = int(min(len(sound) / RATE_HZ + _PADDING_S, _WINDOW_S) * _FRAMES_PER_S)
         fitted = np.pad(heard[:, :frames], ((0, 0), (0, max(frames - heard.shape[1], 0))))
@@ -129,18 +131,20 @@ class WhisperRecogniser:
 class WhisperRecognition:
     """One sound as Whisper recognised it."""
 
-    def __init__(self, owner: WhisperRecogniser, encoded: Any, length_s: float, vocabulary: Vocabulary) -> None:
-        self._owner, self._encoded, self._length_s, self._vocabulary = owner, encoded, length_s, vocabulary
+    def __init__(self, owner: WhisperRecogniser, sound: Samples, vocabulary: Vocabulary) -> None:
+        self._owner, self._sound, self._prompt = owner, sound, vocabulary.prompt
+        self._encoded = owner.encoded(sound)
 
     @cached_property
     def transcripts(self) -> tuple[Transcript, ...]:
         """The readings, likeliest first; none when nothing was said."""
-        return self._owner.search(self._encoded, self._vocabulary.prompt, beam=_BEAM)
+        return self._owner.search(self._encoded, self._prompt, beam=_BEAM)
 
-    def more(self) -> tuple[Transcript, ...]:
-        """The readings that a wider and slower search finds, likeliest first."""
-        return self._owner.search(self._encoded, self._vocabulary.prompt, beam=_WIDE_BEAM)
+    def more(self) -> Iterator[tuple[Transcript, ...]]:
+        """The readings of the sound with less noise, and then those of a wider search in the sound as it is."""
+        yield self._owner.search(self._owner.encoded(less_noisy(self._sound)), self._prompt, beam=_BEAM)
+        yield self._owner.search(self._encoded, self._prompt, beam=_WIDE_BEAM)
 
     def likelihoods(self, texts: Sequence[str]) -> list[float]:
         """The log likelihood of each text given the sound."""
-        return self._owner.likelihoods(self._encoded, self._length_s, texts) if texts else []
+        return self._owner.likelihoods(self._encoded, len(self._sound) / RATE_HZ, texts) if texts else []

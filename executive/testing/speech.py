@@ -1,0 +1,109 @@
+"""For tests of speech: sound made on the spot, and a recogniser and a detector that follow a script."""
+
+from __future__ import annotations
+
+import struct
+import wave
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from executive.speech.recogniser import Transcript
+from executive.speech.sound import RATE_HZ, Samples
+from executive.speech.vocabulary import Vocabulary
+
+__all__ = [
+    "LoudIsSpeech",
+    "ScriptedRecogniser",
+    "ScriptedRecognition",
+    "silence",
+    "speech_like",
+    "tone",
+    "write_raw_wav",
+    "write_wav",
+]
+
+
+@dataclass(frozen=True)
+class ScriptedRecognition:
+    """Readings as given; `likely` holds the log likelihoods of other texts, and `otherwise` is that of all else."""
+
+    transcripts: Sequence[Transcript] = ()
+    wider: Sequence[Transcript] = ()
+    likely: Mapping[str, float] = field(default_factory=dict)
+    otherwise: float = 0.0
+
+    def more(self) -> Iterator[Sequence[Transcript]]:
+        """The readings of one further search."""
+        yield self.wider
+
+    def likelihoods(self, texts: Sequence[str]) -> list[float]:
+        """The likelihoods that were given."""
+        return [self.likely.get(text, self.otherwise) for text in texts]
+
+
+@dataclass
+class ScriptedRecogniser:
+    """Hears the given texts one after another, whatever the sound, and notes how long the sounds were (s)."""
+
+    texts: list[str]
+    lengths_s: list[float] = field(default_factory=list)
+
+    def transcribe(self, sound: Samples, vocabulary: Vocabulary) -> ScriptedRecognition:
+        """The next text; nothing for an empty one, or when none is left."""
+        self.lengths_s.append(len(sound) / RATE_HZ)
+        text = self.texts.pop(0) if self.texts else ""
+        return ScriptedRecognition((Transcript(text, -1.0),) if text else ())
+
+    def draft(self, sound: Samples, vocabulary: Vocabulary) -> str:
+        """The first word of the next text."""
+        return self.texts[0].split()[0] if self.texts else ""
+
+
+class LoudIsSpeech:
+    """Takes for speech whatever is loud."""
+
+    def probability(self, frame: Samples) -> float:
+        """1 above 26 dB below full scale, else 0."""
+        return float(np.abs(frame).max() > 0.05)
+
+
+def tone(seconds: float, *, rate_hz: int = RATE_HZ, height: float = 0.5) -> Samples:
+    """A tone of 440 Hz."""
+    times_s = np.arange(round(seconds * rate_hz)) / rate_hz
+    return np.asarray(height * np.sin(2 * np.pi * 440.0 * times_s), np.float32)
+
+
+def silence(seconds: float, *, rate_hz: int = RATE_HZ) -> Samples:
+    """No sound at all."""
+    return np.zeros(round(seconds * rate_hz), np.float32)
+
+
+def speech_like(*lengths_s: float) -> Samples:
+    """Silences and tones of the given lengths (s) in turn, a silence first."""
+    return np.concatenate([tone(s) if n % 2 else silence(s) for n, s in enumerate(lengths_s)])
+
+
+def write_wav(file: Path, samples: npt.ArrayLike, *, rate_hz: int = RATE_HZ, channels: int = 1) -> Path:
+    """A wav file with 16 bits a sample; each channel holds the same."""
+    whole = (np.asarray(samples, np.float32) * 32767).astype("<i2")
+    with wave.open(str(file), "wb") as writer:
+        writer.setnchannels(channels)
+        writer.setsampwidth(2)
+        writer.setframerate(rate_hz)
+        writer.writeframes(np.repeat(whole, channels).tobytes())
+    return file
+
+
+def write_raw_wav(
+    file: Path, data: bytes, *, tag: int, bits: int, rate_hz: int = RATE_HZ, size: int | None = None, extra: bytes = b""
+) -> Path:
+    """A wav file of one channel with any samples in it: their kind `tag`, and any `size` told in its head."""
+    form = struct.pack("<HHIIHH", tag, 1, rate_hz, rate_hz * bits // 8, bits // 8, bits) + extra
+    chunks = b"fmt " + struct.pack("<I", len(form)) + form
+    chunks += b"data" + struct.pack("<I", len(data) if size is None else size) + data
+    file.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunks)) + b"WAVE" + chunks)
+    return file

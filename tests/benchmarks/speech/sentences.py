@@ -1,0 +1,188 @@
+"""Makes requests from the vocabulary of a world, each with the commands that it asks for, the same for a seed."""
+
+import random
+from dataclasses import dataclass
+
+from executive.command import Task
+from executive.knowledge import Knowledge
+
+GREETINGS = ("Hey {robot}, ", "Hi {robot}, ", "OK {robot}, ", "{robot}, ")
+POLITE = ("", "", "", "please ", "could you ", "can you please ", "would you ")
+FETCH = ("bring me {article} {thing}{source}", "get me {article} {thing}{source}", "fetch {article} {thing}{source}")
+FETCH_TWO = ("bring me two {things}{source}", "get me two {things}{source}")
+DELIVER = ("take {article} {thing} to {goal}", "bring {article} {thing} to {goal}", "carry {article} {thing} to {goal}")
+MOVE = ("move {article} {thing} from the {source} to the {goal}",)
+PUT = (
+    "take {article} {thing} from the {source} and put it on the {goal}",
+    "get {article} {thing} from the {source} and place it on the {goal}",
+)
+FIND = ("find {article} {thing}{place}", "look for {article} {thing}{place}", "search for {article} {thing}{place}")
+PICK = ("pick up {article} {thing}{source}", "grab {article} {thing}{source}")
+GO = ("go to the {goal}", "drive to the {goal}", "walk to the {goal}")
+GIVE = ("give {article} {thing} to {person}", "go to the {source}, take {article} {thing} and give it to {person}")
+TOLD = ("there is {article} {thing} on the {source}, bring it here",)
+
+NOT_ADDRESSED = (
+    "{thing_a} is better cold than warm",
+    "did you see my {thing} in the {place} yesterday",
+    "{person} left a {thing} on the {surface} this morning",
+    "bring me the {thing} from the {place}",
+    "could you take the {thing} to the {place}",
+    "hey {person}, where did you put the {thing}",
+    "hi {person}, please go to the {place}",
+    "{other}, bring the {thing} to {person}",
+    "hey {other}, get me a {thing} from the {place}",
+    "I think that {person} is in the {place}",
+    "the {thing} belongs on the {surface}",
+    "what a nice {place} you have",
+    "we should buy a new {thing} for the {place}",
+    "okay, let us meet in the {place} at five",
+    "hey, that is my {thing}",
+    "all of us went to the {place} with a {thing}",
+    "hello everybody, dinner is ready in the {place}",
+    "is there any {thing} left in the {place}",
+)
+OTHERS = ("Bob", "Charlie", "Maria", "Oliver", "Susan", "Peter")
+
+
+@dataclass(frozen=True)
+class Spoken:
+    """A sentence, and the commands it asks for in their text form; none when it is said to nobody."""
+
+    text: str
+    commands: tuple[str, ...] = ()
+    addressed: bool = True
+
+
+def requests(knowledge: Knowledge, count: int, seed: int) -> list[Spoken]:
+    """So many different sentences to the robot."""
+    return _different(_Maker(knowledge, random.Random(seed)).request, count)
+
+
+def chatter(knowledge: Knowledge, count: int, seed: int) -> list[Spoken]:
+    """So many different sentences that are not said to the robot, many of them with its words."""
+    return _different(_Maker(knowledge, random.Random(seed)).chatter, count)
+
+
+def _different(make, count):
+    found = {}
+    while len(found) < count:
+        spoken = make()
+        found.setdefault(spoken.text, spoken)
+    return list(found.values())
+
+
+class _Maker:
+    """Draws names of the world and puts them into the patterns."""
+
+    def __init__(self, knowledge: Knowledge, draw: random.Random) -> None:
+        self.knowledge, self.draw = knowledge, draw
+        self.kinds = (self._fetch, self._two, self._deliver, self._move, self._put, self._find, self._pick, self._go)
+        self.kinds += (self._give, self._told)
+
+    def request(self) -> Spoken:
+        text, commands = self.draw.choice(self.kinds)()
+        greeting = self.draw.choice(GREETINGS).format(robot=self.knowledge.robot.name)
+        polite = "" if text.startswith("there") else self.draw.choice(POLITE)
+        return Spoken(f"{greeting}{polite}{text}", tuple(commands))
+
+    def chatter(self) -> Spoken:
+        thing, _ = self._thing()
+        text = self.draw.choice(NOT_ADDRESSED).format(
+            thing=thing,
+            thing_a=f"a {thing}".capitalize(),
+            place=self._room()[0],
+            surface=self._surface()[0],
+            person=self._person()[0],
+            other=self.draw.choice(OTHERS),
+        )
+        return Spoken(text[0].upper() + text[1:], addressed=False)
+
+    def _fetch(self):
+        (thing, name), (words, source) = self._thing(), self._maybe(" from the {}")
+        text = self._text(FETCH, thing, source=words)
+        return text, [_take(source or self._usual(name), name), _carry(name, "start")]
+
+    def _two(self):
+        thing, name = self.draw.choice([("cokes", "coke"), ("beers", "beer"), ("hammers", "hammer"), ("cubes", "cube")])
+        words, source = self._maybe(" from the {}")
+        text = self.draw.choice(FETCH_TWO).format(things=thing, source=words)
+        return text, [_take(source or self._usual(name), f"2 {name}"), _carry(f"2 {name}", "start")]
+
+    def _deliver(self):
+        (thing, name), (goal, place) = self._thing(), self._goal()
+        return self._text(DELIVER, thing, goal=goal), [_take(self._usual(name), name), _carry(name, place)]
+
+    def _move(self):
+        (thing, name), (source, taken), (goal, place) = self._thing(), self._surface(), self._surface()
+        return self._text(MOVE, thing, source=source, goal=goal), [_take(taken, name), _carry(name, place)]
+
+    def _put(self):
+        (thing, name), (source, taken), (goal, place) = self._thing(), self._surface(), self._surface()
+        text = self._text(PUT, thing, source=source, goal=goal)
+        return text, [_take(taken, name), f"Take [{name}] to [{place}] and do [place] to [{name}]"]
+
+    def _find(self):
+        (thing, name), (words, place) = self._thing(), self._maybe(" in the {}", rooms=True)
+        found = place or self._usual(name, Task.FIND)
+        return self._text(FIND, thing, place=words), [f"Take [Nothing] to [{found}] and do [find] to [{name}]"]
+
+    def _pick(self):
+        (thing, name), (words, source) = self._thing(), self._maybe(" from the {}")
+        return self._text(PICK, thing, source=words), [_take(source or self._usual(name), name)]
+
+    def _go(self):
+        goal, place = self._room()
+        return self.draw.choice(GO).format(goal=goal), [f"Take [Nothing] to [{place}] and do [Nothing] to [Nothing]"]
+
+    def _give(self):
+        (thing, name), (person, who), (source, taken) = self._thing(), self._person(), self._surface()
+        text = self._text(GIVE, thing, source=source, person=person)
+        return text, [_take(taken if text.startswith("go") else self._usual(name), name), _carry(name, who)]
+
+    def _told(self):
+        (thing, name), (source, taken) = self._thing(), self._surface()
+        return self._text(TOLD, thing, source=source), [_take(taken, name), _carry(name, "start")]
+
+    def _text(self, patterns, thing, **words) -> str:
+        article = self.draw.choice(("the", "an" if thing[0] in "aeiou" else "a"))
+        return self.draw.choice(patterns).format(article=article, thing=thing, **words)
+
+    def _thing(self):
+        return self.draw.choice([*_named(self.knowledge.things), *((c, c) for c in self.knowledge.categories())])
+
+    def _room(self):
+        return self.draw.choice(_named(self.knowledge.places))
+
+    def _surface(self):
+        return self.draw.choice(_named(self.knowledge.surfaces))
+
+    def _person(self):
+        return self.draw.choice(_named(self.knowledge.people))
+
+    def _goal(self):
+        name, known = self.draw.choice((self._room, self._surface, self._person))()
+        return (name, known) if known in self.knowledge.people else (f"the {name}", known)
+
+    def _maybe(self, pattern, *, rooms=False):
+        """The words for a place and its name, or none of both."""
+        if self.draw.random() < 0.4:
+            return "", None
+        name, known = self._room() if rooms or self.draw.random() < 0.3 else self._surface()
+        return pattern.format(name), known
+
+    def _usual(self, name, task=Task.GRASP):
+        return self.knowledge.default_place(task, name)
+
+
+def _named(group):
+    """Each name and alias with the name that it stands for; of aliases that hold another name, the whole."""
+    return [(spoken, name) for name, facts in group.items() for spoken in (name, *facts.aliases)]
+
+
+def _take(place, name) -> str:
+    return f"Take [Nothing] to [{place}] and do [grasp] to [{name}]"
+
+
+def _carry(name, goal) -> str:
+    return f"Take [{name}] to [{goal}] and do [Nothing] to [Nothing]"

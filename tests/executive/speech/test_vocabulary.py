@@ -1,0 +1,51 @@
+import pytest
+
+from executive.errors import InputError
+from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
+
+
+def test_a_world_gives_all_its_names_and_the_robots_own_last(flat):
+    words = of_world(flat, called=True)
+    assert {"coke", "cola", "drink", "kitchen counter", "worktop", "lounge", "Robin"} <= set(words.names)
+    assert words.names[-1] == words.robot_name == "Alice"
+    assert len(set(words.names)) == len(words.names)
+
+
+def test_a_robot_that_need_not_be_called_is_no_part_of_the_prompt(flat):
+    words = of_world(flat, called=False)
+    assert words.robot_name is None
+    assert "Alice" not in words.prompt
+
+
+def test_the_prompt_holds_the_names_and_how_one_calls():
+    prompt = Vocabulary(("sofa", "coke"), "Bob").prompt
+    assert prompt.startswith("sofa, coke. Hey Bob, ")
+    assert "Names" not in Vocabulary().prompt
+
+
+def test_a_file_of_names_has_one_on_each_line(tmp_path):
+    file = tmp_path / "names.txt"
+    file.write_text("\ufeffbig dish\n\n  washing   machine \nbig dish\n", encoding="utf-8")
+    assert read_vocabulary(file, None).names == ("big dish", "washing machine")
+    assert read_vocabulary(file, "Alice").names[-1] == "Alice"
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"\xff\xfe\x00", "cannot read"),
+        (b"x" * 200, "too long"),
+        (b"\n".join(b"n%d" % n for n in range(6000)), "too many"),
+    ],
+)
+def test_a_file_that_holds_no_names_is_told(tmp_path, content, told):
+    file = tmp_path / "names.txt"
+    file.write_bytes(content)
+    with pytest.raises(InputError, match=told) as refused:
+        read_vocabulary(file, None)
+    assert refused.value.file == file
+
+
+def test_a_missing_file_of_names_is_told(tmp_path):
+    with pytest.raises(InputError, match="cannot read"):
+        read_vocabulary(tmp_path / "none.txt", None)

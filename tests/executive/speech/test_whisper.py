@@ -1,0 +1,97 @@
+"""The recogniser itself, with a synthetic voice of this machine; skipped where the extra or a voice is missing."""
+
+import socket
+from importlib import import_module
+
+import pytest
+
+import executive.speech.extra as extra
+from executive.errors import InputError
+from executive.speech.activity import load_detector
+from executive.speech.hearing import SpeechReader, spoken_phrases
+from executive.speech.listener import Listener
+from executive.speech.sound import joined
+from executive.speech.vocabulary import of_world
+from executive.speech.wav import read_wav
+from executive.speech.whisper import load_whisper
+from executive.testing.speech import silence
+
+pytest.importorskip("faster_whisper")
+
+
+@pytest.fixture(scope="module")
+def whisper():
+    """The recogniser, loaded where there is no network."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(socket, "socket", _no_network)
+        return load_whisper()
+
+
+def _no_network(*args, **more):
+    raise AssertionError("the network was asked for")
+
+
+@pytest.fixture
+def listener(whisper, flat, parser):
+    words = of_world(flat, called=True)
+    reader = SpeechReader(parser, flat, words, "Alice", require_wake=True)
+    return Listener(whisper, load_detector, reader, spoken_phrases(words))
+
+
+@pytest.mark.parametrize(
+    ("said", "commands"),
+    [
+        ("Hey Alice, go to the kitchen.", ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"]),
+        (
+            "Hey Alice, bring the hammer from the workbench to Robin.",
+            [
+                "Take [Nothing] to [workbench] and do [grasp] to [hammer]",
+                "Take [hammer] to [Robin] and do [Nothing] to [Nothing]",
+            ],
+        ),
+    ],
+)
+def test_a_spoken_request_becomes_commands(listener, say, said, commands):
+    heard = listener.file(say(said))
+    assert heard.addressed
+    assert list(map(str, heard.commands)) == commands
+
+
+def test_what_is_said_to_nobody_is_left_alone(listener, say):
+    heard = listener.file(say("The hammer belongs on the workbench."))
+    assert not heard.addressed and heard.commands == ()
+
+
+def test_the_same_sound_gives_the_same_readings(whisper, say, flat):
+    words, sound = of_world(flat, called=True), joined(read_wav(say("Hey Alice, find the wrench.")))
+    first, second = (whisper.transcribe(sound, words) for _ in range(2))
+    assert first.transcripts == second.transcripts
+
+
+def test_the_words_that_were_said_are_likelier_than_others(whisper, say, flat):
+    recognition = whisper.transcribe(joined(read_wav(say("Find the wrench."))), of_world(flat, called=False))
+    right, wrong = recognition.likelihoods(["Find the wrench.", "Take the beer."])
+    assert right > wrong + 5.0
+
+
+def test_silence_holds_no_words_worth_a_command(whisper, flat):
+    readings = whisper.transcribe(silence(2.0), of_world(flat, called=True)).transcripts
+    assert not any("kitchen" in reading.text for reading in readings)
+
+
+def test_without_the_extra_the_mend_is_told(monkeypatch):
+    def missing(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(extra, "import_module", missing)
+    for load in (load_whisper, load_detector):
+        with pytest.raises(InputError, match="not installed") as refused:
+            load()
+        assert "spot-errand[speech]" in refused.value.mend
+    assert import_module("faster_whisper")
+
+
+def test_damaged_weights_are_told(monkeypatch):
+    monkeypatch.setattr("executive.speech.whisper._SHA256", "0")
+    with pytest.raises(InputError, match="damaged"):
+        load_whisper()

@@ -78,12 +78,12 @@ def _key(rng: np.random.Generator, room: Room, gain: float) -> LightParameter:
 
 
 def _fill(rng: np.random.Generator, level: float) -> list[LightParameter]:
-    """Light from four sides, from above and from the floor, uneven."""
-    turn, beams = float(rng.uniform(0, np.pi / 2)), []
-    for k in range(4):
-        angle = turn + k * np.pi / 2
+    """Light from three sides and from above or below, uneven. Every light more costs time in the renderer."""
+    turn, beams = float(rng.uniform(0, np.pi)), []
+    for k in range(3):
+        angle = turn + k * 2 * np.pi / 3
         beams.append(np.array([np.cos(angle), np.sin(angle), -0.35]))
-    beams += [np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.05, -1.0])]
+    beams.append(np.array([0.0, 0.05, 1.0 if rng.random() < 0.5 else -1.0]))
     return [
         LightParameter(
             type="directional",

@@ -23,7 +23,7 @@ def errand(*arguments: str) -> Result:
         (("--out", "x", "--images", "0"), "'--images'"),
         (("--out", "x", "--images", "8", "--seed", "-1"), "'--seed'"),
         (("--out", "x", "--images", "many"), "'--images'"),
-        (("--out", "x", "--images", "8", "--jobs", "0"), "'--images'"),
+        (("--out", "x", "--images", "8", "--jobs", "0"), "'--jobs'"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments: tuple[str, ...], told: str) -> None:

@@ -23,6 +23,7 @@ ATTEMPTS = 30
 CLEAR_M = 0.004
 LARGE_M = 0.45
 HELD_LONGEST_M = 0.40
+TOGETHER_SHARE, SPREAD_M = 0.6, 0.22
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ class _Table:
         points = model.surface.points @ pose.R.T
         outline = points[ConvexHull(points[:, :2]).vertices, :2]
         tall = float(np.ptp(points[:, 2]))
-        for _ in range(ATTEMPTS):
+        for _ in range(4 * ATTEMPTS if model.family == "person" else ATTEMPTS):
             spot = self._spot(model, supports, outline, tall)
             if spot is None:
                 continue
@@ -139,12 +140,26 @@ class _Table:
         if not half.all() and reach > 1.5 * min(support.half):
             return None
         local = rng.uniform(-1, 1, 2) * half
+        near = self._neighbour(support.height_m)
+        if near is not None:
+            wished = _turn(-support.yaw_rad) @ (near + rng.normal(0, SPREAD_M, 2) - support.centre)
+            local = np.clip(wished, -half, half) if np.all(np.abs(wished) < np.array(support.half) + 0.3) else local
         x, y = np.array(support.centre) + _turn(support.yaw_rad) @ local
         return (float(x), float(y), support.height_m, yaw)
+
+    def _neighbour(self, height_m: float) -> FloatArray | None:
+        """Now and then a thing on the same level, to be put beside: clutter gathers."""
+        level = [outline for z, outline in self._taken if abs(z - height_m) < 0.01]
+        if not level or self._rng.random() > TOGETHER_SHARE:
+            return None
+        return np.asarray(level[int(self._rng.integers(len(level)))].mean(axis=0))
 
     def _floor_spot(self, outline: FloatArray, tall: float, yaw: float) -> tuple[float, float, float, float] | None:
         width, depth, _ = self._room.size_m
         x, y = float(self._rng.uniform(0.1, width - 0.1)), float(self._rng.uniform(0.1, depth - 0.1))
+        near = self._neighbour(0.0)
+        if near is not None:
+            x, y = (float(v) for v in near + self._rng.normal(0, 2 * SPREAD_M, 2))
         turned = outline @ _turn(yaw).T + [x, y]
         low, high = turned.min(axis=0), turned.max(axis=0)
         if low.min() < 0.03 or high[0] > width - 0.03 or high[1] > depth - 0.03:

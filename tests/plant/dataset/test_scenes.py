@@ -12,7 +12,9 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
+from scipy.spatial import ConvexHull
 
+from plant.dataset.compose import Placed, compose
 from plant.dataset.degrade import Degradation, degraded
 from plant.dataset.render import is_validation
 from plant.dataset.resting import choose, resting_poses
@@ -20,6 +22,7 @@ from plant.dataset.room import random_room
 from plant.dataset.textures import ROLES, numbers, texture
 from plant.dataset.views import any_view, camera_specs
 from plant.models.families import instance
+from plant.worlds.placement import polygon_distance
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -121,3 +124,27 @@ def test_degrading_is_the_same_for_the_same_seed() -> None:
     how = Degradation.drawn(np.random.default_rng(2))
     first, second = (degraded(clean, how, np.random.default_rng(0), grey=False) for _ in range(2))
     assert np.array_equal(first, second)
+
+
+def test_a_scene_for_validation_holds_held_out_instances_only_and_nothing_overlaps() -> None:
+    scene = compose(np.random.default_rng(3), 5, for_training=False)
+    assert any(thing.model.class_id for thing in scene.things)
+    assert all(thing.model.held_out for thing in scene.things)
+    outlines = [(*thing_outline(thing), thing.model.name) for thing in scene.things]
+    for k, (low, points, name) in enumerate(outlines):
+        for other_low, other_points, other in outlines[:k]:
+            if abs(low - other_low) < 0.2:
+                assert polygon_distance(points, other_points) > 0.0, (name, other)
+
+
+def thing_outline(thing: Placed) -> tuple[float, np.ndarray]:
+    """Lowest height, and the outline from above."""
+    points = np.asarray(thing.X_WO @ thing.model.surface.points.T).T
+    return float(points[:, 2].min()), points[ConvexHull(points[:, :2]).vertices, :2]
+
+
+def test_every_tenth_scene_holds_distractors_only() -> None:
+    scene = compose(np.random.default_rng(3), 9, for_training=True)
+    assert scene.things
+    assert all(thing.model.class_id == 0 for thing in scene.things)
+    assert scene.held is None or scene.held.model.class_id == 0

@@ -129,6 +129,16 @@ class Phrase:
         return titled or (self.head.kind is NounKind.PERSON and (proper or len(self.tokens) == 1))
 
     @property
+    def proper(self) -> bool:
+        """Whether it is written as a name, of whatever kind."""
+        return not self._determined() and all(token.pos == "PROPN" for token in self.tokens)
+
+    def as_person(self) -> Phrase:
+        """The same, taken for the name of a person."""
+        *left, head = self.tokens
+        return replace(self, tokens=(*left, replace(head, kind=NounKind.PERSON)))
+
+    @property
     def universal(self) -> bool:
         """Whether it means all of a kind ("everyone", "all the men")."""
         return any(t.word in lexicon().everyone for t in self.tokens)

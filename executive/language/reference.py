@@ -127,7 +127,9 @@ def _told(action: Action, where: Location | None, memory: Memory) -> Memory:
     if people:
         return replace(memory, person=Location(people[-1], within=where))
     told = () if where is None else tuple((phrase, where) for phrase in action.objects)
-    return replace(memory, things=action.objects or memory.things, told=(*memory.told, *told))
+    called = [phrase.as_person() for phrase in action.objects if phrase.proper]
+    person = Location(called[-1], within=where) if called else memory.person
+    return replace(memory, person=person, things=action.objects or memory.things, told=(*memory.told, *told))
 
 
 def _all_meant(phrases: Sequence[Phrase], memory: Memory) -> tuple[Phrase, ...]:

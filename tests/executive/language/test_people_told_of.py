@@ -1,0 +1,23 @@
+"""Somebody who was told of by name is who "her" and "him" mean, also where the name is not known for one."""
+
+import pytest
+
+from executive.language import Status, load_parser, understand
+
+
+@pytest.fixture(scope="module")
+def parser():
+    return load_parser()
+
+
+@pytest.mark.parametrize("name", ["Tracy", "Mary", "Odo"])
+def test_whoever_is_told_of_is_brought_to(parser, name):
+    text = f"{name} is at the desk, bring her the tuna."
+    meaning = understand(text, parser=parser, knowledge=None, require_wake=False)
+    assert meaning.status is Status.OK
+    assert (meaning.commands[-1].goal, meaning.commands[-1].goal_at) == (name, "desk")
+
+
+def test_a_thing_that_is_told_of_is_still_one(parser):
+    meaning = understand("Coke is on the table, bring it here.", parser=parser, knowledge=None, require_wake=False)
+    assert meaning.commands[0].goal == "table"

@@ -86,7 +86,8 @@ def spoken_phrases(vocabulary: Vocabulary) -> SoundAlikes:
     calls = [f"{greeting} {vocabulary.robot_name}" for greeting in _GREETINGS] if vocabulary.robot_name else []
     names = [form for name in vocabulary.names for form in (name, f"{name}s")]
     told = [f"{being} {where}" for being in _BEINGS for where in ("at", "by", "in", "on")]
-    small = [*told, *_BEINGS, *words.pronouns, *words.here, *words.there, *words.speaker, *_ARTICLES, *_NUMBERS]
+    goals = [f"to {name}" for name in vocabulary.names]
+    small = [*goals, *told, *_BEINGS, *words.pronouns, *words.here, *words.there, *words.speaker, *_ARTICLES, *_NUMBERS]
     return SoundAlikes(names, [*calls, *verbs, *prepositions, *words.openers, *words.requests, *small])
 
 

@@ -44,7 +44,7 @@ def interpret(
     if not transcripts:
         return None
     first = transcripts[0]
-    heard = [Repair(once(first.text), 0.0, read(once(first.text)))]
+    heard = [Repair(smoothed(first.text), 0.0, read(smoothed(first.text)))]
     if heard[0].reading.mendable:
         heard = _searched(recognition, heard, read, alikes)
     best = next((one for one in heard if one.reading.fits), heard[0])
@@ -79,7 +79,7 @@ def _read(
     """Those heard and, read in order, those that are not much less likely than the best, up to one that fits."""
     heard = [*heard]
     for transcript in transcripts:
-        text, behind = once(transcript.text), max(best - transcript.likelihood, 0.0)
+        text, behind = smoothed(transcript.text), max(best - transcript.likelihood, 0.0)
         if behind > _OTHER_READING or any(_same(text, other.text) for other in heard):
             continue
         heard.append(Repair(text, behind / _PER_SOUND, read(text)))
@@ -108,6 +108,11 @@ def _same(first: str, second: str) -> bool:
     return first.rstrip(" .?!").lower() == second.rstrip(" .?!").lower()
 
 
-def once(text: str) -> str:
-    """The text without what a speaker said twice on starting anew ("grab the, grab the cup")."""
-    return re.sub(r"\b(\w+(?:[ ']\w+){1,9})[ ,.;]+(?=\1\b)", "", text, flags=re.IGNORECASE)
+def smoothed(text: str) -> str:
+    """The text as it was meant to be said.
+
+    What a speaker said twice on starting anew stands once ("grab the, grab the cup"), and no pronoun repeats a
+    relative one ("Robin, which he is in the hall").
+    """
+    anew = re.sub(r"\b(\w+(?:[ ']\w+){1,9})[ ,.;]+(?=\1\b)", "", text, flags=re.IGNORECASE)
+    return re.sub(r",?\s+(?:which|who|that)\s+(?:he|she|they)\s+(is|are)\b", r" who \1", anew, flags=re.IGNORECASE)

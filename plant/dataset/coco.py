@@ -17,6 +17,7 @@ LEAST_SHARE = 0.25
 LEAST_LONG_PX = 10
 LEAST_SHORT_PX = 4
 LEAST_NOTED_PX = 6
+DARKEST_MEAN, DARKEST_SPREAD = 14.0, 7.0
 
 
 def run_lengths(mask: Mask) -> dict[str, Any]:
@@ -50,12 +51,13 @@ def box_of(mask: Mask) -> tuple[int, int, int, int]:
 
 
 def annotation(
-    *, mask: Mask, alone: Silhouette, class_id: int, instance: str, distance_m: float
+    *, mask: Mask, alone: Silhouette, class_id: int, instance: str, distance_m: float, dark: bool = False
 ) -> dict[str, Any] | None:
     """One label without ids, or None when next to nothing is seen.
 
     `visibility` is the share seen of what the thing alone would show in the picture, `truncation` the share of the
-    thing beyond the picture's edge. Too little seen, or too small: `ignore` is 1 (and `iscrowd`, as COCO's tools do).
+    thing beyond the picture's edge. Too little seen, too small or too `dark`: `ignore` is 1, and `iscrowd`, by which
+    COCO's tools pass over it.
     """
     area = int(mask.sum())
     if area < LEAST_NOTED_PX:
@@ -64,7 +66,7 @@ def annotation(
     visibility = min(1.0, area / max(alone.inside_px, 1))
     truncation = 1.0 - alone.inside_px / max(alone.whole_px, alone.inside_px, 1)
     seen = visibility * (1.0 - truncation)
-    ignored = seen < LEAST_SHARE or max(w, h) < LEAST_LONG_PX or min(w, h) < LEAST_SHORT_PX
+    ignored = dark or seen < LEAST_SHARE or max(w, h) < LEAST_LONG_PX or min(w, h) < LEAST_SHORT_PX
     return {
         "category_id": class_id,
         "bbox": [x, y, w, h],
@@ -77,6 +79,12 @@ def annotation(
         "distance_m": round(distance_m, 3),
         "instance": instance,
     }
+
+
+def lost_in_the_dark(picture: NDArray[np.uint8], mask: Mask) -> bool:
+    """Whether nobody could see the thing of a mask in the picture, (H, W) or (H, W, 3): all black."""
+    seen = picture[mask].astype(np.float32)
+    return bool(seen.mean() < DARKEST_MEAN and seen.std() < DARKEST_SPREAD)
 
 
 def categories() -> list[dict[str, Any]]:

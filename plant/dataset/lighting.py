@@ -32,7 +32,7 @@ def random_lighting(rng: np.random.Generator, room: Room) -> Lighting:
     style = str(rng.choice(STYLES, p=[0.45, 0.3, 0.25]))
     shadows = style == SHADOWS or (style == PHYSICAL and rng.random() < 0.5)
     gain = _PHYSICAL_GAIN if style == PHYSICAL else 1.0
-    fill = _fill(rng, gain * float(rng.uniform(0.15, 0.5)))
+    fill = _fill(rng, gain * float(rng.uniform(0.28, 0.6)))
     keys = [_key(rng, room, gain) for _ in range(int(rng.choice([1, 2, 3], p=[0.55, 0.33, 0.12])))]
     sky = rng.uniform(0.2, 1.0) * np.array([0.85, 0.92, 1.0])
     parameters = RenderEngineVtkParams(

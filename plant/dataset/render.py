@@ -30,7 +30,7 @@ from pydrake.geometry import (
 from pydrake.geometry import Mesh as MeshShape
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.dataset.coco import annotation
+from plant.dataset.coco import annotation, lost_in_the_dark
 from plant.dataset.compose import Held, Placed, Scene, compose
 from plant.dataset.degrade import Degradation, degraded
 from plant.dataset.hand import hand_mesh
@@ -91,7 +91,7 @@ def _views(rng: np.random.Generator, scene: Scene) -> list[View]:
     for attempt in range(3 * VIEWS_PER_SCENE):
         if len(views) == VIEWS_PER_SCENE or not order:
             break
-        view = view_of(rng, scene.room, order[attempt % len(order)], specs, hand_only=False)
+        view = view_of(rng, scene.room, order[attempt % len(order)], specs)
         if view is not None:
             views.append(view)
     views += [any_view(rng, scene.room, specs) for _ in range(VIEWS_PER_SCENE - len(views))]
@@ -219,7 +219,7 @@ def _shot(
         "style": lighting.style,
         "motion_px": round(how.motion_px, 1),
     }
-    return Shot(picture, how.quality, facts, label_view(stage.labelled, labels, view, stage.hand_pose(view)))
+    return Shot(picture, how.quality, facts, label_view(stage.labelled, labels, view, stage.hand_pose(view), picture))
 
 
 def _rounded(view: View) -> list[float]:
@@ -232,6 +232,7 @@ def label_view(
     labels: NDArray[np.int16],
     view: View,
     X_WH: RigidTransform,
+    picture: Picture,
 ) -> list[dict[str, Any]]:
     """Labels of all things of the classes that show: masks from the label image, what they hide from silhouettes."""
     found, X_CW = [], view.X_WC.inverse()
@@ -241,8 +242,14 @@ def label_view(
         points_C = np.asarray(X_CO @ model.surface.points.T).T
         alone = silhouette(points_C, model.surface.faces, view.intrinsics)
         distance = float(np.linalg.norm(points_C.mean(axis=0)))
+        mask = labels == label
         entry = annotation(
-            mask=labels == label, alone=alone, class_id=model.class_id, instance=model.name, distance_m=distance
+            mask=mask,
+            alone=alone,
+            class_id=model.class_id,
+            instance=model.name,
+            distance_m=distance,
+            dark=lost_in_the_dark(picture, mask),
         )
         if entry is not None:
             found.append(entry)

@@ -53,11 +53,9 @@ def roll_deg(X_WC: RigidTransform) -> float:
     return float(np.degrees(np.arctan2(up_C[0], -up_C[1])))
 
 
-def view_of(
-    rng: np.random.Generator, room: Room, thing: Placed, specs: Mapping[str, CameraSpec], *, hand_only: bool
-) -> View | None:
+def view_of(rng: np.random.Generator, room: Room, thing: Placed, specs: Mapping[str, CameraSpec]) -> View | None:
     """A view in which the thing stands somewhere in the picture, or None when none was found."""
-    in_body = not hand_only and rng.random() < BODY_SHARE
+    in_body = rng.random() < BODY_SHARE
     for _ in range(TRIES):
         view = _body_view(rng, room, thing, specs) if in_body else _hand_view(rng, room, thing, specs["hand"])
         if view is not None and _sees(view, room.obstacles, _aim(thing)):

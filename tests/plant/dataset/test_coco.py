@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from executive.class_ids import CLASS_IDS
-from plant.dataset.coco import annotation, box_of, categories, counts, document, mask_of, run_lengths
+from plant.dataset.coco import annotation, box_of, categories, counts, document, lost_in_the_dark, mask_of, run_lengths
 from plant.dataset.silhouette import Silhouette
 
 
@@ -105,3 +105,11 @@ def test_a_document_numbers_pictures_and_labels_and_joins_them() -> None:
     needed = {"category_id", "bbox", "area", "segmentation", "iscrowd", "visibility", "truncation", "distance_m"}
     assert all(needed <= set(entry) for entry in made["annotations"])
     assert counts(made["annotations"])["hammer"] == 2
+
+
+# mean and spread of the thing's pixels -> whether it is lost
+@pytest.mark.parametrize(("mean", "spread", "lost"), [(5, 2, True), (60, 2, False), (10, 25, False)])
+def test_a_thing_that_is_all_black_is_lost_in_the_dark(mean: float, spread: float, lost: bool) -> None:
+    noise = np.random.default_rng(1).normal(mean, spread, (20, 20, 3))
+    picture = np.clip(noise, 0, 255).astype(np.uint8)
+    assert lost_in_the_dark(picture, np.ones((20, 20), dtype=bool)) is lost

@@ -41,8 +41,8 @@ def labels_of(things: tuple[Placed, ...], folder: Path) -> list[dict[str, object
     scene = Scene(empty_room(), things, None, ())
     stage = Stage(scene, Lighting("plain", render_parameters()), folder, 1.0)
     view = View("hand", look_at(EYE, (0, 0, 0.05)), CAMERA, False, False)
-    _, labels = stage.take(view)
-    return label_view(stage.labelled, labels, view, stage.hand_pose(view))
+    clean, labels = stage.take(view)
+    return label_view(stage.labelled, labels, view, stage.hand_pose(view), clean)
 
 
 def projected_box(model: ObjectModel, X_WO: RigidTransform) -> tuple[float, float, float, float]:

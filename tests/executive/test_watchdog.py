@@ -51,11 +51,11 @@ def test_calls_from_other_threads_are_let_through():
 
 def test_a_hung_verb_ends_the_run_with_an_error(compiled, run_tree, make, robot, script):
     def hang(skill):
-        robot.gripper = lambda: time.sleep(5.0)
-        skill.context.robot.gripper()
+        robot.imu = lambda: time.sleep(5.0)
+        skill.context.robot.imu()
 
     script.ends["navigate"] = hang
     result = run_tree(compiled(*make.FETCH), settings={"verb_limit_s": 0.05})
     assert result.outcome is Outcome.ERROR
-    assert "'gripper'" in result.worst.message
+    assert "'imu'" in result.worst.message
     assert (robot.driving, robot.holder) == (False, None)

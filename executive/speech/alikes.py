@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -47,6 +48,11 @@ class SoundAlikes:
     def knows(self, word: str) -> bool:
         """Whether the word is one of the phrases or stands in one."""
         return word.lower() in self._words
+
+    def names_in(self, text: str) -> tuple[str, ...]:
+        """The known names that stand in a text."""
+        spoken = " " + re.sub(r"[^\w ]", "", text.lower()) + " "
+        return tuple(phrase for phrase, name in self._phrases if name and f" {phrase.lower()} " in spoken)
 
     def _of(self, words: str) -> tuple[Alike, ...]:
         """The phrases that sound like `words`, the nearest first; not the very same words."""

@@ -9,7 +9,7 @@ from typing import Final, Generic, TypeVar
 
 from executive.speech.alikes import SoundAlikes
 from executive.speech.recogniser import Recognition, Transcript
-from executive.speech.repair import Reading, Repair, repairs
+from executive.speech.repair import Reading, Repair, repairs, variants
 
 __all__ = ["Interpretation", "interpret"]
 
@@ -17,10 +17,10 @@ Meaning = TypeVar("Meaning")
 
 _OTHER_READING: Final = 6.0
 """How many times e less likely another of the recogniser's own readings may be than the first."""
-_MENDED_READING: Final = 9.0
+_MENDED_READING: Final = 12.0
 """The same for a reading mended by sound; these are compared without telling the recogniser what to expect."""
 _MOST_MENDED: Final = 4
-_PER_SOUND: Final = 2.0
+_PER_SOUND: Final = 3.0
 """How much log likelihood a changed sound is worth."""
 
 
@@ -44,30 +44,55 @@ def interpret(
     if not transcripts:
         return None
     first = transcripts[0]
-    heard = [Repair(smoothed(first.text), 0.0, read(smoothed(first.text)))]
-    if heard[0].reading.mendable:
-        heard = _searched(recognition, heard, read, alikes)
-    best = next((one for one in heard if one.reading.fits), heard[0])
+    text = smoothed(first.text)
+    heard = [Repair(text, 0.0, read(text))]
+    if not heard[0].reading.mendable or (heard[0].reading.fits and not recognition.noisy):
+        return Interpretation(text, heard[0].reading.meaning, first.text)
+    fitting = _fitting(recognition, heard, read, alikes)
+    best = _likeliest(recognition, heard[0], fitting, read, alikes) or heard[0]
     return Interpretation(best.text, best.reading.meaning, first.text)
 
 
-def _searched(
+def _fitting(
     recognition: Recognition,
     heard: list[Repair[Meaning]],
     read: Callable[[str], Reading[Meaning]],
     alikes: SoundAlikes,
 ) -> list[Repair[Meaning]]:
-    """The readings, and where the first does not fit, the others up to one that does, or else that mended by sound."""
+    """The readings that fit: of the first search, or else of those after it, or else what is mended by sound.
+
+    In noise there is always a second search.
+    """
     likeliest = recognition.transcripts[0].likelihood
-    if not heard[-1].reading.fits:
-        heard = _read(recognition.transcripts, likeliest, heard, read)
-    more = recognition.more()
-    while not heard[-1].reading.fits and (readings := next(more, None)) is not None:
+    heard = _read(recognition.transcripts, likeliest, heard, read)
+    searches = recognition.more()
+    enough = not recognition.noisy
+    while not (enough and any(one.reading.fits for one in heard)) and (readings := next(searches, None)) is not None:
         heard = _read(readings, likeliest, heard, read)
-    if not heard[-1].reading.fits:
-        repair = _mended(recognition, [one for one in heard if one.reading.mendable], read, alikes)
-        return heard if repair is None else [*heard, repair]
-    return heard
+        enough = True
+    fitting = [one for one in heard if one.reading.fits]
+    return fitting or repairs([one for one in heard if one.reading.mendable], read, alikes, most=_MOST_MENDED)
+
+
+def _likeliest(
+    recognition: Recognition,
+    first: Repair[Meaning],
+    fitting: list[Repair[Meaning]],
+    read: Callable[[str], Reading[Meaning]],
+    alikes: SoundAlikes,
+) -> Repair[Meaning] | None:
+    """The one that is likeliest given the sound, if it is not much less likely than the first reading.
+
+    The readings of a clear sound stand in their order. In noise, names of like sound are tried for those in the first.
+    """
+    if not fitting or not (fitting[0].changes or recognition.noisy):
+        return fitting[0] if fitting else None
+    if recognition.noisy:
+        fitting = [*fitting, *variants(fitting[0], read, alikes)]
+    unmended, *likelihoods = recognition.likelihoods([first.text, *(one.text for one in fitting)])
+    weighed = zip(likelihoods, fitting, strict=True)
+    best, found = max(weighed, key=lambda pair: pair[0] - _PER_SOUND * pair[1].cost)
+    return found if best >= unmended - _MENDED_READING else None
 
 
 def _read(
@@ -76,32 +101,14 @@ def _read(
     heard: list[Repair[Meaning]],
     read: Callable[[str], Reading[Meaning]],
 ) -> list[Repair[Meaning]]:
-    """Those heard and, read in order, those that are not much less likely than the best, up to one that fits."""
+    """Those heard and, read in order, those that are not much less likely than the best."""
     heard = [*heard]
     for transcript in transcripts:
         text, behind = smoothed(transcript.text), max(best - transcript.likelihood, 0.0)
         if behind > _OTHER_READING or any(_same(text, other.text) for other in heard):
             continue
         heard.append(Repair(text, behind / _PER_SOUND, read(text)))
-        if heard[-1].reading.fits:
-            break
     return heard
-
-
-def _mended(
-    recognition: Recognition,
-    heard: Sequence[Repair[Meaning]],
-    read: Callable[[str], Reading[Meaning]],
-    alikes: SoundAlikes,
-) -> Repair[Meaning] | None:
-    """The likeliest of the sentences that fit and sound like one of the readings, if it is likely at all."""
-    fitting = repairs(heard, read, alikes, most=_MOST_MENDED)
-    if not fitting:
-        return None
-    unmended, *likelihoods = recognition.likelihoods([heard[0].text, *(repair.text for repair in fitting)])
-    weighed = zip(likelihoods, fitting, strict=True)
-    best, repair = max(weighed, key=lambda pair: pair[0] - _PER_SOUND * pair[1].cost)
-    return repair if best >= unmended - _MENDED_READING else None
 
 
 def _same(first: str, second: str) -> bool:

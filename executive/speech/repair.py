@@ -11,13 +11,13 @@ import heapq
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, islice
 from typing import Final, Generic, TypeVar
 
 from executive.command import is_attribute
 from executive.speech.alikes import Alike, SoundAlikes
 
-__all__ = ["Reading", "Repair", "repairs"]
+__all__ = ["Reading", "Repair", "repairs", "variants"]
 
 Meaning = TypeVar("Meaning")
 
@@ -37,11 +37,15 @@ class Reading(Generic[Meaning]):
 
 @dataclass(frozen=True)
 class Repair(Generic[Meaning]):
-    """A sentence, what it means, and how far it sounds from what was heard (0 the same, about 1 a changed sound)."""
+    """A sentence, what it means, and how far it sounds from what was heard (0 the same, about 1 a changed sound).
+
+    `changes` counts the groups of words that were changed.
+    """
 
     text: str
     cost: float
     reading: Reading[Meaning]
+    changes: int = 0
 
 
 def repairs(
@@ -60,7 +64,7 @@ def repairs(
         sentence = " ".join(words)
         reading = known.get(sentence) or read(sentence)
         if reading.fits:
-            found.append(Repair(sentence, cost, reading))
+            found.append(Repair(sentence, cost, reading, changes))
         elif changes < _MOST_CHANGES:
             for more, changed in _changed(words, reading.suspects, alikes):
                 if changed not in seen and cost + more <= _MOST_COST:
@@ -69,16 +73,29 @@ def repairs(
     return found
 
 
+def variants(
+    heard: Repair[Meaning], read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes, *, most: int = 6
+) -> list[Repair[Meaning]]:
+    """At most so many sentences that fit and have another known name, of like sound, in the place of one of theirs."""
+    words = tuple(heard.text.split())
+    changed = sorted(_changed(words, alikes.names_in(heard.text), alikes, names_only=True))[: 2 * most]
+    found = (
+        Repair(" ".join(other), heard.cost + cost, read(" ".join(other)), heard.changes + 1) for cost, other in changed
+    )
+    return list(islice((one for one in found if one.reading.fits), most))
+
+
 def _changed(
-    words: tuple[str, ...], suspects: Sequence[str], alikes: SoundAlikes
+    words: tuple[str, ...], suspects: Sequence[str], alikes: SoundAlikes, *, names_only: bool = False
 ) -> Iterator[tuple[float, tuple[str, ...]]]:
     """The sentences with one group of words changed, and the cost of that."""
-    for start, end in _spans(len(words), _blamed(words, suspects)):
+    blamed = _blamed(words, suspects) if suspects or not names_only else set[int]()
+    for start, end in _spans(len(words), blamed):
         spoken = " ".join(map(_bare, words[start:end]))
         tail = re.sub(r".*[\w']", "", words[end - 1])
         price = _PER_CHANGE + _PER_KNOWN_WORD * sum(alikes.knows(word) for word in spoken.split())
         for alike in alikes.of(spoken):
-            if _stands(words[:start], alike):
+            if _stands(words[:start], alike) and alike.name >= names_only:
                 yield alike.cost + price, (*words[:start], *f"{alike.phrase}{tail}".split(), *words[end:])
 
 
@@ -89,17 +106,28 @@ def _stands(before: Sequence[str], alike: Alike) -> bool:
 
 
 def _blamed(words: Sequence[str], suspects: Sequence[str]) -> set[int]:
-    """The positions of the words to blame, articles between them included; all when none is named."""
+    """The positions of the words to blame, articles between them included; all when none is named.
+
+    Where the words of a suspect do not stand together, each is to blame for itself.
+    """
     bare = [(at, _bare(word).lower()) for at, word in enumerate(words)]
     plain = [(at, word) for at, word in bare if word not in _ARTICLES]
     blamed = set[int]()
     for suspect in suspects:
         parts = [part for part in map(str.lower, map(_bare, suspect.split())) if part not in _ARTICLES]
-        for first in range(len(plain) - len(parts) + 1):
-            found = plain[first : first + len(parts)]
-            if parts and [word for _, word in found] == parts:
-                blamed |= set(range(found[0][0], found[-1][0] + 1))
+        together = _together(plain, parts)
+        blamed |= together or {at for at, word in plain if word in parts}
     return blamed or set(range(len(words)))
+
+
+def _together(plain: Sequence[tuple[int, str]], parts: Sequence[str]) -> set[int]:
+    """All positions from the first to the last of the parts, wherever they stand one after another."""
+    places = set[int]()
+    for first in range(len(plain) - len(parts) + 1):
+        found = plain[first : first + len(parts)]
+        if parts and [word for _, word in found] == parts:
+            places |= set(range(found[0][0], found[-1][0] + 1))
+    return places
 
 
 def _spans(count: int, blamed: set[int]) -> Iterator[tuple[int, int]]:

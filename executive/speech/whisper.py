@@ -21,7 +21,7 @@ from executive.errors import InputError
 from executive.speech.denoise import less_noisy
 from executive.speech.extra import speech_module
 from executive.speech.recogniser import Transcript
-from executive.speech.sound import RATE_HZ, Samples
+from executive.speech.sound import RATE_HZ, Samples, range_db
 from executive.speech.vocabulary import Vocabulary
 
 __all__ = ["WhisperRecogniser", "load_whisper"]
@@ -33,6 +33,10 @@ _SMALL_FILES: Final = ("config.json", "vocabulary.txt", "tokenizer.json")
 _THREADS: Final = 2
 _BEAM: Final = 5
 _WIDE_BEAM: Final = 10
+_NOISY_RANGE_DB: Final = 22.0
+_AT_A_TIME: Final = 4
+_PER_TOKEN: Final = 1.0
+"""Added for each token, since a longer text is not for that the less likely."""
 _PADDING_S: Final = 10.0
 """So much silence is heard behind the sound. Whisper was trained on 30 s throughout; with less than some seconds it
 repeats itself, and with all 30 the encoder takes three times as long."""
@@ -104,7 +108,11 @@ class WhisperRecogniser:
         return tuple(transcript for transcript in found if transcript.text)
 
     def likelihoods(self, encoded: Any, length_s: float, texts: Sequence[str]) -> list[float]:
-        """The log likelihood of each text, without any prompt."""
+        """The log likelihood of each text, without any prompt, weighed for its length; a few at a time."""
+        few = [texts[first : first + _AT_A_TIME] for first in range(0, len(texts), _AT_A_TIME)]
+        return [told for some in few for told in self._aligned(encoded, length_s, some)]
+
+    def _aligned(self, encoded: Any, length_s: float, texts: Sequence[str]) -> list[float]:
         several = np.repeat(np.asarray(encoded), len(texts), axis=0)
         aligned = self._whisper.model.align(
             self._ctranslate2.StorageView.from_array(np.ascontiguousarray(several)),
@@ -113,7 +121,7 @@ class WhisperRecogniser:
             max(int(length_s * _FRAMES_PER_S), 2),
             median_filter_width=1,
         )
-        return [sum(math.log(max(p, 1e-9)) for p in one.text_token_probs) for one in aligned]
+        return [sum(math.log(max(p, 1e-9)) + _PER_TOKEN for p in one.text_token_probs) for one in aligned]
 
     def _start(self, prompt: str) -> list[int]:
         told = self._tokens.encode(f" {prompt}") if prompt else []
@@ -140,11 +148,24 @@ class WhisperRecognition:
         """The readings, likeliest first; none when nothing was said."""
         return self._owner.search(self._encoded, self._prompt, beam=_BEAM)
 
+    @property
+    def noisy(self) -> bool:
+        """Whether voices stand out little from the rest of the sound."""
+        return range_db(self._sound) < _NOISY_RANGE_DB
+
     def more(self) -> Iterator[tuple[Transcript, ...]]:
         """The readings of the sound with less noise, and then those of a wider search in the sound as it is."""
-        yield self._owner.search(self._owner.encoded(less_noisy(self._sound)), self._prompt, beam=_BEAM)
+        yield self._owner.search(self._quieter, self._prompt, beam=_BEAM)
         yield self._owner.search(self._encoded, self._prompt, beam=_WIDE_BEAM)
 
     def likelihoods(self, texts: Sequence[str]) -> list[float]:
-        """The log likelihood of each text given the sound."""
-        return self._owner.likelihoods(self._encoded, len(self._sound) / RATE_HZ, texts) if texts else []
+        """The log likelihood of each text given the sound; a noisy sound is also asked with less noise."""
+        if not texts:
+            return []
+        heard = [self._encoded, self._quieter] if self.noisy else [self._encoded]
+        told = [self._owner.likelihoods(encoded, len(self._sound) / RATE_HZ, texts) for encoded in heard]
+        return [sum(one) / len(told) for one in zip(*told, strict=True)]
+
+    @cached_property
+    def _quieter(self) -> Any:
+        return self._owner.encoded(less_noisy(self._sound))

@@ -1,0 +1,165 @@
+"""`errand listen` and `errand run --listen`, with a recogniser that follows a script."""
+
+import io
+import json
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+import executive.cli.listen_command as listen_command
+from executive.cli.listen_command import answer_line, hear_request, show_hearing
+from executive.cli.main import app
+from executive.errors import InputError
+from executive.language import Status, Understanding
+from executive.speech.microphone import follow
+from executive.testing.speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, write_wav
+
+GO = "Hey Alice, go to the kitchen."
+KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
+KEYS = {"file", "transcript", "addressed", "status", "commands", "reason"}
+
+
+@pytest.fixture
+def says(monkeypatch):
+    """Makes the recogniser hear the given texts one after another."""
+
+    def script(*texts):
+        monkeypatch.setattr(listen_command, "load_whisper", lambda: ScriptedRecogniser(list(texts)))
+        monkeypatch.setattr(listen_command, "load_detector", LoudIsSpeech)
+
+    return script
+
+
+@pytest.fixture
+def wav(tmp_path):
+    return write_wav(tmp_path / "a.wav", speech_like(0.5, 2.0, 0.5))
+
+
+def _listen(*arguments):
+    return CliRunner().invoke(app, ["listen", *map(str, arguments)])
+
+
+def _lines(result):
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+def test_transcript_and_commands_are_shown(says, wav):
+    says(GO)
+    result = _listen(wav)
+    assert result.exit_code == 0
+    assert GO in result.stdout and KITCHEN in result.stdout
+
+
+def test_each_file_is_one_line_for_scripts(says, wav):
+    says(GO, "What a day.")
+    first, second = _lines(_listen(wav, wav, "--jsonl"))
+    assert set(first) >= KEYS
+    assert (first["file"], first["addressed"], first["status"]) == (str(wav), True, "ok")
+    assert (second["addressed"], second["status"], second["commands"]) == (False, "not_addressed", [])
+
+
+def test_without_the_wake_phrase_only_when_it_may_be_left_out(says, wav):
+    says("Go to the kitchen.")
+    assert _listen(wav).exit_code == 2
+    says("Go to the kitchen.")
+    assert _listen(wav, "--no-wake").exit_code == 0
+
+
+def test_open_words_stay_as_spoken_and_are_matched_to_the_vocabulary(says, wav, tmp_path):
+    names = tmp_path / "names.txt"
+    names.write_text("big dish\nwashing machine\n")
+    says("Take the big fish to the washing machine.")
+    (told,) = _lines(_listen(wav, "--jsonl", "--open", "--no-wake", "--vocabulary", names))
+    assert told["commands"][-1]["item"] == "big dish"
+    assert told["commands"][-1]["goal"] == "washing machine"
+
+
+def test_the_robot_may_have_another_name(says, wav):
+    says("Hey Bob, go to the kitchen.")
+    (told,) = _lines(_listen(wav, "--jsonl", "--robot", "Bob"))
+    assert told["addressed"] and told["status"] == "ok"
+
+
+def test_a_broken_file_is_told_and_the_others_are_heard(says, wav, tmp_path):
+    broken = tmp_path / "b.wav"
+    broken.write_text("Hey Alice")
+    says(GO)
+    result = _listen(broken, wav, "--jsonl")
+    bad, good = _lines(result)
+    assert result.exit_code == 2
+    assert set(bad) >= KEYS and "no wav file" in bad["reason"] and str(broken) in result.stderr
+    assert good["status"] == "ok"
+
+
+def test_a_silent_file_is_refused(says, tmp_path):
+    says()
+    (told,) = _lines(_listen(write_wav(tmp_path / "s.wav", silence(2.0)), "--jsonl"))
+    assert (told["status"], told["reason"]) == ("refused", "the recording is silent")
+
+
+@pytest.mark.parametrize("arguments", [(), ("--mic", "a.wav")])
+def test_files_or_the_microphone_are_wanted(arguments):
+    result = _listen(*arguments)
+    assert result.exit_code == 2 and "wav files or --mic" in result.stderr
+
+
+def test_a_missing_vocabulary_is_told(says, wav, tmp_path):
+    says(GO)
+    result = _listen(wav, "--vocabulary", tmp_path / "none.txt")
+    assert result.exit_code == 2 and "none.txt" in result.stderr
+
+
+def test_the_request_to_run_is_what_was_heard(says, wav):
+    says("High Alice, go to the kitchen.")
+    console = Console(file=io.StringIO())
+    assert hear_request(wav, None, world="flat", require_wake=True, console=console) == "Hey Alice, go to the kitchen."
+    assert "heard: Hey Alice" in console.file.getvalue()
+
+
+def test_there_is_no_second_request_beside_the_one_heard(wav):
+    with pytest.raises(InputError, match="stands alone"):
+        hear_request(wav, "go home", world=None, require_wake=True, console=Console(file=io.StringIO()))
+
+
+def test_a_silent_request_is_refused_with_its_file(says, tmp_path):
+    says()
+    file = write_wav(tmp_path / "s.wav", silence(1.0))
+    result = CliRunner().invoke(app, ["run", "--listen", str(file), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2 and "silent" in result.stderr and str(file) in result.stderr
+
+
+class Heard:
+    """A voice that notes what it is to say."""
+
+    def __init__(self):
+        self.said = []
+
+    def say(self, text):
+        self.said.append(text)
+
+
+def test_the_microphones_sentences_are_answered_in_text_and_aloud(says, flat_listener):
+    sound = speech_like(0.5, 2.0, 1.5, 2.0, 1.5)
+    console, voice = Console(file=io.StringIO(), width=120), Heard()
+    blocks = (sound[at : at + 1600] for at in range(0, len(sound), 1600))
+    show_hearing(follow(blocks, flat_listener(GO, "Go to the hall.")), console, voice)
+    shown = console.file.getvalue()
+    assert GO in shown and f"All right: {KITCHEN}" in shown and "name was not said" in shown
+    assert voice.said == ["All right."]
+
+
+@pytest.fixture
+def flat_listener(says):
+    def listener(*texts):
+        says(*texts)
+        knowledge = listen_command.knowledge_of(listen_command.open_world("flat"))
+        return listen_command.listener_for(knowledge)
+
+    return listener
+
+
+def test_answers_are_one_line():
+    refused = Understanding("", Status.REFUSED, reason="I know no thing 'x'; known: y")
+    assert answer_line(refused) == "I know no thing 'x'"
+    assert answer_line(Understanding("", Status.REFUSED)) == "I did not understand."

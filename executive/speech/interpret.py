@@ -88,7 +88,7 @@ def _likeliest(
     if not fitting or not (fitting[0].changes or recognition.noisy):
         return fitting[0] if fitting else None
     if recognition.noisy:
-        fitting = [*fitting, *variants(fitting[0], read, alikes)]
+        fitting = [*fitting[:_MOST_MENDED], *variants(fitting[0], read, alikes)]
     unmended, *likelihoods = recognition.likelihoods([first.text, *(one.text for one in fitting)])
     weighed = zip(likelihoods, fitting, strict=True)
     best, found = max(weighed, key=lambda pair: pair[0] - _PER_SOUND * pair[1].cost)

@@ -74,29 +74,58 @@ def repairs(
 
 
 def variants(
-    heard: Repair[Meaning], read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes, *, most: int = 6
+    heard: Repair[Meaning], read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes, *, most: int = 4
 ) -> list[Repair[Meaning]]:
     """At most so many sentences that fit and have another known name, of like sound, in the place of one of theirs."""
     words = tuple(heard.text.split())
-    changed = sorted(_changed(words, alikes.names_in(heard.text), alikes, names_only=True))[: 2 * most]
-    found = (
-        Repair(" ".join(other), heard.cost + cost, read(" ".join(other)), heard.changes + 1) for cost, other in changed
+    changed = sorted(
+        (alike.cost + _PER_CHANGE, other)
+        for start, end in _named_spans(words, alikes)
+        for alike, other in _replaced(words, start, end, alikes)
+        if alike.name
     )
+    texts = ((heard.cost + cost, " ".join(other)) for cost, other in changed[: 2 * most])
+    found = (Repair(text, cost, read(text), heard.changes + 1) for cost, text in texts)
     return list(islice((one for one in found if one.reading.fits), most))
 
 
 def _changed(
-    words: tuple[str, ...], suspects: Sequence[str], alikes: SoundAlikes, *, names_only: bool = False
+    words: tuple[str, ...], suspects: Sequence[str], alikes: SoundAlikes
 ) -> Iterator[tuple[float, tuple[str, ...]]]:
     """The sentences with one group of words changed, and the cost of that."""
-    blamed = _blamed(words, suspects) if suspects or not names_only else set[int]()
-    for start, end in _spans(len(words), blamed):
-        spoken = " ".join(map(_bare, words[start:end]))
-        tail = re.sub(r".*[\w']", "", words[end - 1])
-        price = _PER_CHANGE + _PER_KNOWN_WORD * sum(alikes.knows(word) for word in spoken.split())
-        for alike in alikes.of(spoken):
-            if _stands(words[:start], alike) and alike.name >= names_only:
-                yield alike.cost + price, (*words[:start], *f"{alike.phrase}{tail}".split(), *words[end:])
+    for start, end in _spans(len(words), _blamed(words, suspects)):
+        known = sum(alikes.knows(_bare(word)) for word in words[start:end])
+        for alike, other in _replaced(words, start, end, alikes):
+            yield alike.cost + _PER_CHANGE + _PER_KNOWN_WORD * known, other
+
+
+def _replaced(
+    words: tuple[str, ...], start: int, end: int, alikes: SoundAlikes
+) -> Iterator[tuple[Alike, tuple[str, ...]]]:
+    """The sentences with a known phrase of like sound in the place of those words."""
+    tail = re.sub(r".*[\w']", "", words[end - 1])
+    for alike in alikes.of(" ".join(map(_bare, words[start:end]))):
+        if _stands(words[:start], alike):
+            yield alike, (*_before(words[:start], alike), *f"{alike.phrase}{tail}".split(), *words[end:])
+
+
+def _before(words: tuple[str, ...], alike: Alike) -> tuple[str, ...]:
+    """The words before a phrase; no comma parts a preposition from them."""
+    joins = bool(words) and alike.phrase.split()[0] in _PREPOSITIONS
+    return (*words[:-1], words[-1].rstrip(",")) if joins else words
+
+
+def _named_spans(words: Sequence[str], alikes: SoundAlikes) -> list[tuple[int, int]]:
+    """Where known names stand, the longest first."""
+    bare = [_bare(word).lower() for word in words]
+    taken, kept = set[int](), list[tuple[int, int]]()
+    for length in range(_MOST_WORDS, 0, -1):
+        for start in range(len(words) - length + 1):
+            span = set(range(start, start + length))
+            if not taken & span and alikes.is_name(" ".join(bare[start : start + length])):
+                taken |= span
+                kept.append((start, start + length))
+    return kept
 
 
 def _stands(before: Sequence[str], alike: Alike) -> bool:
@@ -148,5 +177,6 @@ _MOST_READINGS: Final = 32
 _MOST_COST: Final = 4.5
 _PER_CHANGE: Final = 0.3
 _PER_KNOWN_WORD: Final = 0.4
+_PREPOSITIONS: Final = frozenset({"to", "from", "on", "in", "at"})
 _ARTICLES: Final = frozenset({"the", "a", "an"})
 _BEFORE_NAMES: Final = _ARTICLES | {"my", "two", "three", "four", "five"}

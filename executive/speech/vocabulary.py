@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,7 +33,13 @@ class Vocabulary:
             f"{call[0]} you get me one? {call[1]} you please go there. {call[2]} it. "
             f"{call[3]} pick it up, move it from here and give it to me."
         ).format(self.robot_name)
-        return f"{', '.join(self.names)}. {turns}" if self.names else turns
+        return f"{', '.join(_longest(self.names))}. {turns}" if self.names else turns
+
+
+def _longest(names: Sequence[str]) -> list[str]:
+    """The names that stand in no other one: what is said in a longer name is expected alone as well."""
+    spaced = [f" {name.lower()} " for name in names]
+    return [name for name in names if sum(f" {name.lower()} " in other for other in spaced) == 1]
 
 
 def of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:

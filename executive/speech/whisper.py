@@ -41,6 +41,8 @@ _PADDING_S: Final = 10.0
 """So much silence is heard behind the sound. Whisper was trained on 30 s throughout; with less than some seconds it
 repeats itself, and with all 30 the encoder takes three times as long."""
 _WINDOW_S: Final = 30.0
+_MOST_TOLD: Final = 300
+"""Tokens of the prompt. Whisper was trained with 223 and has room for 448 with the text."""
 _NO_SPEECH: Final = 0.8
 _WEAK_READING: Final = -1.0
 """With so little likelihood per token, and so high a probability that nobody spoke, nothing was said."""
@@ -124,9 +126,10 @@ class WhisperRecogniser:
         return [sum(math.log(max(p, 1e-9)) + _PER_TOKEN for p in one.text_token_probs) for one in aligned]
 
     def _start(self, prompt: str) -> list[int]:
-        told = self._tokens.encode(f" {prompt}") if prompt else []
-        start: list[int] = self._whisper.get_prompt(self._tokens, told, without_timestamps=True)
-        return start
+        """The tokens before a text: the end of what was said before, the language, the task, and no times."""
+        told = self._tokens.encode(f" {prompt}")[-_MOST_TOLD:] if prompt else []
+        before = [self._tokens.sot_prev, *told] if told else []
+        return [*before, *self._tokens.sot_sequence, self._tokens.no_timestamps]
 
     def encoded(self, sound: Samples) -> Any:
         """The sound as the encoder hears it, some silence behind it."""

@@ -23,6 +23,10 @@ def test_the_prompt_holds_the_names_and_how_one_calls():
     assert "Names" not in Vocabulary().prompt
 
 
+def test_names_that_stand_in_longer_ones_are_not_told_twice():
+    assert Vocabulary(("coke", "can of coke", "desk")).prompt.startswith("can of coke, desk. ")
+
+
 def test_a_file_of_names_has_one_on_each_line(tmp_path):
     file = tmp_path / "names.txt"
     file.write_text("\ufeffbig dish\n\n  washing   machine \nbig dish\n", encoding="utf-8")

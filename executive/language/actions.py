@@ -9,7 +9,7 @@ from typing import Final
 
 from executive.language.clauses import Clause
 from executive.language.items import Being, Chunk, Outside, Separator, Unknown, Verb, Whether, spoken_words
-from executive.language.lexicon import Lexicon, VerbKind, lexicon
+from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind, lexicon
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, Location, Roles, read_roles
 
@@ -21,7 +21,7 @@ class Action:
     """One verb's work: `objects` are what it is done to, `source` where those are, `goal` where they or the robot go.
 
     `kind` is None for a statement, which only tells where something is. `said` is all that was said of it, `unknown`
-    the words that do not fit.
+    the words that do not fit, `choices` phrases of which only one can be meant, `teller` who told by what they did.
     """
 
     kind: VerbKind | None
@@ -31,14 +31,17 @@ class Action:
     goal: Location | None = None
     unknown: tuple[str, ...] = ()
     said: str = ""
+    choices: tuple[tuple[Phrase, ...], ...] = ()
+    teller: Phrase | None = None
 
 
+_FRONTED: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 
 def read_actions(clauses: Sequence[Clause], words: Lexicon) -> tuple[Action, ...]:
     """The actions of all clauses, in order."""
-    merged = list(_without_checks(_without_reasons(clauses)))
+    merged = list(_without_checks(_without_reasons(_with_fronted(clauses))))
     found = [replace(action, said=_said(clause)) for clause in merged for action in _actions(clause, words)]
     return tuple(action for action in found[:-1] if not _goes_nowhere(action)) + tuple(found[-1:])
 
@@ -52,6 +55,16 @@ def _said(clause: Clause) -> str:
 def _goes_nowhere(action: Action) -> bool:
     """Whether it is the "go" of "go and find", which says nothing of its own."""
     return action.kind is VerbKind.GO and action.goal is None and action.unknown == (action.verb,)
+
+
+def _with_fronted(clauses: Sequence[Clause]) -> Sequence[Clause]:
+    """Put a place that stands before the first verb behind it: "from the kitchen bring me a spoon"."""
+    if len(clauses) < 2 or clauses[0].verb is not None or not isinstance(clauses[1].verb, Verb | Being):
+        return clauses
+    fronted = [item for item in clauses[0].items if not isinstance(item, Separator)]
+    places = all(isinstance(item, Chunk) and item.role in _FRONTED for item in fronted)
+    first = replace(clauses[1], items=(*clauses[1].items, *fronted))
+    return (first, *clauses[2:]) if places else clauses
 
 
 def _without_reasons(clauses: Sequence[Clause]) -> Sequence[Clause]:
@@ -92,8 +105,9 @@ def _actions(clause: Clause, words: Lexicon) -> Iterator[Action]:
 
 def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     """A status check ("is there a hammer in the workshop"), or a statement ("there is a hammer in the workshop")."""
-    if _is_state(clause):
-        return Action(None, being.text)
+    if _is_state(clause, being):
+        named = clause.subject is not None and not (clause.subject.phrase.speaker or clause.subject.phrase.pronoun)
+        return Action(None, being.text, (clause.subject.phrase,) if named and clause.subject else ())
     if clause.subject is not None and clause.subject.phrase.speaker and not being.asked:
         return _lacking(clause, being, words)
     roles = read_roles(clause.items, words, describes=False)
@@ -102,11 +116,12 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     place = next(iter(places), None)
     simple = len(objects) == 1 and len(places) <= 1 and not roles.goals and not roles.unknown
     fits = simple and (place or being.existential)
-    asked_for = any(t.tag in _QUESTION_TAGS for phrase in objects for t in phrase.tokens)
+    asked_for = any(map(_asks, objects))
     before = [clause.subject] if clause.subject else []
     unknown = () if fits and not asked_for else (spoken_words([*before, being, *clause.items]),)
     asked = being.asked or clause.whether
-    return Action(VerbKind.FIND if asked else None, "be", tuple(objects[:1]), place, unknown=unknown)
+    kind = VerbKind.FIND if asked else None
+    return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, teller=being.teller)
 
 
 def _lacking(clause: Clause, being: Being, words: Lexicon) -> Action:
@@ -117,17 +132,23 @@ def _lacking(clause: Clause, being: Being, words: Lexicon) -> Action:
     return Action(None, being.text, tuple(lacked), place, unknown=(*roles.unknown, *(p.spoken for p in roles.objects)))
 
 
-def _is_state(clause: Clause) -> bool:
-    """Whether the speaker only tells how they feel ("I'm thirsty"): a reason, and nothing to do."""
-    speaker = clause.subject is not None and clause.subject.phrase.speaker
-    return speaker and all(isinstance(item, Unknown | Separator) for item in clause.items)
+def _is_state(clause: Clause, being: Being) -> bool:
+    """Whether it only tells how things are ("I'm thirsty", "the baby is crying"): a reason, and nothing to do."""
+    if clause.subject is None or clause.whether or (being.asked and _asks(clause.subject.phrase)):
+        return False
+    told = any(isinstance(item, Unknown) for item in clause.items) or clause.subject.phrase.speaker
+    return told and all(isinstance(item, Unknown | Separator) for item in clause.items)
+
+
+def _asks(phrase: Phrase) -> bool:
+    return any(token.tag in _QUESTION_TAGS for token in phrase.tokens)
 
 
 def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
     going = verb.kinds == {VerbKind.GO}
     roles = read_roles(clause.items, words, describes=not going, puts=VerbKind.PLACE in verb.kinds)
     kind = _kind(verb, roles)
-    blank = Action(kind, verb.text, unknown=tuple(roles.unknown))
+    blank = Action(kind, verb.text, unknown=tuple(roles.unknown), choices=tuple(map(tuple, roles.choices)))
     if kind is VerbKind.GO:
         yield from _going(blank, roles, words)
     elif kind is VerbKind.FIND or (kind is VerbKind.CHECK and roles.searched is not None):
@@ -148,6 +169,8 @@ def _kind(verb: Verb, roles: Roles) -> VerbKind:
 def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     """One action for each place to go to."""
     bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
+    if bare and blank.verb not in words.bare_goal:
+        blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
     places = [*roles.goals, *roles.ats, *bare, *roles.joined_goals]
     if not places and blank.verb in words.goes_back:
         places = [HERE]
@@ -184,7 +207,10 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     sources += ats
     goal = next(iter(goals), None)
     shared = roles.joined_goals if goal is not None and _for_each(roles) else []
-    extra = [place.text for place in (*sources[1:], *_others(goals), *([] if shared else roles.joined_goals))]
+    rivals = [place.phrase for place in ([] if shared else [goal, *roles.joined_goals]) if place and place.phrase]
+    if len(rivals) > 1:
+        blank = replace(blank, choices=(*blank.choices, tuple(rivals)))
+    extra = [place.text for place in (*sources[1:], *_others(goals))]
     extra += [roles.searched.text] if roles.searched is not None else []
     source = next(iter(sources), None)
     carried = _with_object(replace(blank, objects=tuple(roles.objects), source=source, goal=goal), extra)

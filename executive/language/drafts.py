@@ -48,6 +48,10 @@ def draft_commands(deeds: Sequence[Deed]) -> tuple[Draft, ...]:
         later = any(other.again and other.target == deed.target for other in joined[index + 1 :])
         if _goal(deed, later) is None and deed.verb in lexicon().goal_wanted and not later:
             raise RefusalError(f"{deed.verb} {_name(deed)}: where to?", question=True)
+        if _carried_on(deed, joined[index + 1 :]):
+            drafts += [*_taking(deed, held), *_passing(deed, joined[index + 1])]
+            held = deed.target
+            continue
         drafts += _drafts(deed, held, later)
         held = _held_after(deed, held, later)
     return tuple(drafts)
@@ -76,7 +80,8 @@ def _without_wishes(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
 def _meets(deed: Deed, wish: Deed) -> bool:
     """Whether a deed goes once more for what a wish asks to be brought."""
     same = deed.target is not None and wish.target is not None and deed.target.tokens == wish.target.tokens
-    wished = wish.kind is VerbKind.ROUND_TRIP and wish.goal is HERE and wish.source is None and not wish.again
+    somebody = wish.goal is not None and (wish.goal is HERE or wish.goal.living)
+    wished = wish.kind is VerbKind.ROUND_TRIP and somebody and wish.source is None and not wish.again
     return same and wished and deed.again and deed.kind in _FETCHES
 
 
@@ -100,12 +105,32 @@ def _drafts(deed: Deed, held: Phrase | None, later: bool) -> Iterator[Draft]:
         yield from _handling(deed, held, later)
 
 
+def _carried_on(deed: Deed, after: Sequence[Deed]) -> bool:
+    """Whether what is carried somewhere is then put down there: "take it to the bathroom, set it on the shelf"."""
+    carries = deed.kind in _GOES_FOR and deed.goal is not None and deed.goal is not HERE and not deed.goal.person
+    puts = bool(after) and after[0].kind is VerbKind.PLACE and after[0].again and after[0].target == deed.target
+    return carries and puts and after[0].goal is not None and after[0].goal is not HERE
+
+
+def _taking(deed: Deed, held: Phrase | None) -> Iterator[Draft]:
+    """Going for a thing, unless it is in the hand."""
+    if held != deed.target:
+        yield Draft(deed.verb, goal=deed.source, task=Task.GRASP, object=deed.target)
+
+
+def _passing(deed: Deed, puts: Deed) -> Iterator[Draft]:
+    """Going, with the thing in the hand, by where it was to be carried, unless it is put down right there."""
+    same = deed.goal is not None and puts.goal is not None and deed.goal.name == puts.goal.name
+    if not same:
+        yield Draft(deed.verb, goal=deed.goal)
+
+
 def _handling(deed: Deed, held: Phrase | None, later: bool) -> Iterator[Draft]:
     """Going for a thing unless it is in the hand, and carrying it where a goal is said."""
     goal = _goal(deed, later)
     sets_down = deed.kind is VerbKind.PLACE
-    if held != deed.target and not (sets_down and goal is None):
-        yield Draft(deed.verb, goal=deed.source, task=Task.GRASP, object=deed.target)
+    if not (sets_down and goal is None):
+        yield from _taking(deed, held)
     if sets_down:
         yield Draft(deed.verb, item=deed.target, goal=goal, task=Task.PLACE, object=deed.target)
     elif goal is not None:

@@ -64,11 +64,15 @@ class Adverb:
 
 @dataclass(frozen=True)
 class Being:
-    """A form of "to be" as spoken; `existential` with "there", `asked` when it stands before its subject."""
+    """A form of "to be" as spoken; `existential` with "there", `asked` when it stands before its subject.
+
+    `teller` is somebody who did something with a thing, so that it is where it is ("Anna left her umbrella").
+    """
 
     text: str
     existential: bool
     asked: bool
+    teller: Phrase | None = None
 
 
 @dataclass(frozen=True)

@@ -62,6 +62,9 @@ class Lexicon:
     hesitations: tuple[str, ...]
     speaker: frozenset[str]
     pronouns: frozenset[str]
+    levels: frozenset[str]
+    bare_goal: frozenset[str]
+    needs: frozenset[Phrase]
     here: frozenset[str]
     there: frozenset[str]
     people: frozenset[str]
@@ -77,6 +80,8 @@ class Lexicon:
     negations: frozenset[Phrase]
     corrections: Mapping[Phrase, bool]
     light_nouns: Mapping[str, frozenset[str]]
+    light_whole: frozenset[str]
+    calls: frozenset[str]
 
 
 @cache
@@ -88,6 +93,8 @@ def lexicon() -> Lexicon:
         at_is_goal=frozenset(verbs["at_is_goal"]),
         goal_wanted=frozenset(verbs["goal_wanted"]),
         goes_back=frozenset(verbs["goes_back"]),
+        bare_goal=frozenset(verbs["bare_goal"]),
+        needs=_phrases(words["needs"]),
         prepositions={
             tuple(phrase.split()): PrepositionRole(role)
             for role, phrases in words["prepositions"].items()
@@ -115,6 +122,7 @@ _WORD_SETS: Final = (
     "speaker",
     "pronouns",
     "here",
+    "levels",
     "there",
     "people",
     "everyone",
@@ -126,6 +134,8 @@ _WORD_SETS: Final = (
     "subjects",
     "asks",
     "told",
+    "light_whole",
+    "calls",
 )
 
 

@@ -41,7 +41,7 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
     if ahead and isinstance(ahead[0], Verb) and not (done and isinstance(done[-1], Being)):
         return done, _behind_clause(ahead)
     if ahead and isinstance(ahead[0], Chunk) and not (done and isinstance(done[-1], Being)):
-        return done, _behind_chunks(ahead)
+        return done, _told_apart(_behind_chunks(ahead), ahead[0].phrase)
     return [*done, Unknown(mark.word)], rest
 
 
@@ -53,6 +53,15 @@ def _behind_clause(ahead: list[Item]) -> list[Item]:
     turn = next(turns, None)
     kept = [] if turn is None or turn + 1 == end else [verb, *clause[turn + 1 : end]]
     return [Separator(","), *kept, *clause[end:]]
+
+
+def _told_apart(rest: list[Item], negated: Phrase) -> list[Item]:
+    """What follows, with "one" standing for what was negated ("not the red cup but the blue one")."""
+    at = next((n for n, item in enumerate(rest) if not isinstance(item, Separator)), len(rest))
+    new = rest[at] if at < len(rest) else None
+    if not isinstance(new, Chunk) or not new.phrase.stands_for_one:
+        return rest
+    return [*rest[:at], replace(new, phrase=new.phrase.instead_of_one(negated)), *rest[at + 1 :]]
 
 
 def _behind_chunks(ahead: list[Item]) -> list[Item]:
@@ -69,8 +78,8 @@ def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[li
     verb = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), None)
     if not any(not isinstance(item, Separator) for item in done):
         return done, ahead
-    if ahead and isinstance(ahead[0], Verb) and verb is not None:
-        return done[:verb], ahead
+    if ahead and isinstance(ahead[0], Verb):
+        return done[: verb or 0], ahead
     if verb is None or not ahead or not isinstance(ahead[0], Chunk | Adverb):
         return (done, rest) if mark.soft else ([*done, Unknown(mark.word)], rest)
     while ahead and isinstance(new := ahead[0], Chunk | Adverb):

@@ -48,21 +48,21 @@ class Phrase:
     @property
     def text(self) -> str:
         """The words as spoken, without article, possessive and number."""
-        return " ".join((*(t.text for t in self._content()), *self.extra))
+        return _joined_text((*self.content, *self.extra))
 
     @property
     def singular(self) -> str:
         """The same with the noun in its dictionary form."""
-        *left, head = self._content()
-        return " ".join((*(t.text for t in left), head.lemma, *self.extra))
+        *left, head = self.content
+        return _joined_text((*left, head.lemma, *self.extra))
 
     @property
     def thing(self) -> Thing:
         """The phrase as a thing: leading adjectives are attributes."""
-        words = self._content()
+        words = self.content
         leads = (n for n, t in enumerate(words[:-1]) if not t.adjective)
         first = next(leads, len(words) - 1)
-        name = " ".join((*(t.text for t in words[first:]), *self.extra))
+        name = _joined_text((*words[first:], *self.extra))
         return Thing(name, tuple(t.text for t in words[:first]))
 
     @property
@@ -79,8 +79,10 @@ class Phrase:
     @property
     def said_count(self) -> int | None:
         """The number said, if any; that of "one" and "two" standing alone, too."""
-        words = self.tokens if self.counts else self.tokens[:-1]
+        words = self.tokens if self.counts else self._counting()
         said = next((n for n in map(_number, words) if n is not None), None)
+        if said is None and self.plural and self.tokens[0].word == "both":
+            said = 2
         return said if self.numbered is None else self.numbered
 
     @property
@@ -125,7 +127,8 @@ class Phrase:
         if self.head.known:
             return self.head.entity == "PERSON"
         proper = all(t.pos == "PROPN" for t in self.tokens)
-        titled = proper and self.tokens[0].word.rstrip(".") in _TITLES
+        somebody = proper or self.head.kind is NounKind.PERSON
+        titled = somebody and len(self.tokens) > 1 and self.tokens[0].word.rstrip(".") in _TITLES
         return titled or (self.head.kind is NounKind.PERSON and (proper or len(self.tokens) == 1))
 
     @property
@@ -140,8 +143,9 @@ class Phrase:
 
     @property
     def universal(self) -> bool:
-        """Whether it means all of a kind ("everyone", "all the men")."""
-        return any(t.word in lexicon().everyone for t in self.tokens)
+        """Whether it means all of a kind ("everyone", "all the men"); "all the forks" are only the forks."""
+        words = {t.word for t in self.tokens} & lexicon().everyone
+        return bool(words - {_ALL}) or (bool(words) and (self.person or not self.plural))
 
     @property
     def negative(self) -> bool:
@@ -208,17 +212,60 @@ class Phrase:
     def _determined(self) -> bool:
         return any(t.relation in ("det", "poss") for t in self.tokens)
 
-    def _content(self) -> tuple[Token, ...]:
+    @property
+    def content(self) -> tuple[Token, ...]:
+        """The words without article, possessive and number."""
         *left, head = self.tokens
-        return (*(t for t in left if not _is_determiner(t)), head)
+        units = {n for n in range(len(left)) if self._measures(n)}
+        mine = {n for n, t in enumerate(left) if t.tag == "POS" and left[n - 1].tag not in ("PRP$", "PRP")}
+        return (*(t for n, t in enumerate(left) if n in units | mine or not _is_determiner(t)), head)
+
+    def _counting(self) -> tuple[Token, ...]:
+        """The words before the noun among which a count may be; that of a measure is none ("ten inch nails")."""
+        return tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
+
+    def _measures(self, at: int) -> bool:
+        """Whether the number there belongs to a unit of measure."""
+        return at + 2 < len(self.tokens) and _number(self.tokens[at]) is not None and self.tokens[at + 1].word in _UNITS
 
 
+_ALL: Final = "all"
+_UNITS: Final = frozenset(
+    """millimetre millimeter centimetre centimeter metre meter inch foot mm cm litre liter ounce pound gram kilo
+    kilogram volt watt amp gallon pint""".split()  # noqa: SIM905
+)
 _VAGUE_NUMBERS: Final = frozenset({"few", "several", "many", "some", "any", "more", "enough", "another"})
-_TITLES: Final = frozenset({"mr", "mrs", "ms", "miss", "dr", "doctor", "professor", "sir", "madam", "uncle", "aunt"})
+_TITLES: Final = frozenset(
+    {
+        "mr",
+        "mrs",
+        "ms",
+        "miss",
+        "dr",
+        "doctor",
+        "professor",
+        "nurse",
+        "sister",
+        "officer",
+        "sir",
+        "madam",
+        "uncle",
+        "aunt",
+    }
+)
 _ONE: Final = frozenset({"one", "ones"})
 _DEFINITE: Final = frozenset(
     {"the", "this", "that", "these", "those", "my", "your", "his", "her", "its", "our", "their"}
 )
+
+
+def _joined_text(words: Sequence[Token | str]) -> str:
+    """The words with blanks between them, but none before the "'s" of an owner."""
+    text = ""
+    for word in words:
+        owner = isinstance(word, Token) and word.tag == "POS"
+        text += ("" if owner or not text else " ") + (word.text if isinstance(word, Token) else word)
+    return text
 
 
 def _is_determiner(token: Token) -> bool:
@@ -257,6 +304,8 @@ def _compounds(phrases: Mapping[int, Phrase]) -> dict[int, Phrase]:
 
 
 def _compound(before: Phrase, phrase: Phrase) -> bool:
+    if before.head.lemma in lexicon().people and phrase.named_person and phrase.proper:
+        return before.head.pos in ("NOUN", "PROPN") and not before.plural
     nouns = before.head.pos == "NOUN" and all(t.pos == "NOUN" for t in phrase.tokens)
     return nouns and not before.plural and not before.person and before.head.kind is not NounKind.PERSON
 

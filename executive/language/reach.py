@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 
 from executive.knowledge import Knowledge
 from executive.language.grounding import known_line
-from executive.language.lexicon import VerbKind, lexicon
+from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.reference import Deed
 from executive.language.refusal import RefusalError
-from executive.language.roles import HERE, Location
+from executive.language.roles import Location
 
 __all__ = ["check_reach", "not_understood"]
 
@@ -25,7 +25,8 @@ def check_reach(deeds: Sequence[Deed], knowledge: Knowledge | None) -> None:
     people = [f"{d.verb} {d.target.text}" for d in deeds if _carries(d) and d.target is not None and d.target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
-    outside = [(part, part) for deed in deeds for part in _outside(deed)]
+    moved = [deed.target for deed in deeds if _moved(deed)]
+    outside = [(part, part) for deed in deeds for part in _outside(deed, deed.target in moved)]
     if outside:
         raise not_understood(outside, knowledge)
 
@@ -47,9 +48,20 @@ def _carries(deed: Deed) -> bool:
     return deed.kind not in (VerbKind.GO, VerbKind.FIND)
 
 
-def _outside(deed: Deed) -> Iterator[str]:
-    """The parts of a deed that are out of reach."""
-    if deed.target is not None and (deed.target.universal or not _holdable(deed.target, deed)):
+def _moved(deed: Deed) -> bool:
+    """Whether a definite thing is taken from a place in the house, so that it is no idea ("the mail from the desk")."""
+    role = lexicon().prepositions.get(tuple(deed.source.preposition.split())) if deed.source is not None else None
+    place = None if deed.source is None else deed.source.phrase
+    if deed.target is None or place is None or role is not PrepositionRole.SOURCE or not _carries(deed):
+        return False
+    contained = place.kind is NounKind.THING and _fixture(deed.target)
+    named = not deed.target.indefinite and deed.target.kind is not NounKind.ELSEWHERE
+    return named and (contained or place.kind is NounKind.PLACE)
+
+
+def _outside(deed: Deed, moved: bool) -> Iterator[str]:
+    """The parts of a deed that are out of reach; `moved` says that its thing lies in a place of the house."""
+    if deed.target is not None and (deed.target.universal or not (moved or _holdable(deed.target, deed))):
         yield f"{deed.verb} {deed.target.spoken}"
     for place in (deed.source, deed.goal):
         yield from _outside_place(place, deed)
@@ -79,16 +91,25 @@ def _fixture(phrase: Phrase) -> bool:
 def _light(phrase: Phrase, deed: Deed) -> bool:
     """Whether verb and noun are one act, as in "take a picture": the noun is no thing then."""
     acts = lexicon().light_nouns.get(deed.verb.split()[0], frozenset())
-    elsewhere = deed.goal is not None and deed.goal is not HERE and not deed.goal.person
-    return phrase.head.lemma in acts and phrase.indefinite and deed.source is None and not elsewhere
+    elsewhere = deed.goal is not None and deed.goal.phrase is not None and deed.goal.phrase.kind is NounKind.PLACE
+    loose = phrase.indefinite or deed.verb in lexicon().light_whole
+    return phrase.head.lemma in acts and loose and deed.source is None and not elsewhere
 
 
 def _outside_place(place: Location | None, deed: Deed) -> Iterator[str]:
     while place is not None:
         phrase = place.phrase
-        if phrase is not None and (phrase.universal or not _reachable(phrase, place)):
+        idle = phrase is not None and deed.kind is VerbKind.GO and _idle(phrase, place, deed.verb)
+        if phrase is not None and (idle or phrase.universal or not _reachable(phrase, place)):
             yield f"{deed.verb} {place.preposition} {phrase.spoken}".replace("  ", " ")
         place = place.within
+
+
+def _idle(phrase: Phrase, place: Location, verb: str) -> bool:
+    """Whether going there is something else than a way: "go to bed", "reach my wife"."""
+    bare = len(phrase.tokens) == 1 and not phrase.known
+    called = verb in lexicon().calls and phrase.person and not phrase.named_person and place.within is None
+    return called or (bare and phrase.head.lemma in lexicon().light_nouns.get(verb.split()[0], frozenset()))
 
 
 def _reachable(phrase: Phrase, place: Location) -> bool:

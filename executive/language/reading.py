@@ -19,7 +19,7 @@ from executive.language.items import (
     Verb,
     Whether,
 )
-from executive.language.lexicon import Lexicon
+from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
 from executive.language.nouns import NounKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
@@ -30,6 +30,8 @@ _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
 _LONGEST: Final = 6
 _RELATIVE: Final = frozenset({"that", "which", "what"})
+_TIMES: Final = frozenset({"early", "hourly", "daily", "nightly", "weekly", "monthly", "yearly", "annually"})
+_BRING: Final = "bring"
 _SIDES: Final = frozenset({"left", "right"})
 _SHOWN: Final = frozenset({"that", "this", "those", "these"})
 _WHO: Final = frozenset({"who", "that", "which"})
@@ -46,7 +48,7 @@ class _Reader:
     at: int = 0
 
     def read(self) -> Iterable[Item]:
-        steps = (self._mark, self._told, self._verb, self._being, self._chunk, self._small, self._outside)
+        steps = (self._mark, self._told, self._needed, self._verb, self._being, self._chunk, self._small, self._outside)
         items: list[Item] = []
         while self.at < len(self.tokens):
             item = next((found for step in steps if (found := step(items)) is not None), None)
@@ -84,14 +86,31 @@ class _Reader:
         if not isinstance(subject, Chunk) or self.tokens[self.at].word not in self.words.told:
             return None
         phrase = subject.phrase
-        if subject.role is not None or not (phrase.head.word in self.words.subjects or phrase.named_person):
+        if subject.role is not None or not (phrase.head.word in self.words.subjects or phrase.person):
             return None
         items.pop()
         text = self._words(1)
         if items and isinstance(items[-1], Unknown) and items[-1].word.lower() in _RELATIVE:
             items.pop()
         relative = bool(items) and isinstance(items[-1], Chunk)
-        return Separator("") if relative else Being(text, existential=True, asked=False)
+        teller = phrase if phrase.person else None
+        return Separator("") if relative else Being(text, existential=True, asked=False, teller=teller)
+
+    def _needed(self, items: list[Item]) -> Item | None:
+        """ "The patient in room four needs a blanket" asks to bring somebody something."""
+        found = self._match(self.words.needs)
+        first = len(items) - 1
+        while found is not None and first > 0 and isinstance(item := items[first], Chunk) and item.role is not None:
+            first -= 1
+        who = items[first] if found is not None and first >= 0 else None
+        behind = self.tokens[self.at + len(found or ()) :][:1]
+        if found is None or not isinstance(who, Chunk) or not _may_need(who) or not _command_position(items[:first]):
+            return None
+        if not behind or behind[0].tag in ("TO", "IN") or behind[0].pos in ("PUNCT", "CCONJ"):
+            return None
+        self.at += len(found)
+        items.insert(first, Verb(_BRING, self.words.verbs[(_BRING,)]))
+        return Separator("")
 
     def _verb(self, items: list[Item]) -> Item | None:
         found = self._match(self.words.verbs) or self._gerund(items)
@@ -149,13 +168,27 @@ class _Reader:
         start = self.at + len(preposition)
         phrase = self._phrase_at(start) or self._shown_at(start)
         if phrase is None:
-            return None
+            return None if preposition else self._level(items)
         self.at = start + len(phrase.tokens)
         if phrase.negative:
             return Unknown(phrase.spoken)
         phrase = self._described(self._numbered(self._of(phrase)))
         role = self.words.prepositions[preposition] if preposition else None
         return Chunk(phrase, " ".join(preposition), role)
+
+    def _level(self, items: list[Item]) -> Item | None:
+        """ "Upstairs": where to, or where to look; before a place it says nothing more."""
+        token = self.tokens[self.at]
+        if token.word not in self.words.levels:
+            return None
+        self.at += 1
+        ahead = self.tokens[self.at : self.at + 1]
+        if ahead and (ahead[0].pos == "ADP" or ahead[0].tag in ("TO", "IN")):
+            return Separator("")
+        verb = next((item for item in reversed(items) if isinstance(item, Verb | Being)), None)
+        looks = not isinstance(verb, Verb) or VerbKind.FIND in verb.kinds
+        role = PrepositionRole.AT if looks else PrepositionRole.GOAL
+        return Chunk(Phrase((replace(token, pos="NOUN", tag="NN", kind=NounKind.PLACE),)), "", role)
 
     def _phrase_at(self, start: int) -> Phrase | None:
         """The noun phrase that begins at `start`, also when what came before took its first words."""
@@ -188,7 +221,8 @@ class _Reader:
         token = self.tokens[self.at] if self.at < len(self.tokens) else None
         behind = self.tokens[self.at + 1 : self.at + 2]
         counts = bool(behind) and behind[0].pos in ("NOUN", "ADJ", "PROPN")
-        if token is None or token.tag != "CD" or phrase.kind is not NounKind.PLACE or phrase.plural or counts:
+        countable = phrase.kind in (NounKind.PLACE, NounKind.THING) and not (phrase.plural or phrase.pronoun)
+        if token is None or token.tag != "CD" or not countable or counts:
             return phrase
         self.at += 1
         return phrase.with_extra(token.text)
@@ -253,6 +287,16 @@ class _Reader:
 
     def _small(self, items: list[Item]) -> Item | None:
         token = self.tokens[self.at]
+        if token.word in self.words.there and self._points(items):
+            self.at += 1
+            return Separator("")
+        behind = self.tokens[self.at + 1 : self.at + 2]
+        if token.tag == "RB" and token.word.endswith("ly") and token.word not in _TIMES:
+            self.at += 1
+            return Separator(token.word)
+        if token.pos in ("ADP", "ADV") and behind and behind[0].word in ("here", "there"):
+            self.at += 1
+            return Separator("")
         if token.word in self.words.here or token.word in self.words.there:
             self.at += 1
             return Adverb(here=token.word in self.words.here)
@@ -265,12 +309,22 @@ class _Reader:
         self.at += len(filler)
         return Separator(" ".join(filler))
 
+    def _points(self, items: Sequence[Item]) -> bool:
+        """Whether "over there" only goes with a "that", as in "that clamp over there"."""
+        thing = next((item for item in reversed(items) if not isinstance(item, Separator)), None)
+        if not isinstance(thing, Chunk) or thing.role is not None or self.tokens[self.at - 1].word != "over":
+            return False
+        return thing.phrase.tokens[0].word in _SHOWN and not thing.phrase.pronoun
+
     def _particle(self, items: list[Item]) -> tuple[str, ...] | None:
         """Join a particle to its verb: "put the cup down"."""
         at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Verb)), None)
         verb = None if at is None else items[at]
         particle = self.tokens[self.at].word
         if at is None or not isinstance(verb, Verb) or (*verb.text.split(), particle) not in self.words.verbs:
+            return None
+        behind = self.tokens[self.at + 1 : self.at + 2]
+        if behind and behind[0].word in self.words.here | self.words.there:
             return None
         items[at] = Verb(f"{verb.text} {particle}", self.words.verbs[(*verb.text.split(), particle)])
         return (particle,)
@@ -287,6 +341,12 @@ class _Reader:
         token = self.tokens[self.at]
         self.at += 1
         return Unknown(token.text)
+
+
+def _may_need(chunk: Chunk) -> bool:
+    """Whether it is somebody else who can be brought what they need."""
+    somebody = chunk.phrase.person or chunk.phrase.kind is NounKind.PERSON
+    return chunk.role is None and somebody and not chunk.phrase.stands_for_somebody
 
 
 def _command_position(items: Sequence[Item]) -> bool:

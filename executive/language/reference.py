@@ -75,11 +75,12 @@ def resolve(actions: Sequence[Action], memory: Memory) -> Resolved:
 def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
     memory = before.memory
     again = any(phrase.pronoun for phrase in action.objects)
-    things = _all_meant(action.objects, memory)
+    meant = _all_meant(action.objects, memory)
+    things = tuple(_named_before(thing, action, kind, before.deeds) or thing for thing in meant)
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
     told = again or any(phrase.stands_for_one for phrase in action.objects)
     source = source or (memory.where if told else None)
-    person = next((place for place in (goal, source) if place is not None and place.person), memory.person)
+    person = next((place for place in (goal, source) if place is not None and place.living), memory.person)
     after = Memory(
         things=things or memory.things,
         gathered=() if goal is not None else tuple(dict.fromkeys((*memory.gathered, *things))),
@@ -90,10 +91,19 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
     )
     looks = kind is not VerbKind.GO
     deeds = (
-        Deed(kind, action.verb, thing, source or (memory.where_is(thing) if thing and looks else None), goal, again)
+        Deed(kind, action.verb, thing, source or (memory.where_is(thing) if thing and looks else None), goal, same)
         for thing in things or (None,)
+        for same in [again or (thing is not None and thing not in meant)]
     )
     return Resolved((*before.deeds, *deeds), after, (*before.meanings, *_meanings(action, memory)))
+
+
+def _named_before(thing: Phrase, action: Action, kind: VerbKind, deeds: Sequence[Deed]) -> Phrase | None:
+    """The thing that was taken before under the same name: "get the bread, go to the hall and put the bread there"."""
+    if thing.indefinite or action.source is not None or kind not in (VerbKind.PLACE, VerbKind.SINGLE_TRIP):
+        return None
+    taken = (deed.target for deed in reversed(deeds) if deed.target is not None and deed.kind is not VerbKind.PLACE)
+    return next((target for target in taken if target.text.lower() == thing.text.lower()), None)
 
 
 def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
@@ -111,7 +121,8 @@ def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
 def _stated(action: Action, before: Resolved) -> Resolved:
     """Remember a statement; "it is in the drawer" tells where the thing of an earlier deed is."""
     where = _place(action.source, before.memory)
-    memory = replace(before.memory, where=where, place=where or before.memory.place)
+    person = before.memory.person if action.teller is None else Location(action.teller)
+    memory = replace(before.memory, where=where, place=where or before.memory.place, person=person)
     if not any(phrase.pronoun for phrase in action.objects):
         return replace(before, memory=_told(action, where, memory))
     told = tuple(

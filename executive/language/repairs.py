@@ -20,6 +20,8 @@ __all__ = ["repaired"]
 
 _AFTER_NOUN: Final = frozenset({"", "ADP", "PUNCT", "CCONJ"})
 _BEGINS_OBJECT: Final = frozenset({"DT", "PRP", "PRP$", "CD"})
+_DEMONSTRATIVES: Final = frozenset({"that", "this", "these", "those"})
+_BEFORE_INFINITIVE: Final = frozenset({"want", "need", "like", "love", "have", "try", "wish", "hope", "plan", "ask"})
 _BEFORE_NOUN: Final = frozenset({"det", "amod", "compound", "nmod", "nummod", "poss"})
 
 
@@ -35,6 +37,12 @@ def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
             _join_noun(found, at)
         elif _name(found, at):
             found[at] = replace(found[at], pos="PROPN", tag="NNP", relation="obl", head=at - 1)
+        elif _goal(found, at) or _department(found, at):
+            found[at] = replace(found[at], pos="NOUN", tag="NN", relation="obl", head=at - 1)
+        elif (noun := _owned(found, at)) is not None:
+            _own(found, at, noun)
+        elif _shown(found, at):
+            _show(found, at)
         elif _command(found, at):
             _part_verb(found, at)
     return tuple(found)
@@ -65,6 +73,40 @@ def _name(tokens: Sequence[Token], at: int) -> bool:
     return tokens[at].pos == "VERB" and tokens[at - 1].word == "to" and tokens[at].kind is NounKind.PERSON
 
 
+def _goal(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a verb behind "to" is a place and no infinitive ("proceed to checkpoint four", "run to park")."""
+    behind_to = tokens[at].pos == "VERB" and tokens[at].tag == "VB" and tokens[at - 1].word == "to" and at > 1
+    if not behind_to or tokens[at - 2].lemma in _BEFORE_INFINITIVE or tokens[at - 2].tag in ("WRB", "JJ"):
+        return False
+    numbered = _pos(tokens, at + 1) == "NUM" and _pos(tokens, at + 2) in _AFTER_NOUN
+    good = tokens[at].kind is NounKind.PLACE or (numbered and tokens[at].kind is NounKind.THING)
+    return good and (numbered or _pos(tokens, at + 1) in _AFTER_NOUN) and (tokens[at].word,) not in lexicon().verbs
+
+
+def _department(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a word in "-ing" behind a preposition is a place ("to Angela in accounting")."""
+    token = tokens[at]
+    place = token.tag == "VBG" and token.kind is NounKind.PLACE and _pos(tokens, at - 1) == "ADP"
+    return place and _pos(tokens, at + 1) in _AFTER_NOUN
+
+
+def _shown(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a verb behind "that" is the noun which is pointed at ("hand me that clamp")."""
+    token, that = tokens[at], tokens[at - 1]
+    verb = token.pos == "VERB" and token.tag in ("VB", "VBP", "VBD") and token.kind is NounKind.THING
+    pointed = that.word in _DEMONSTRATIVES and at > 1 and tokens[at - 2].pos in ("VERB", "PRON", "ADP")
+    return verb and pointed and (token.word,) not in lexicon().verbs and _pos(tokens, at + 1) not in ("PRON", "DET")
+
+
+def _owned(tokens: Sequence[Token], at: int) -> int | None:
+    """The noun that a lost possessive belongs to: "glasses" in "would like her reading glasses"."""
+    if tokens[at].tag != "PRP$" or tokens[at].relation == "poss":
+        return None
+    end = next((n for n in range(at + 1, len(tokens)) if tokens[n].tag not in ("VBG", "JJ", "NN")), len(tokens))
+    noun = end if end < len(tokens) and tokens[end].tag == "NNS" else end - 1
+    return noun if noun > at and tokens[noun].pos == "NOUN" else None
+
+
 def _command(tokens: Sequence[Token], at: int) -> bool:
     """Whether a noun behind a noun is a known verb before its object ("the counter look for the bowl")."""
     before = tokens[at - 1]
@@ -93,6 +135,22 @@ def _join_noun(tokens: list[Token], at: int) -> None:
     for n in range(at - 1):
         if tokens[n].head == at - 1:
             tokens[n] = replace(tokens[n], head=at)
+
+
+def _show(tokens: list[Token], at: int) -> None:
+    """Make a word a noun, or a part of the one behind it, and "that" before it its article."""
+    whole = _pos(tokens, at + 1) == "NOUN"
+    head = at + 1 if whole else at
+    tokens[at - 1] = replace(tokens[at - 1], pos="DET", tag="DT", relation="det", head=head)
+    relation, above = ("compound", head) if whole else ("obj", at - 2)
+    tokens[at] = replace(tokens[at], pos="NOUN", tag="NN", relation=relation, head=above)
+
+
+def _own(tokens: list[Token], at: int, noun: int) -> None:
+    """Make a possessive, and the words behind it, depend on the noun."""
+    tokens[at] = replace(tokens[at], relation="poss", head=noun)
+    for n in range(at + 1, noun):
+        tokens[n] = replace(tokens[n], relation="amod" if tokens[n].tag == "JJ" else "compound", head=noun)
 
 
 def _part_verb(tokens: list[Token], at: int) -> None:

@@ -32,6 +32,11 @@ class Location:
         return self.phrase is not None and self.phrase.person
 
     @property
+    def living(self) -> bool:
+        """Whether it is somebody, of whatever trade, or an animal: "him" and "her" can mean them."""
+        return self.phrase is not None and (self.phrase.person or self.phrase.kind is NounKind.PERSON)
+
+    @property
     def name(self) -> str:
         """The words of the place itself, without articles; "start" for HERE."""
         return _HERE_NAME if self.phrase is None else self.phrase.text
@@ -44,6 +49,7 @@ class Location:
         return f"{self.name} {self.within.preposition} {self.within.text}"
 
 
+_LISTING: Final = frozenset({",", ""})
 _HERE_NAME: Final = "start"
 HERE: Final = Location(None)
 THERE: Final = Location(None, preposition="there")
@@ -54,7 +60,7 @@ class Roles:
     """What stands behind a verb, sorted: bare noun phrases, places by their prepositions, and what is left over.
 
     `first_at` is where the first of the bare phrases is to be found when that is somebody, `listed` says that "and"
-    stands between them.
+    stands between them. `choices` are phrases with "or" between them.
     """
 
     objects: list[Phrase] = field(default_factory=list)
@@ -66,6 +72,7 @@ class Roles:
     goals: list[Location] = field(default_factory=list)
     ats: list[Location] = field(default_factory=list)
     joined_goals: list[Location] = field(default_factory=list)
+    choices: list[list[Phrase]] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
 
@@ -87,8 +94,15 @@ def read_roles(items: Sequence[Item], words: Lexicon, *, describes: bool, puts: 
     spoken = list(_spoken(items, roles))
     if describes:
         spoken = _describe(spoken)
+    row: list[_Placed] = []
     for one in _nested(spoken, puts):
+        if one.joint == "or" and row and one.chunk.role in (None, row[-1].chunk.role):
+            listed = _listed_before(row)
+            roles.choices.append([*listed, one.chunk.phrase])
+            roles.objects = [phrase for phrase in roles.objects if phrase not in listed[1:]]
+            continue
         _ADD[one.chunk.role](roles, one)
+        row.append(one)
     roles.goals += [HERE if item.here else THERE for item in items if isinstance(item, Adverb)]
     _split_recipient(roles)
     return roles
@@ -162,9 +176,21 @@ def _tells_closer(one: _Spoken, before: Chunk) -> bool:
     return place and one.chunk.role in _CLOSER and not one.joint and one.chunk.preposition != before.preposition
 
 
+def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
+    """The phrases that an "or" behind the row gives a choice of: the last, and what commas join to it."""
+    first = len(row) - 1
+    while first > 0 and row[first].joint in _LISTING and _alike(row[first - 1].chunk, row[first].chunk):
+        first -= 1
+    return [one.chunk.phrase for one in row[first:]]
+
+
+def _alike(before: Chunk, chunk: Chunk) -> bool:
+    """Whether two chunks can be of one list, the first not being who receives the second."""
+    receives = before.phrase.speaker or before.phrase.person or before.phrase.kind is NounKind.PERSON
+    return before.role == chunk.role and (not receives or chunk.phrase.person)
+
+
 def _add_bare(roles: Roles, one: _Placed) -> None:
-    if one.joint == "or" and roles.objects:
-        return
     roles.listed = roles.listed or (bool(one.joint) and bool(roles.objects))
     if one.joint and (roles.goals or roles.ats) and not roles.sources:
         roles.joined_goals.append(one.location)

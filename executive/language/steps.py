@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from executive.command import Command
+from executive.command import Command, is_attribute
 from executive.errors import listing
 from executive.knowledge import Knowledge
 from executive.language.actions import Action, read_actions
@@ -18,8 +18,10 @@ from executive.language.lexicon import lexicon
 from executive.language.mending import mended
 from executive.language.names import name_table, parse_with_names
 from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS, open_commands
+from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser, Token
-from executive.language.phrases import noun_phrases
+from executive.language.phrases import Phrase, noun_phrases
+from executive.language.questions import Slot, which
 from executive.language.reach import check_reach, not_understood
 from executive.language.reading import split_items
 from executive.language.reference import Deed, Memory, resolve
@@ -109,11 +111,33 @@ def _check(trace: Trace, context: _Context) -> Trace:
     unknown = [(word, action.said) for action in trace.actions for word in action.unknown]
     if unknown:
         raise not_understood(unknown, context.knowledge)
+    choices = [choice for action in trace.actions for choice in action.choices]
+    for choice in choices:
+        if not _any_will_do(choice):
+            raise _choosing(choice, trace.tokens)
+    notes = [f"of {listing((p.spoken for p in choice), last='or')} I take the first" for choice in choices]
+    trace = replace(trace, notes=(*trace.notes, *notes))
     if not any(action.kind for action in trace.actions):
         told = [phrase.text for action in trace.actions for phrase in action.objects]
         of = f" of {listing(told)}" if told else ""
         raise RefusalError(f"nothing to do was said{of}; {known_line(context.knowledge)}", told)
     return trace
+
+
+def _any_will_do(choice: Sequence[Phrase]) -> bool:
+    """Whether the speaker would take any one of them: "an apple or an orange"."""
+    return all(phrase.tokens[0].word in ("a", "an", "any", "some") and not phrase.person for phrase in choice)
+
+
+def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError:
+    """The question which of several is meant, where only one can be."""
+    heard = " ".join(t.text for t in tokens[choice[0].content[0].index : choice[-1].head.index + 1]).replace(" ,", ",")
+    place = all(phrase.kind is NounKind.PLACE for phrase in choice)
+    slot = Slot.PLACE if place else Slot.PERSON if all(phrase.person for phrase in choice) else Slot.THING
+    noun = choice[-1].head.text
+    names = (f"{p.text} {noun}" if is_attribute(p.head.text) else p.text for p in choice)
+    question = which(slot, slot.value, tuple(dict.fromkeys(names)))
+    return RefusalError(question.text, (heard,), question=replace(question, heard=heard))
 
 
 def _refer(trace: Trace, context: _Context) -> Trace:
@@ -135,7 +159,7 @@ def _command(trace: Trace, context: _Context) -> Trace:
         return replace(trace, commands=tuple(map(spoken_command, trace.drafts)))
     facts = context.parser if isinstance(context.parser, WordFacts) else None
     grounded = ground_noted(trace.drafts, context.knowledge, facts)
-    return replace(trace, commands=grounded.commands, notes=grounded.notes)
+    return replace(trace, commands=grounded.commands, notes=(*trace.notes, *grounded.notes))
 
 
 _STEPS: Final[dict[str, Callable[[Trace, _Context], Trace]]] = {

@@ -102,7 +102,7 @@ OPEN = {
         "Take [Nothing] to [Nothing] and do [grasp] to [glass of milk]",
         "Take [glass of milk] to [garden] and do [Nothing] to [Nothing]",
     ],
-    "find grandma's glasses": ["Take [Nothing] to [Nothing] and do [find] to [some grandma glasses]"],
+    "find grandma's glasses": ["Take [Nothing] to [Nothing] and do [find] to [some grandma's glasses]"],
 }
 
 

@@ -169,9 +169,12 @@ def _kind(verb: Verb, roles: Roles) -> VerbKind:
 def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     """One action for each place to go to."""
     bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
-    if bare and blank.verb not in words.bare_goal:
+    if bare and blank.verb.endswith((" down", " up", " along")):
+        bare = [] if roles.goals else bare
+    elif bare and blank.verb not in words.bare_goal:
         blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
     places = [*roles.goals, *roles.ats, *bare, *roles.joined_goals]
+    places = places or roles.paths
     if not places and blank.verb in words.goes_back:
         places = [HERE]
     extra = [part.text for part in (roles.recipient, roles.searched) if part is not None]
@@ -212,6 +215,7 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
         blank = replace(blank, choices=(*blank.choices, tuple(rivals)))
     extra = [place.text for place in (*sources[1:], *_others(goals))]
     extra += [roles.searched.text] if roles.searched is not None else []
+    extra += [blank.verb] if blank.verb in words.source_wanted and not (sources or goals) else []
     source = next(iter(sources), None)
     carried = _with_object(replace(blank, objects=tuple(roles.objects), source=source, goal=goal), extra)
     yield carried

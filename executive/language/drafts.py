@@ -82,7 +82,8 @@ def _meets(deed: Deed, wish: Deed) -> bool:
     same = deed.target is not None and wish.target is not None and deed.target.tokens == wish.target.tokens
     somebody = wish.goal is not None and (wish.goal is HERE or wish.goal.living)
     wished = wish.kind is VerbKind.ROUND_TRIP and somebody and wish.source is None and not wish.again
-    return same and wished and deed.again and deed.kind in _FETCHES
+    put = wish.kind is VerbKind.PLACE and deed.kind is VerbKind.PLACE and deed.goal == wish.goal
+    return same and deed.again and (put or (wished and deed.kind in _FETCHES))
 
 
 def _one_by_one(deeds: Sequence[Deed]) -> tuple[Deed, ...]:

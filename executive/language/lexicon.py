@@ -50,6 +50,7 @@ class Lexicon:
     verbs: Mapping[Phrase, frozenset[VerbKind]]
     at_is_goal: frozenset[str]
     goal_wanted: frozenset[str]
+    source_wanted: frozenset[str]
     goes_back: frozenset[str]
     prepositions: Mapping[Phrase, PrepositionRole]
     fillers: frozenset[Phrase]
@@ -81,6 +82,7 @@ class Lexicon:
     corrections: Mapping[Phrase, bool]
     light_nouns: Mapping[str, frozenset[str]]
     light_whole: frozenset[str]
+    written: frozenset[str]
     calls: frozenset[str]
 
 
@@ -92,6 +94,7 @@ def lexicon() -> Lexicon:
         verbs=_kinds(verbs),
         at_is_goal=frozenset(verbs["at_is_goal"]),
         goal_wanted=frozenset(verbs["goal_wanted"]),
+        source_wanted=frozenset(verbs["source_wanted"]),
         goes_back=frozenset(verbs["goes_back"]),
         bare_goal=frozenset(verbs["bare_goal"]),
         needs=_phrases(words["needs"]),
@@ -135,6 +138,7 @@ _WORD_SETS: Final = (
     "asks",
     "told",
     "light_whole",
+    "written",
     "calls",
 )
 

@@ -15,6 +15,14 @@ MAX_WORDS: Final = 60
 MAX_CHARACTERS: Final = 800
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _SOMETHING: Final = {r"\b(?:something|anything) to drink\b": "a drink", r"\b(?:something|anything) to eat\b": "food"}
+_FAVOUR: Final = re.compile(
+    r"\b(?:i'd|i would|it would|it'd|that would|that'd|i'm|i am|we'd|we would)\s+(?:\w+\s+){1,4}if you\b"
+    r"(?:\s+(?:could|can|would|might))?",
+    re.IGNORECASE,
+)
+_WISH: Final = re.compile(
+    r"^\W*(?:a|an|one|two|three|four|five|six|some|another|\d{1,2})\s+\w+.*\bplease\W*$", re.IGNORECASE
+)
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")
 
 
@@ -35,7 +43,7 @@ def open_commands(text: str) -> str:
     Hesitations and words said twice are left out. Where a polite form stands inside the sentence, a comma takes its
     place. "I would like something to drink" becomes "bring me a drink".
     """
-    text = _said_once(text)
+    text = _wished(_said_once(text))
     text = re.sub(r"^\W*(please\s+)?robot\b[\s,]*", r"\1", text, flags=re.IGNORECASE)
     for words, command in _wishes():
         text = re.sub(rf"\b(?:{_any(words)})\s+(?!you\b|to\b)", f", {command} ", text, flags=re.IGNORECASE)
@@ -58,9 +66,19 @@ def _said_once(text: str) -> str:
     text = re.sub(
         rf"(?<![\w'])(?:{_any(list(full))})(?![\w'])", lambda m: full[m[0].lower()], text, flags=re.IGNORECASE
     )
+    text = _FAVOUR.sub("please", text)
+    verbs = [" ".join(words) for words in lexicon().verbs if len(words) == 1]
+    text = re.sub(rf"(?<!\bi )(?<!d )\blike,?\s+(?=(?:{_any(verbs)})\b)", "", text, flags=re.IGNORECASE)
     asides = (*lexicon().asides, *lexicon().hesitations)
     text = re.sub(rf"(?<![\w'])(?:{_any(asides)})(?![\w'])[,.\s]*", " ", text, flags=re.IGNORECASE)
     return re.sub(r"\b(\w+(?:\s\w+){0,2})(?:[\s,]+\1\b)+", r"\1", " ".join(text.split()), flags=re.IGNORECASE)
+
+
+def _wished(text: str) -> str:
+    """A bare wish with "please" as a request: "two beers please"."""
+    if not _WISH.match(text):
+        return text
+    return f"bring {text}" if re.search(r"\b(?:for|to)\b", text, re.IGNORECASE) else f"bring me {text}"
 
 
 def _any(phrases: Sequence[str]) -> str:

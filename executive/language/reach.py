@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 from executive.knowledge import Knowledge
 from executive.language.grounding import known_line
@@ -11,7 +12,7 @@ from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.reference import Deed
 from executive.language.refusal import RefusalError
-from executive.language.roles import Location
+from executive.language.roles import HERE, Location
 
 __all__ = ["check_reach", "not_understood"]
 
@@ -48,15 +49,32 @@ def _carries(deed: Deed) -> bool:
     return deed.kind not in (VerbKind.GO, VerbKind.FIND)
 
 
+_BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "bring over", "carry over", "hand"})
+_INTO: Final = frozenset({"into", "onto"})
+
+
 def _moved(deed: Deed) -> bool:
-    """Whether a definite thing is taken from a place in the house, so that it is no idea ("the mail from the desk")."""
+    """Whether a definite thing is taken from or put into a place in the house, so that it is no idea.
+
+    So is "the mail from the desk", and what is written ("take the report to the boss").
+    """
+    if deed.target is None or deed.target.indefinite or not _carries(deed):
+        return False
+    goal = deed.goal
+    if (
+        goal is not None
+        and goal.preposition in _INTO
+        and goal.phrase is not None
+        and goal.phrase.kind is NounKind.PLACE
+    ):
+        return deed.target.kind is not NounKind.ELSEWHERE
+    if goal not in (None, HERE) and deed.verb in _BY_HAND and deed.target.head.lemma in lexicon().written:
+        return True
     role = lexicon().prepositions.get(tuple(deed.source.preposition.split())) if deed.source is not None else None
     place = None if deed.source is None else deed.source.phrase
-    if deed.target is None or place is None or role is not PrepositionRole.SOURCE or not _carries(deed):
+    if place is None or role is not PrepositionRole.SOURCE or deed.target.kind is NounKind.ELSEWHERE:
         return False
-    contained = place.kind is NounKind.THING and _fixture(deed.target)
-    named = not deed.target.indefinite and deed.target.kind is not NounKind.ELSEWHERE
-    return named and (contained or place.kind is NounKind.PLACE)
+    return place.kind is NounKind.PLACE or (place.kind is NounKind.THING and _fixture(deed.target))
 
 
 def _outside(deed: Deed, moved: bool) -> Iterator[str]:
@@ -117,4 +135,5 @@ def _reachable(phrase: Phrase, place: Location) -> bool:
     named = place.within is not None and phrase.head.pos == "PROPN"
     if phrase.known or named or phrase.person:
         return True
-    return phrase.nominal and (phrase.kind is None or phrase.kind.within_reach)
+    called = place.preposition == "to" and phrase.proper and phrase.kind is NounKind.ABSTRACT
+    return called or (phrase.nominal and (phrase.kind is None or phrase.kind.within_reach))

@@ -30,6 +30,9 @@ _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
 _LONGEST: Final = 6
 _RELATIVE: Final = frozenset({"that", "which", "what"})
+_PUT: Final = "put"
+_BELONGS: Final = frozenset({"go", "goes", "belong", "belongs"})
+_WHERE: Final = frozenset({"in", "on", "into", "onto", "inside", "under", "next"})
 _TIMES: Final = frozenset({"early", "hourly", "daily", "nightly", "weekly", "monthly", "yearly", "annually"})
 _BRING: Final = "bring"
 _SIDES: Final = frozenset({"left", "right"})
@@ -48,7 +51,17 @@ class _Reader:
     at: int = 0
 
     def read(self) -> Iterable[Item]:
-        steps = (self._mark, self._told, self._needed, self._verb, self._being, self._chunk, self._small, self._outside)
+        steps = (
+            self._mark,
+            self._told,
+            self._needed,
+            self._belongs,
+            self._verb,
+            self._being,
+            self._chunk,
+            self._small,
+            self._outside,
+        )
         items: list[Item] = []
         while self.at < len(self.tokens):
             item = next((found for step in steps if (found := step(items)) is not None), None)
@@ -112,6 +125,20 @@ class _Reader:
         items.insert(first, Verb(_BRING, self.words.verbs[(_BRING,)]))
         return Separator("")
 
+    def _belongs(self, items: list[Item]) -> Item | None:
+        """ "The plates go in the cupboard" asks to put them there."""
+        thing = items[-1] if items else None
+        behind = self.tokens[self.at + 1 : self.at + 2]
+        if self.tokens[self.at].word not in _BELONGS or not behind or behind[0].word not in _WHERE:
+            return None
+        if not isinstance(thing, Chunk) or thing.role is not None or not _command_position(items[:-1]):
+            return None
+        if thing.phrase.speaker or thing.phrase.person or thing.phrase.kind is NounKind.PERSON:
+            return None
+        self.at += 1
+        items.insert(-1, Verb(_PUT, self.words.verbs[(_PUT,)]))
+        return Separator("")
+
     def _verb(self, items: list[Item]) -> Item | None:
         found = self._match(self.words.verbs) or self._gerund(items)
         if found is not None and self._takes_preposition(found):
@@ -130,9 +157,10 @@ class _Reader:
         return any(ahead[:n] in self.words.prepositions for n in range(2, len(ahead) + 1))
 
     def _gerund(self, items: list[Item]) -> tuple[str, ...] | None:
-        """A verb that stands as "bringing" where a command begins, as behind "would you mind"."""
+        """A verb that stands as "bringing" or "brought" where a command begins, as behind "would you mind"."""
         first = self.tokens[self.at]
-        if first.tag != "VBG" or not _command_position(items):
+        past = first.tag in ("VBD", "VBN") and not items
+        if not (past or (first.tag == "VBG" and _command_position(items))):
             return None
         spoken = (first.lemma, *(t.word for t in self.tokens[self.at + 1 : self.at + _LONGEST]))
         return next((spoken[:n] for n in range(len(spoken), 0, -1) if spoken[:n] in self.words.verbs), None)
@@ -213,7 +241,8 @@ class _Reader:
             if inner is None:
                 break
             self.at += 1 + len(inner.tokens)
-            phrase = phrase.counting(inner) if phrase.counts else phrase.consisting_of(inner)
+            whole = phrase.counts or phrase.head.word in ("all", "both")
+            phrase = phrase.counting(inner) if whole else phrase.consisting_of(inner)
         return phrase
 
     def _numbered(self, phrase: Phrase) -> Phrase:
@@ -346,7 +375,7 @@ class _Reader:
 def _may_need(chunk: Chunk) -> bool:
     """Whether it is somebody else who can be brought what they need."""
     somebody = chunk.phrase.person or chunk.phrase.kind is NounKind.PERSON
-    return chunk.role is None and somebody and not chunk.phrase.stands_for_somebody
+    return chunk.role is None and somebody and chunk.phrase.head.word not in ("her", "him", "them")
 
 
 def _command_position(items: Sequence[Item]) -> bool:

@@ -72,6 +72,7 @@ class Roles:
     goals: list[Location] = field(default_factory=list)
     ats: list[Location] = field(default_factory=list)
     joined_goals: list[Location] = field(default_factory=list)
+    paths: list[Location] = field(default_factory=list)
     choices: list[list[Phrase]] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
@@ -224,7 +225,7 @@ def _add_for(roles: Roles, one: _Placed) -> None:
 
 
 def _add_path(roles: Roles, one: _Placed) -> None:
-    """The way is the planner's to choose."""
+    roles.paths.append(one.location)
 
 
 _ADD: Final = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from executive.errors import InputError
 from executive.knowledge import Knowledge
@@ -28,10 +29,10 @@ class Vocabulary:
     @property
     def prompt(self) -> str:
         """What the recogniser is told was said before: the names, and the turns in which people ask."""
-        call = ("Hey {0}, could", "Hi {0}, would", "OK {0}, grab", "{0}, please") if self.robot_name else _UNCALLED
+        call = ("Hey {0}, could", "Hi {0}, would", "OK {0}, take", "{0}, please") if self.robot_name else _UNCALLED
         turns = (
-            f"{call[0]} you get me one? {call[1]} you please go there. {call[2]} it. "
-            f"{call[3]} pick it up, move it from here and give it to me."
+            f"{call[0]} you bring me two? {call[1]} you go there. {call[2]} it back. "
+            f"{call[3]} pick it up, move it and put it there."
         ).format(self.robot_name)
         return f"{', '.join(_longest(self.names))}. {turns}" if self.names else turns
 
@@ -71,4 +72,4 @@ def read_vocabulary(file: Path, robot_name: str | None) -> Vocabulary:
     return Vocabulary((*names, *([robot_name] if robot_name else [])), robot_name)
 
 
-_UNCALLED = ("Could", "Would", "Grab", "Please")
+_UNCALLED: Final = ("Could", "Would", "Take", "Please")

@@ -157,9 +157,14 @@ class WhisperRecognition:
         return range_db(self._sound) < _NOISY_RANGE_DB
 
     def more(self) -> Iterator[tuple[Transcript, ...]]:
-        """The readings of the sound with less noise, and then those of a wider search in the sound as it is."""
+        """The readings of the sound with less noise, then those of a wider search in the sound as it is.
+
+        In a noisy sound there is a wider search in the one with less noise, too.
+        """
         yield self._owner.search(self._quieter, self._prompt, beam=_BEAM)
         yield self._owner.search(self._encoded, self._prompt, beam=_WIDE_BEAM)
+        if self.noisy:
+            yield self._owner.search(self._quieter, self._prompt, beam=_WIDE_BEAM)
 
     def likelihoods(self, texts: Sequence[str]) -> list[float]:
         """The log likelihood of each text given the sound; a noisy sound is also asked with less noise."""

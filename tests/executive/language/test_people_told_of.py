@@ -18,6 +18,11 @@ def test_whoever_is_told_of_is_brought_to(parser, name):
     assert (meaning.commands[-1].goal, meaning.commands[-1].goal_at) == (name, "desk")
 
 
+def test_her_own_thing_is_brought_to_her(parser):
+    meaning = understand("Mary's at her desk, bring her her tuna.", parser=parser, knowledge=None, require_wake=False)
+    assert (meaning.commands[-1].goal, meaning.commands[-1].goal_at) == ("Mary", "desk")
+
+
 def test_a_thing_that_is_told_of_is_still_one(parser):
     meaning = understand("Coke is on the table, bring it here.", parser=parser, knowledge=None, require_wake=False)
     assert meaning.commands[0].goal == "table"

@@ -10,6 +10,7 @@ from typing import Final
 from executive.language.clauses import Clause
 from executive.language.items import Being, Chunk, Outside, Separator, Unknown, Verb, Whether, spoken_words
 from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind, lexicon
+from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, Location, Roles, read_roles
 
@@ -173,11 +174,13 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
         bare = [] if roles.goals else bare
     elif bare and blank.verb not in words.bare_goal:
         blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
-    places = [*roles.goals, *roles.ats, *bare, *roles.joined_goals]
+    headed = roles.searched if roles.searched is not None and roles.searched.kind is NounKind.PLACE else None
+    places = [*roles.goals, *roles.ats, *bare, *([] if headed is None else [Location(headed)]), *roles.joined_goals]
     places = places or roles.paths
     if not places and blank.verb in words.goes_back:
         places = [HERE]
-    extra = [part.text for part in (roles.recipient, roles.searched) if part is not None]
+    unfit = (roles.recipient, None if headed is not None else roles.searched)
+    extra = [part.text for part in unfit if part is not None]
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
     blank = replace(blank, unknown=(*blank.unknown, *extra))
     yield from (replace(blank, goal=place) for place in places) if places else (blank,)

@@ -15,6 +15,11 @@ MAX_WORDS: Final = 60
 MAX_CHARACTERS: Final = 800
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _SOMETHING: Final = {r"\b(?:something|anything) to drink\b": "a drink", r"\b(?:something|anything) to eat\b": "food"}
+_LEISURE: Final = re.compile(
+    r"\b(?:if|when|whenever|once|as soon as) you(?:'ve)? (?:have|get|got|find|can spare)? ?(?:a|an|the|some|any)? ?"
+    r"(?:free |spare )?(?:minute|second|moment|sec|time|chance|opportunity)\b,?",
+    re.IGNORECASE,
+)
 _FAVOUR: Final = re.compile(
     r"\b(?:i'd|i would|it would|it'd|that would|that'd|i'm|i am|we'd|we would)\s+(?:\w+\s+){1,4}if you\b"
     r"(?:\s+(?:could|can|would|might))?",
@@ -66,11 +71,11 @@ def _said_once(text: str) -> str:
     text = re.sub(
         rf"(?<![\w'])(?:{_any(list(full))})(?![\w'])", lambda m: full[m[0].lower()], text, flags=re.IGNORECASE
     )
-    text = _FAVOUR.sub("please", text)
+    text = _FAVOUR.sub("please", _LEISURE.sub("", text))
     verbs = [" ".join(words) for words in lexicon().verbs if len(words) == 1]
     text = re.sub(rf"(?<!\bi )(?<!d )\blike,?\s+(?=(?:{_any(verbs)})\b)", "", text, flags=re.IGNORECASE)
     asides = (*lexicon().asides, *lexicon().hesitations)
-    text = re.sub(rf"(?<![\w'])(?:{_any(asides)})(?![\w'])[,.\s]*", " ", text, flags=re.IGNORECASE)
+    text = re.sub(rf"(?<![\w'])(?<!\d )(?:{_any(asides)})(?![\w'])[,.\s]*", " ", text, flags=re.IGNORECASE)
     return re.sub(r"\b(?!her her\b)(\w+(?:\s\w+){0,2})(?:[\s,]+\1\b)+", r"\1", " ".join(text.split()), flags=re.IGNORECASE)
 
 

@@ -129,7 +129,8 @@ def _inside_candidate(sentence: str, span: tuple[int, int], question: Clarifying
     """Whether what was heard stands there as a part of a candidate's whole name."""
     upto = sentence[: span[1]].lower()
     heard = (question.heard or "").lower()
-    return any(upto.endswith(c.lower()) for c in question.candidates if c.lower() != heard)
+    longer = (c.lower() for c in question.candidates if len(c) > len(heard))
+    return any(upto.endswith(candidate) for candidate in longer)
 
 
 def _bare(answer: str) -> str:

@@ -81,6 +81,9 @@ def test_the_answer_is_put_into_the_sentence(sentence, question, answer, whole):
         ("send the hammer", "to Robin", 2),
         ("put the hammer back", "on the workbench", 2),
         ("bring the hammer to the man", "Charlie", 2),
+        ("bring me coke or beer", "beer", 2),
+        ("bring me the coke or the beer please", "the second one", 2),
+        ("take the hammer to the kitchen and the bedroom", "bedroom", 2),
     ],
 )
 def test_an_answered_question_leads_to_the_commands(parser, knowledge, sentence, answer, commands):
@@ -91,6 +94,12 @@ def test_an_answered_question_leads_to_the_commands(parser, knowledge, sentence,
     assert asked.status is Status.QUESTION
     answered = told(with_answer(sentence, asked.question, answer))
     assert (answered.reason, len(answered.commands)) == (None, commands)
+
+
+def test_where_any_one_will_do_the_first_is_taken_and_said(parser, knowledge):
+    meant = understand("bring me a beer or a coke", parser=parser, knowledge=knowledge, require_wake=False)
+    assert [str(command.item or command.object) for command in meant.commands] == ["beer", "beer"]
+    assert meant.notes == ("of a beer or a coke I take the first",)
 
 
 def test_the_policy_says_who_answers():

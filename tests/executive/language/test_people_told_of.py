@@ -19,8 +19,8 @@ def test_whoever_is_told_of_is_brought_to(parser, name):
 
 
 def test_her_own_thing_is_brought_to_her(parser):
-    meaning = understand("Mary's at her desk, bring her her tuna.", parser=parser, knowledge=None, require_wake=False)
-    assert (meaning.commands[-1].goal, meaning.commands[-1].goal_at) == ("Mary", "desk")
+    meaning = understand("Linda is at her desk, bring her her tuna.", parser=parser, knowledge=None, require_wake=False)
+    assert (meaning.commands[-1].goal, meaning.commands[-1].goal_at) == ("Linda", "desk")
 
 
 def test_a_thing_that_is_told_of_is_still_one(parser):

@@ -8,7 +8,7 @@ from itertools import zip_longest
 from typing import Final
 
 from executive.language.clauses import Clause
-from executive.language.items import Being, Chunk, Outside, Separator, Unknown, Verb, Whether, spoken_words
+from executive.language.items import Being, Chunk, Item, Outside, Separator, Unknown, Verb, Whether, spoken_words
 from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
@@ -63,9 +63,19 @@ def _with_fronted(clauses: Sequence[Clause]) -> Sequence[Clause]:
     if len(clauses) < 2 or clauses[0].verb is not None or not isinstance(clauses[1].verb, Verb | Being):
         return clauses
     fronted = [item for item in clauses[0].items if not isinstance(item, Separator)]
+    if _named_first(fronted, clauses[1]):
+        return (replace(clauses[0], verb=Being("", existential=True, asked=False)), *clauses[1:])
     places = all(isinstance(item, Chunk) and item.role in _FRONTED for item in fronted)
     first = replace(clauses[1], items=(*clauses[1].items, *fronted))
     return (first, *clauses[2:]) if places else clauses
+
+
+def _named_first(fronted: Sequence[Item], clause: Clause) -> bool:
+    """Whether a thing is only named, and then meant by "it": "that vase on the shelf, bring it here"."""
+    chunks = [item for item in fronted if isinstance(item, Chunk)]
+    named = len(chunks) == len(fronted) and bool(chunks) and chunks[0].role is None and not chunks[0].phrase.pronoun
+    placed = named and all(chunk.role in _FRONTED for chunk in chunks[1:]) and not chunks[0].phrase.speaker
+    return placed and any(isinstance(item, Chunk) and item.phrase.pronoun for item in clause.items)
 
 
 def _without_reasons(clauses: Sequence[Clause]) -> Sequence[Clause]:

@@ -76,7 +76,9 @@ def _said_once(text: str) -> str:
     text = re.sub(rf"(?<!\bi )(?<!d )\blike,?\s+(?=(?:{_any(verbs)})\b)", "", text, flags=re.IGNORECASE)
     asides = (*lexicon().asides, *lexicon().hesitations)
     text = re.sub(rf"(?<![\w'])(?<!\d )(?:{_any(asides)})(?![\w'])[,.\s]*", " ", text, flags=re.IGNORECASE)
-    return re.sub(r"\b(?!her her\b)(\w+(?:\s\w+){0,2})(?:[\s,]+\1\b)+", r"\1", " ".join(text.split()), flags=re.IGNORECASE)
+    return re.sub(
+        r"\b(?!her her\b)(\w+(?:\s\w+){0,2})(?:[\s,]+\1\b)+", r"\1", " ".join(text.split()), flags=re.IGNORECASE
+    )
 
 
 def _wished(text: str) -> str:

@@ -41,6 +41,11 @@ def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
             found[at] = replace(found[at], pos="NOUN", tag="NN", relation="obl", head=at - 1)
         elif (noun := _owned(found, at)) is not None:
             _own(found, at, noun)
+        elif found[at].pos == "NOUN" and (found[at - 1].tag, found[at - 1].relation) == ("DT", "mark"):
+            found[at - 1] = replace(found[at - 1], relation="det", head=at)
+        elif _place_one(found, at):
+            found[at] = replace(found[at], pos="NUM", tag="CD", relation="nummod", head=at - 1)
+            found[at - 1] = replace(found[at - 1], relation="obl", head=max(at - 2, 0))
         elif _shown(found, at):
             _show(found, at)
         elif _command(found, at):
@@ -105,6 +110,13 @@ def _owned(tokens: Sequence[Token], at: int) -> int | None:
     end = next((n for n in range(at + 1, len(tokens)) if tokens[n].tag not in ("VBG", "JJ", "NN")), len(tokens))
     noun = end if end < len(tokens) and tokens[end].tag == "NNS" else end - 1
     return noun if noun > at and tokens[noun].pos == "NOUN" else None
+
+
+def _place_one(tokens: Sequence[Token], at: int) -> bool:
+    """Whether "one" is the number of a place without article ("room one"), unlike "the kitchen one"."""
+    before = tokens[max(at - 3, 0) : at]
+    bare = tokens[at].word == "one" and not any(t.pos == "DET" or t.relation in ("det", "poss") for t in before)
+    return bare and before[-1].pos in ("NOUN", "PROPN") and before[-1].kind is NounKind.PLACE
 
 
 def _command(tokens: Sequence[Token], at: int) -> bool:

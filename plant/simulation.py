@@ -16,7 +16,6 @@ from plant.diagram import LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
-from plant.resting import RestingThings
 from plant.snapshot.file import read_snapshot
 from plant.snapshot.keeper import SnapshotKeeper, restore
 from plant.snapshot.values import State
@@ -31,7 +30,6 @@ from skills.robot import Pose2D, Robot
 FloatArray = NDArray[np.float64]
 CONTROL_PERIOD_S = 0.01
 REFEREE_PERIOD_STEPS = 2
-RESTING_PERIOD_STEPS = 10
 SETTLING_S = 1.5
 
 
@@ -61,7 +59,6 @@ class Engine:
             name: SpotRobot(model, self._sensors(model, seed), self.context)
             for name, model in sorted(world.robots.items())
         }
-        self._resting = RestingThings(world.plant, world.models, [model.body for model in world.robots.values()])
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
         self._after_advance: list[Callable[[], None]] = []
@@ -98,8 +95,6 @@ class Engine:
             self._command_robots()
             self._steps += 1
             self._simulator.AdvanceTo(self.now())
-            if self._steps % RESTING_PERIOD_STEPS == 0:
-                self._resting.look(self.context)
             for every, observer in self._observers:
                 if self._steps % every == 0:
                     observer(self.now())
@@ -114,8 +109,7 @@ class Engine:
 
     def state(self) -> State:
         """Time, and what the robots keep."""
-        robots = {name: spot.state() for name, spot in self._spots.items()}
-        return {"steps": self._steps, "resting": self._resting.state(), "robots": robots}
+        return {"steps": self._steps, "robots": {name: spot.state() for name, spot in self._spots.items()}}
 
     def world_state(self) -> Mapping[str, FloatArray]:
         """Positions and velocities of all that moves."""
@@ -134,7 +128,6 @@ class Engine:
         self.root_context.SetTime(self.now())
         for group, values in world.items():
             self.root_context.get_mutable_discrete_state(int(group)).SetFromVector(values)
-        self._resting.restore(state["resting"], self.context)
         for name, spot in self._spots.items():
             spot.restore(state["robots"][name], self.now())
         self._command_robots()

@@ -51,7 +51,7 @@ format: env
 	$(BIN)/ruff format .
 
 bench: env
-	$(BIN)/pytest tests/benchmarks -p no:xdist --benchmark-only
+	$(BIN)/pytest tests/benchmarks tests/executive/view/test_page.py -p no:xdist --benchmark-only
 
 clean:
 	rm -rf $(VENV) out build dist *.egg-info

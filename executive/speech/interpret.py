@@ -17,7 +17,7 @@ Meaning = TypeVar("Meaning")
 
 _OTHER_READING: Final = 6.0
 """How many times e less likely another of the recogniser's own readings may be than the first."""
-_MENDED_READING: Final = 12.0
+_MENDED_READING: Final = 8.0
 """The same for a reading mended by sound; these are compared without telling the recogniser what to expect."""
 _MOST_MENDED: Final = 4
 _PER_SOUND: Final = 3.0

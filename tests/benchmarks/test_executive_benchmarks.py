@@ -16,7 +16,7 @@ from executive.record.event_log import EventLog
 from executive.runner import RunEntry, RunSettings, run
 from executive.worker import LockStepWorker
 from skills.api import Running, Skill, Succeeded
-from skills.robot import CommandId, Lease, Odometry
+from skills.robot import CommandId, Gripper, Lease, Odometry
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 
@@ -44,6 +44,9 @@ class LightRobot:
 
     def odometry(self):
         return Odometry(self.clock.now(), RigidTransform(), (0.0, 0.0, 0.0))
+
+    def gripper(self):
+        return Gripper(self.clock.now(), 0.0, 0.0, holding=False)
 
     def drive(self, vx, vy, wz, *, until_s, lease):
         return CommandId(1)

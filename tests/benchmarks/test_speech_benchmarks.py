@@ -12,7 +12,7 @@ pytest.importorskip("faster_whisper")
 SCORE = Path(__file__).parent / "speech" / "score.py"
 NO_VOICE = 3
 LOADING_S, PER_SECOND_OF_SOUND, PEAK_MB = 6.0, 0.3, 1200
-CLEAR, NOISY, MISSED, FALSE = 0.92, 0.60, 0.03, 0.01  # the aim in noise is 0.80
+CLEAR, NOISY, MISSED, FALSE = 0.92, 0.80, 0.03, 0.01
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +33,7 @@ def test_clear_sentences_become_their_commands(result):
     assert result["commands_right"]["clear"] >= CLEAR
 
 
+@pytest.mark.xfail(reason="two of three are right so far", strict=True)
 def test_noisy_sentences_become_their_commands(result):
     assert result["commands_right"]["noisy"] >= NOISY
 

@@ -14,6 +14,7 @@ from plant.snapshot.values import State, array_of, transform_of, transform_state
 FloatArray = NDArray[np.float64]
 
 LIFT_M = 0.03
+AWAY_M = 0.3
 FALL_M = 0.05
 STILL_M_S = 0.05
 WITH_HAND_M_S = 0.2
@@ -164,10 +165,11 @@ class ObjectStory:
         return float(np.linalg.norm(slip)) / (look.time_s - last.time_s) < WITH_HAND_M_S
 
     def _note_lift(self, look: Look, with_hand: bool) -> None:
-        """Begin a carry once the gripper has raised it clear of its place."""
+        """Begin a carry once the gripper has raised it clear of its place, or borne it well away from there."""
         if look.gripper is None or look.supported or not with_hand:
             return
-        if not self._carried and look.p_WO[2] - self.rests_W[-1][2] >= LIFT_M:
+        way_W = look.p_WO - self.rests_W[-1]
+        if not self._carried and (way_W[2] >= LIFT_M or float(np.linalg.norm(way_W[:2])) >= AWAY_M):
             self.lifts.append(Lift(look.time_s, look.gripper, self.rests_W[-1]))
             self.events.append(f"{look.gripper} lifted the {self.name} at {look.time_s:.2f} s.")
             self._carried = True

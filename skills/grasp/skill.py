@@ -32,7 +32,6 @@ _PULL_BACK_M = 0.12
 _SURFACE_AROUND_M = 0.2
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
-_LIFT_AGAIN_M = 0.1
 _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 
@@ -133,12 +132,23 @@ class Grasp(ArmSkill[GraspInputs]):
         message, opening = f"carrying the {seen.thing}", self._check_held(str(seen.thing), None)
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         if at_thing:
-            yield from self.try_shift_hand(_LIFT_AGAIN_M * self._up_B(), f"lifting the {seen.thing}")
+            yield from self._lift_again(f"lifting the {seen.thing}")
             yield from self.try_shift_hand(-_PULL_BACK_M * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
         yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
         self._check_held(str(seen.thing), opening)
         yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
+
+    def _lift_again(self, message: str) -> Routine[None]:
+        """Lift what the jaw has hold of by the first way that the arm finds; where it finds none, it is carried low."""
+        for way_B in lifts(self.model, self.model.X_BH(self.q_rad()), self._up_B()):
+            try:
+                yield from self.shift_hand(way_B, message)
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING:
+                    raise
+            else:
+                return
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
         """A view of the thing from 0.4 m; the plane and what stands around come with it."""

@@ -155,6 +155,17 @@ def test_pushed_or_barely_raised_object_is_not_grasped():
     assert not Stage().lift(height=0.02).holds(GRASPED)
 
 
+def test_object_borne_clear_of_the_table_but_low_and_far_away_is_grasped():
+    barely = np.add(ON_TABLE, (0, 0, 0.015))
+    stage = Stage().hold("coke", ON_TABLE).watch(0.3).carry("coke", ON_TABLE, barely)
+    assert not stage.holds(GRASPED)
+    assert stage.carry("coke", barely, np.add(barely, (-1.0, 0, 0))).holds(GRASPED)
+
+
+def test_object_dragged_far_along_the_table_is_not_grasped():
+    assert not Stage().hold("coke", ON_TABLE).carry("coke", ON_TABLE, np.add(ON_TABLE, (0, 0.45, 0))).holds(GRASPED)
+
+
 def test_object_that_rises_without_the_gripper_is_not_grasped():
     assert not Stage().put("coke", (1.5, 0, 1.3)).watch().holds(GRASPED)
 

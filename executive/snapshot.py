@@ -71,15 +71,6 @@ def walk(root: Behaviour) -> Iterator[Behaviour]:
         yield from walk(child)
 
 
-def running_message(root: Behaviour) -> tuple[str, str, float | None]:
-    """Path id, sentence and progress of the deepest running node; empty when none runs."""
-    running = [node for node in walk(root) if node.status == Status.RUNNING and isinstance(node, Explained)]
-    if not running:
-        return "", "", None
-    state = _state(running[-1])
-    return running[-1].path_id, state.message, state.progress
-
-
 def _renewed(last: NodeState | None, node: Explained) -> NodeState:
     """The last state where it still holds, else a new one."""
     assert isinstance(node, Behaviour)

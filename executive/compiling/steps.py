@@ -28,11 +28,6 @@ def step_plan(shop: Workshop) -> NodePlan:
     return _BY_TASK[shop.command.task](shop)
 
 
-def needs_start(shop: Workshop) -> bool:
-    """True when the command refers to where the robot stood at the start."""
-    return shop.command.goal == START
-
-
 def grasp_plan(shop: Workshop, *, anywhere: bool = True) -> NodePlan:
     """Find it, stand before it, take it, tuck the arm in.
 

@@ -11,7 +11,7 @@ from skills.api import Cause, InputsT, SkillContext
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel, arm_model
 from skills.arm.motion import plan_joint_path, plan_line, time_path
-from skills.arm.routine import PlanningError, Routine, RoutineSkill, SkillFailure
+from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.robot import ArmTrajectory, FloatArray, Image
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
@@ -173,17 +173,3 @@ class ArmSkill(RoutineSkill[InputsT]):
 def hand_camera_in_hand(image: Image) -> RigidTransform:
     """X_HC from a picture's frame tree."""
     return image.frames.pose(image.camera_frame, "hand")
-
-
-def first_solution(goals: Sequence[Goal], message: str) -> Goal:
-    """A goal that tries others in order. Raises PlanningError with `message` when none works."""
-
-    def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-        for one in goals:
-            try:
-                return one(scene, q)
-            except PlanningError:
-                continue
-        raise PlanningError(message)
-
-    return goal

@@ -66,9 +66,3 @@ def rusty(image: FloatArray, rng: np.random.Generator, amount: float) -> FloatAr
     share = np.clip((field - 1.6 + 1.8 * amount) * 1.2, 0, 0.9)[..., None]
     rust = np.array([0.42, 0.22, 0.11]) * (1 + 0.15 * noise(rng, (height, width), (1, 1)))[..., None]
     return np.asarray(image * (1 - share) + share * rust)
-
-
-def shaded_round(image: FloatArray, amount: float = 0.15) -> FloatArray:
-    """Darker towards the lower edge, where dust and shadow gather."""
-    rows = np.linspace(0, 1, image.shape[0])[:, None, None]
-    return np.asarray(image * (1 - amount * np.clip(rows - 0.85, 0, 1) / 0.15))

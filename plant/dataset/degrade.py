@@ -33,7 +33,7 @@ class Degradation:
         """From nearly clean to poor."""
         blurred = rng.random() < 0.25
         return cls(
-            mean=float(np.clip(rng.normal(112, 34), 32, 205)),
+            mean=float(np.clip(rng.normal(114, 32), 50, 205)),
             gamma=float(np.exp(rng.normal(0, 0.12))),
             saturation=float(rng.uniform(0.6, 1.25)),
             balance=(float(rng.normal(1, 0.05)), 1.0, float(rng.normal(1, 0.05))),
@@ -65,7 +65,7 @@ def degraded(clean: Picture, how: Degradation, rng: np.random.Generator, *, grey
 
 def _exposed(image: FloatPicture, how: Degradation) -> FloatPicture:
     """Brightness set to a mean, as automatic exposure does, not always well."""
-    gain = float(np.clip(how.mean / max(float(image.mean()), 1.0), 0.35, 4.0))
+    gain = float(np.clip(how.mean / max(float(image.mean()), 1.0), 0.35, 8.0))
     lit = 255.0 * np.clip(image * gain / 255.0, 0, 1) ** how.gamma
     return np.asarray(lit, dtype=np.float32)
 

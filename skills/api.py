@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
+from skills.detection import Detection as Detection
+from skills.detection import Detector as Detector
 from skills.robot import Clock, Lease, Pose2D, Robot, Scan
 
 ResultT = TypeVar("ResultT")
@@ -157,30 +159,6 @@ class ForgettingCostmap(Protocol):
 
     def forget_seen(self) -> int:
         """Forget all that was seen and not surveyed; the number of cells that were blocked by it."""
-
-
-@dataclass(frozen=True)
-class Detection:
-    """A thing of a class in a picture: how sure (0 to 1), and its box (u0, v0, u1, v1) in pixels of that picture."""
-
-    class_name: str
-    score: float
-    box: tuple[float, float, float, float]
-
-
-class Detector(Protocol):
-    """Finds things of known classes in pictures."""
-
-    @property
-    def class_names(self) -> tuple[str, ...]:
-        """The classes that it knows."""
-
-    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
-        """What is in each picture, the surest first.
-
-        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. May take long: call it inside a Worker job. Raises
-        ValueError for what is no such picture.
-        """
 
 
 class Job(Protocol[ResultT_co]):

@@ -1,0 +1,37 @@
+"""What a detector is, apart from the simulator's types; skills import these names from `skills.api`."""
+
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Detection", "Detector"]
+
+
+@dataclass(frozen=True)
+class Detection:
+    """A thing of a class in a picture: how sure (0 to 1), and its box (u0, v0, u1, v1) in pixels of that picture."""
+
+    class_name: str
+    score: float
+    box: tuple[float, float, float, float]
+
+
+class Detector(Protocol):
+    """Finds things of known classes in pictures."""
+
+    @property
+    def class_names(self) -> tuple[str, ...]:
+        """The classes that it knows."""
+
+    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
+        """What is in each picture, the surest first.
+
+        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. May take long: call it inside a Worker job. Raises
+        ValueError for what is no such picture.
+        """

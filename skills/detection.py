@@ -1,6 +1,5 @@
 """What a detector is, apart from the simulator's types; skills import these names from `skills.api`."""
 
-
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -1,0 +1,98 @@
+"""The detector: a network in ONNX Runtime on pictures in the letterbox, and one box for each thing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.detect.detector_file import MODEL_FILE, DetectorModel, load_model
+from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX, Letterbox, fill_letterbox
+from skills.detect.suppression import SuppressionOptions, candidates_of, suppress
+from skills.detection import Detection
+
+__all__ = ["DetectorOptions", "OnnxDetector", "SharedDetector", "load_detector"]
+
+Picture = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class DetectorOptions:
+    """The least score that is told, how boxes on one thing become one, and how many pictures the network takes at once.
+
+    More at once need more memory and are hardly faster on two cores.
+    """
+
+    threshold: float = 0.5
+    suppression: SuppressionOptions = field(default_factory=SuppressionOptions)
+    at_once: int = 1
+
+
+@dataclass(frozen=True)
+class OnnxDetector:
+    """Finds things with a loaded network. Safe to call from several threads."""
+
+    model: DetectorModel
+    options: DetectorOptions = field(default_factory=DetectorOptions)
+
+    @property
+    def class_names(self) -> tuple[str, ...]:
+        """The classes that it knows."""
+        return self.model.class_names
+
+    def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
+        """What is in each picture, the surest first; boxes in the pictures' own pixels.
+
+        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. Raises ValueError for what is no such picture.
+        """
+        step = max(1, self.options.at_once)
+        return [found for k in range(0, len(pictures), step) for found in self._batch(pictures[k : k + step])]
+
+    def _batch(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
+        images = np.empty((len(pictures), HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
+        placed = [fill_letterbox(picture, images[k]) for k, picture in enumerate(pictures)]
+        boxes, scores = self.model.session.run(["boxes", "scores"], {"images": images})
+        return [self._detections(*one) for one in zip(boxes, scores, placed, strict=True)]
+
+    def _detections(self, boxes: Floats, scores: Floats, placed: Letterbox) -> tuple[Detection, ...]:
+        """The things of one picture from the network's boxes (A, 4) and scores (A, K)."""
+        rules = self.options.suppression
+        candidates = candidates_of(boxes, scores, self.options.threshold, rules.most_candidates)
+        kept = suppress(candidates, rules)
+        corners = placed.to_picture(kept.boxes).astype(np.float64)
+        rows = zip(kept.classes.tolist(), kept.scores.tolist(), corners.tolist(), strict=True)
+        return tuple(
+            Detection(self.class_names[which], score, (u0, v0, u1, v1))
+            for which, score, (u0, v0, u1, v1) in rows
+            if u1 > u0 and v1 > v0
+        )
+
+
+def load_detector(file: Path = MODEL_FILE, options: DetectorOptions | None = None) -> OnnxDetector:
+    """The detector of a file. Raises `skills.detect.detector_file.ModelFileError`."""
+    return OnnxDetector(load_model(file), options or DetectorOptions())
+
+
+@dataclass(frozen=True)
+class SharedDetector:
+    """A detector that is loaded when it is first used, and then kept; errors of its file come then."""
+
+    file: Path = MODEL_FILE
+
+    @cached_property
+    def _loaded(self) -> OnnxDetector:
+        return load_detector(self.file)
+
+    @property
+    def class_names(self) -> tuple[str, ...]:
+        """The classes that it knows. Raises ModelFileError."""
+        return self._loaded.class_names
+
+    def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
+        """As `OnnxDetector.detect`. Raises ModelFileError too."""
+        return self._loaded.detect(pictures)

@@ -1,0 +1,91 @@
+"""Many boxes on one thing become one: the surest of each class, and the surer of two classes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Candidates", "SuppressionOptions", "candidates_of", "suppress"]
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class SuppressionOptions:
+    """Which of many boxes stay.
+
+    Boxes of one class that overlap by more than `same_class` (shared area / area of both) are one thing. So are boxes
+    of two classes over `other_class`, when the surer of the two has at least `sure_score`. Of more than
+    `most_candidates` boxes in a picture the surest are looked at, and `most_kept` of those that stay are told.
+    """
+
+    same_class: float = 0.6
+    other_class: float = 0.8
+    sure_score: float = 0.5
+    most_candidates: int = 1000
+    most_kept: int = 300
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Boxes (N, 4) of (u0, v0, u1, v1), their scores (N,) and the indices (N,) of their classes, the surest first."""
+
+    boxes: Floats
+    scores: Floats
+    classes: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.scores)
+
+    def at(self, rows: NDArray[np.int64]) -> Candidates:
+        """Those of some rows."""
+        return Candidates(self.boxes[rows], self.scores[rows], self.classes[rows])
+
+
+def candidates_of(boxes: Floats, scores: Floats, threshold: float, most: int) -> Candidates:
+    """Boxes (A, 4) of which a class has at least the threshold, by scores (A, K); `most` of them, the surest first.
+
+    What is not finite, or has no area, is none. Equal scores keep their order.
+    """
+    rows, classes = np.nonzero(scores >= threshold)
+    found = boxes[rows]
+    sound = np.isfinite(found).all(axis=1) & (found[:, 2:] > found[:, :2]).all(axis=1)
+    found, rows, classes = found[sound], rows[sound], classes[sound]
+    values = scores[rows, classes]
+    order = np.argsort(-values, kind="stable")[:most]
+    return Candidates(found[order], values[order], classes[order].astype(np.int64))
+
+
+def suppress(candidates: Candidates, options: SuppressionOptions) -> Candidates:
+    """The candidates without those that a surer one stands for.
+
+    Greedy, after the usual non-maximum suppression: the surest stays, what it stands for goes, and so on.
+    """
+    if not len(candidates):
+        return candidates
+    replaced = _replaced_by(candidates, options)
+    alive = np.ones(len(candidates), dtype=bool)
+    for k in range(len(candidates)):
+        if alive[k]:
+            alive[k + 1 :] &= ~replaced[k, k + 1 :]
+    return candidates.at(np.flatnonzero(alive)[: options.most_kept])
+
+
+def _replaced_by(candidates: Candidates, options: SuppressionOptions) -> NDArray[np.bool_]:
+    """(N, N): whether the one of the row stands for the one of the column, if that is less sure."""
+    shared = _overlaps(candidates.boxes)
+    same = candidates.classes[:, None] == candidates.classes[None, :]
+    sure = (candidates.scores >= options.sure_score)[:, None]
+    return np.asarray(np.where(same, shared > options.same_class, sure & (shared > options.other_class)))
+
+
+def _overlaps(boxes: Floats) -> Floats:
+    """Shared area / area of both together (N, N)."""
+    u0, v0, u1, v1 = (boxes[:, k] for k in range(4))
+    width = np.minimum(u1[:, None], u1[None, :]) - np.maximum(u0[:, None], u0[None, :])
+    height = np.minimum(v1[:, None], v1[None, :]) - np.maximum(v0[:, None], v0[None, :])
+    shared = np.clip(width, 0.0, None) * np.clip(height, 0.0, None)
+    areas = (u1 - u0) * (v1 - v0)
+    return np.asarray(shared / (areas[:, None] + areas[None, :] - shared), dtype=np.float32)

@@ -1,0 +1,101 @@
+"""From pictures to detections, with small networks whose pictures tell what they see."""
+
+import threading
+
+import numpy as np
+import pytest
+from tiny_detector import CLASSES, picture_of, write_model
+
+from skills.detect.detector_file import ModelFileError
+from skills.detect.onnx_detector import DetectorOptions, SharedDetector, load_detector
+from skills.detection import Detection
+
+HAMMER = ("hammer", 0.9, (100, 50, 200, 80))
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return write_model(tmp_path_factory.mktemp("model") / "tiny.onnx")
+
+
+@pytest.fixture(scope="module")
+def detector(file):
+    return load_detector(file)
+
+
+def test_a_thing_is_told_with_class_score_and_box(detector):
+    (found,) = detector.detect([picture_of(HAMMER)])
+    assert found == (Detection("hammer", pytest.approx(0.9), (100.0, 50.0, 200.0, 80.0)),)
+    assert detector.class_names == CLASSES
+
+
+def test_the_surest_comes_first_and_the_unsure_not_at_all(detector):
+    things = [("beer", 0.6, (0, 0, 50, 50)), ("coke", 0.8, (300, 0, 350, 50)), ("hammer", 0.48, (100, 100, 200, 200))]
+    (found,) = detector.detect([picture_of(*things)])
+    assert [one.class_name for one in found] == ["coke", "beer"]
+
+
+def test_a_lower_threshold_tells_more(file):
+    detector = load_detector(file, DetectorOptions(threshold=0.1))
+    assert len(detector.detect([picture_of(("beer", 0.2, (0, 0, 50, 50)))])[0]) == 1
+
+
+def test_two_boxes_on_one_thing_become_one(detector):
+    double = ("coke", 0.7, (100, 50, 200, 77.5))
+    (found,) = detector.detect([picture_of(HAMMER, double)])
+    assert [one.class_name for one in found] == ["hammer"]
+
+
+def test_boxes_are_in_the_pictures_own_pixels_and_inside_it(detector):
+    # 320x480 fills the left 320 of 640 columns at scale 1: what reaches beyond is clipped
+    picture = picture_of(("beer", 0.9, (300, 100, 400, 200)), size=(480, 320))
+    assert detector.detect([picture])[0][0].box == (300.0, 100.0, 320.0, 200.0)
+
+
+def test_what_lies_in_the_padding_is_nothing(detector):
+    assert detector.detect([picture_of(("beer", 0.9, (400, 100, 500, 200)), size=(480, 320))]) == [()]
+
+
+def test_grey_pictures_are_taken(detector):
+    assert detector.detect([picture_of(HAMMER)[:, :, 0]])[0][0].class_name == "hammer"
+
+
+def test_pictures_of_several_sizes_at_once_are_each_judged_alone(file):
+    pictures = [picture_of(HAMMER), np.zeros((7, 900), np.uint8), picture_of(("beer", 0.7, (0, 0, 50, 50)))]
+    one_by_one = load_detector(file).detect(pictures)
+    assert [len(found) for found in one_by_one] == [1, 0, 1]
+    assert load_detector(file, DetectorOptions(at_once=2)).detect(pictures) == one_by_one
+
+
+def test_no_pictures_no_detections(detector):
+    assert detector.detect([]) == []
+
+
+@pytest.mark.parametrize("picture", [np.zeros((1, 1), np.uint8), np.zeros((480, 640, 3), np.uint8)])
+def test_black_and_tiny_pictures_hold_nothing(detector, picture):
+    assert detector.detect([picture]) == [()]
+
+
+@pytest.mark.parametrize("picture", [np.zeros((4, 4, 4), np.uint8), np.zeros((4, 4)), np.empty((0, 5), np.uint8), None])
+def test_what_is_no_picture_is_refused(detector, picture):
+    with pytest.raises(ValueError, match="a picture is"):
+        detector.detect([picture])
+
+
+def test_the_shared_detector_is_loaded_once_when_it_is_used(file, tmp_path):
+    shared = SharedDetector(file)
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(shared.detect([picture_of(HAMMER)]))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 4
+    assert all(one == found[0] for one in found)
+    assert shared.class_names == CLASSES
+
+
+def test_the_shared_detector_of_a_missing_file_says_so_when_it_is_used(tmp_path):
+    shared = SharedDetector(tmp_path / "missing.onnx")
+    with pytest.raises(ModelFileError, match=r"missing\.onnx: there is no such model"):
+        shared.detect([picture_of(HAMMER)])

@@ -1,0 +1,83 @@
+"""Small networks in the detector's form, whose pictures tell them what to find."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+CLASSES = ("beer", "coke", "hammer")
+ANCHORS = 5
+STEP_PX = 2.5
+"""Boxes stand in the picture as bytes, in steps of so many pixels."""
+
+
+def model_bytes(
+    *, classes=CLASSES, form="errand-detector-1", names=None, output="scores", size=(480, 640), metadata=None
+) -> bytes:
+    """A network that reads its answer from the picture's first two rows (red): scores, then boxes."""
+    nodes = [
+        helper.make_node("Gather", ["images", "red"], ["plane"], axis=3),
+        *_read_row("scores", "per_score", output),
+        *_read_row("boxes", "step", "boxes"),
+    ]
+    constants = {
+        "red": np.array(0, np.int64),
+        "per_score": np.array(1 / 250, np.float32),
+        "step": np.array(STEP_PX, np.float32),
+        **_rows("scores", 0, ANCHORS * len(classes), [0, ANCHORS, len(classes)]),
+        **_rows("boxes", 1, ANCHORS * 4, [0, ANCHORS, 4]),
+    }
+    graph = helper.make_graph(
+        nodes,
+        "tiny",
+        [helper.make_tensor_value_info("images", TensorProto.UINT8, ["N", *size, 3])],
+        [
+            helper.make_tensor_value_info("boxes", TensorProto.FLOAT, ["N", ANCHORS, 4]),
+            helper.make_tensor_value_info(output, TensorProto.FLOAT, ["N", ANCHORS, len(classes)]),
+        ],
+        [numpy_helper.from_array(value, name) for name, value in constants.items()],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
+    told = {"format": form, "class_names": json.dumps(list(classes)) if names is None else names}
+    helper.set_model_props(model, told if metadata is None else metadata)
+    onnx.checker.check_model(model)
+    return model.SerializeToString()
+
+
+def _read_row(name, factor, output):
+    """Nodes that make an output of the first bytes of a row."""
+    return [
+        helper.make_node("Slice", ["plane", f"{name}_from", f"{name}_to", f"{name}_axes"], [f"{name}_bytes"]),
+        helper.make_node("Cast", [f"{name}_bytes"], [f"{name}_float"], to=TensorProto.FLOAT),
+        helper.make_node("Mul", [f"{name}_float", factor], [f"{name}_scaled"]),
+        helper.make_node("Reshape", [f"{name}_scaled", f"{name}_shape"], [output]),
+    ]
+
+
+def _rows(name, row, length, shape):
+    return {
+        f"{name}_from": np.array([row, 0], np.int64),
+        f"{name}_to": np.array([row + 1, length], np.int64),
+        f"{name}_axes": np.array([1, 2], np.int64),
+        f"{name}_shape": np.array(shape, np.int64),
+    }
+
+
+def write_model(file: Path, **changes) -> Path:
+    """Such a network in a file."""
+    file.write_bytes(model_bytes(**changes))
+    return file
+
+
+def picture_of(*things, size=(480, 640), classes=CLASSES):
+    """A picture (480, 640, 3) in which that network sees things: (class, score, (u0, v0, u1, v1)).
+
+    Scores come in steps of 1/250, boxes in steps of 2.5 pixels.
+    """
+    picture = np.zeros((*size, 3), dtype=np.uint8)
+    for k, (name, score, box) in enumerate(things):
+        picture[0, k * len(classes) + classes.index(name), 0] = round(score * 250)
+        picture[1, 4 * k : 4 * k + 4, 0] = [round(value / STEP_PX) for value in box]
+    return picture

@@ -25,7 +25,8 @@ from executive.session import Session
 from executive.snapshot import Snapshot
 from executive.tree_run import Ending
 from executive.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, tick_watch
-from skills.api import Cause, Costmap, Localiser, Publish, Worker
+from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
+from skills.detection import NoDetector
 from skills.robot import Clock, LeaseError, Robot
 
 HOLDER = "errand"
@@ -33,13 +34,14 @@ HOLDER = "errand"
 
 @dataclass(frozen=True)
 class RunEntry:
-    """One robot with its tree and estimators, and who keeps notes of its mission."""
+    """One robot with its tree and estimators, what looks through its pictures, and who keeps notes of its mission."""
 
     tree: CompiledTree
     robot: Robot
     localiser: Localiser
     costmap: Costmap
     journal: Journal | None = None
+    detector: Detector = NoDetector()
 
 
 @dataclass(frozen=True)
@@ -179,6 +181,7 @@ class _Run:
             board=Board(slug(entry.tree.robot_name)),
             ask=lambda question: self._control.ask(question, self._clock),
             stop_pressed=lambda: self._control.stop_pressed,
+            detector=entry.detector,
         )
         try:
             return Session(entry.tree, context, keeper, self._control, entry.journal)

@@ -19,6 +19,7 @@ from pydrake.math import RigidTransform
 
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
+from skills.detection import NoDetector
 from skills.robot import Clock, Lease, Pose2D, Robot, Scan
 
 ResultT = TypeVar("ResultT")
@@ -254,6 +255,7 @@ class SkillContext:
     publish: Publish
     seed: int
     ask: Ask = nobody_to_ask
+    detector: Detector = NoDetector()
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""

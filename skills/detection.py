@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Detection", "Detector"]
+__all__ = ["Detection", "Detector", "NoDetector", "NoDetectorError"]
 
 
 @dataclass(frozen=True)
@@ -34,3 +34,18 @@ class Detector(Protocol):
         Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. May take long: call it inside a Worker job. Raises
         ValueError for what is no such picture.
         """
+
+
+class NoDetectorError(RuntimeError):
+    """Pictures were to be looked through where there is no detector."""
+
+
+@dataclass(frozen=True)
+class NoDetector:
+    """Stands where nobody gave a detector: knows no classes, and says so when it is used."""
+
+    class_names: tuple[str, ...] = ()
+
+    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
+        """Raises NoDetectorError."""
+        raise NoDetectorError("there is no detector here: put one into the context's field 'detector'")

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from executive.behaviours.board import Board
-from skills.api import Ask, Costmap, Localiser, Publish, SkillContext, Worker, nobody_to_ask
+from skills.api import Ask, Costmap, Detector, Localiser, Publish, SkillContext, Worker, nobody_to_ask
+from skills.detection import NoDetector
 from skills.robot import Clock, Lease, Robot
 
 
@@ -39,6 +40,7 @@ class RunContext:
     seed: int
     board: Board
     ask: Ask = nobody_to_ask
+    detector: Detector = NoDetector()
     stop_pressed: Callable[[], str | None] = never_pressed
 
     def for_skill(self, path_id: str) -> SkillContext:
@@ -53,4 +55,5 @@ class RunContext:
             publish=self.publish,
             seed=leaf_seed(self.seed, path_id),
             ask=self.ask,
+            detector=self.detector,
         )

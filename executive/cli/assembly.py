@@ -20,6 +20,7 @@ from plant.snapshot.file import SnapshotError
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
 from skills.detect.appearance import load_appearance
+from skills.detect.onnx_detector import SharedDetector
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
 from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
@@ -82,7 +83,14 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
         robot=simulation.robots[tree.robot_name],
         localiser=_localiser(scan_map, world.start, believed),
         costmap=LayeredCostmap(keepout_map),
+        detector=shared_detector(),
     )
+
+
+@cache
+def shared_detector() -> SharedDetector:
+    """The one detector of this process, loaded when it is first used."""
+    return SharedDetector()
 
 
 def _localiser(scan_map: GridMap, start: Pose2D, believed: Pose2D | None) -> ScanMatchingLocaliser:

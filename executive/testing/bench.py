@@ -12,7 +12,8 @@ from executive.behaviours.board import Board, Constant
 from executive.behaviours.context import RunContext
 from executive.behaviours.skill_leaf import SkillLeaf
 from executive.worker import LockStepWorker
-from skills.api import Cause, Costmap, Localiser, Skill, SkillContext
+from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
+from skills.detection import NoDetector
 from skills.robot import Clock, Robot
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
@@ -49,6 +50,7 @@ class SkillBench:
         *,
         localiser: Localiser | None = None,
         costmap: Costmap | None = None,
+        detector: Detector | None = None,
         seed: int = 0,
     ) -> None:
         """Take the robot's lease; time passes by `clock`. Estimators that know all stand in for those left out."""
@@ -65,6 +67,7 @@ class SkillBench:
             publish=lambda topic, message: self.published.append((topic, message)),
             seed=seed,
             board=Board(_PREFIX),
+            detector=detector or NoDetector(),
         )
         self._sense(robot)
 

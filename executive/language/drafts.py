@@ -44,17 +44,51 @@ def draft_commands(deeds: Sequence[Deed]) -> tuple[Draft, ...]:
     """
     drafts: list[Draft] = []
     held: Phrase | None = None
-    for index, deed in enumerate(joined := _one_by_one(_join_going(_without_wishes(deeds)))):
+    for index, deed in enumerate(joined := _set_down(_one_by_one(_join_going(_without_wishes(deeds))))):
         later = any(other.again and other.target == deed.target for other in joined[index + 1 :])
         if _goal(deed, later) is None and deed.verb in lexicon().goal_wanted and not later:
             raise RefusalError(f"{deed.verb} {_name(deed)}: where to?", question=True)
+        if deed.verb in lexicon().source_wanted and deed.source is None and deed.goal is None:
+            raise RefusalError(f"{deed.verb} {_name(deed)}: from where?", [deed.verb])
         if _carried_on(deed, joined[index + 1 :]):
             drafts += [*_taking(deed, held), *_passing(deed, joined[index + 1])]
             held = deed.target
             continue
         drafts += _drafts(deed, held, later)
         held = _held_after(deed, held, later)
-    return tuple(drafts)
+    return tuple(_one_in_hand(drafts))
+
+
+def _one_in_hand(drafts: Sequence[Draft]) -> Iterator[Draft]:
+    """Bring what is in the hand before something else is taken, and then that, too: "grab a coke and a water"."""
+    held: Draft | None = None
+    several = False
+    for draft in drafts:
+        if held is not None and draft.task is Task.GRASP:
+            several = True
+            yield Draft(held.verb, item=held.object, goal=HERE)
+        held = draft if draft.task is Task.GRASP else held if draft.item is None else None
+        yield draft
+    if held is not None and (several or (held.object is not None and held.object.count > 1)):
+        yield Draft(held.verb, item=held.object, goal=HERE)
+
+
+def _set_down(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
+    """Put a thing where it was carried: "take it to the desk and set it down"."""
+    found: list[Deed] = []
+    for deed in deeds:
+        before = found[-1] if found else None
+        puts = deed.kind is VerbKind.PLACE and deed.goal is None and deed.again
+        if before and puts and before.target == deed.target and _carries_somewhere(before):
+            found[-1] = replace(before, kind=VerbKind.PLACE)
+        else:
+            found.append(deed)
+    return tuple(found)
+
+
+def _carries_somewhere(deed: Deed) -> bool:
+    """Whether a thing is carried to a place, not to somebody."""
+    return deed.kind in _GOES_FOR and deed.goal is not None and deed.goal is not HERE and not deed.goal.person
 
 
 def _join_going(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
@@ -64,8 +98,14 @@ def _join_going(deeds: Sequence[Deed]) -> tuple[Deed, ...]:
         before = joined[-1] if joined and joined[-1].kind is VerbKind.GO else None
         takes_source = before and deed.kind in _GOES_FOR and deed.source is None and not deed.again
         takes_goal = before and deed.kind is VerbKind.PLACE and deed.goal is None
-        if before and (takes_source or takes_goal):
+        there = before and deed.kind in _GOES_FOR and deed.source is not None and deed.source.within is None
+        same = before and there and before.goal and deed.source and before.goal.name == deed.source.name
+        back = before and before.goal is HERE and deed.kind is VerbKind.ROUND_TRIP
+        if same or back:
             joined.pop()
+            takes_source = takes_source and not back
+        if before and (takes_source or takes_goal):
+            joined = joined if back else joined[:-1]
             deed = replace(deed, source=before.goal) if takes_source else replace(deed, goal=before.goal)
         joined.append(deed)
     return tuple(joined)
@@ -108,9 +148,8 @@ def _drafts(deed: Deed, held: Phrase | None, later: bool) -> Iterator[Draft]:
 
 def _carried_on(deed: Deed, after: Sequence[Deed]) -> bool:
     """Whether what is carried somewhere is then put down there: "take it to the bathroom, set it on the shelf"."""
-    carries = deed.kind in _GOES_FOR and deed.goal is not None and deed.goal is not HERE and not deed.goal.person
     puts = bool(after) and after[0].kind is VerbKind.PLACE and after[0].again and after[0].target == deed.target
-    return carries and puts and after[0].goal is not None and after[0].goal is not HERE
+    return _carries_somewhere(deed) and puts and after[0].goal is not None and after[0].goal is not HERE
 
 
 def _taking(deed: Deed, held: Phrase | None) -> Iterator[Draft]:

@@ -66,13 +66,17 @@ class Adverb:
 class Being:
     """A form of "to be" as spoken; `existential` with "there", `asked` when it stands before its subject.
 
-    `teller` is somebody who did something with a thing, so that it is where it is ("Anna left her umbrella").
+    `teller` is somebody who did something with a thing, so that it is where it is ("Anna left her umbrella");
+    `narrated` says that it is any verb by which something is told ("somebody spilled milk on the floor"), and
+    `topic` is the thing that it is told of ("the ball rolled under the sofa").
     """
 
     text: str
     existential: bool
     asked: bool
     teller: Phrase | None = None
+    narrated: bool = False
+    topic: Phrase | None = None
 
 
 @dataclass(frozen=True)

@@ -60,11 +60,13 @@ class Lexicon:
     searches: tuple[str, ...]
     short_forms: Mapping[str, str]
     asides: tuple[str, ...]
+    praises: tuple[str, ...]
     hesitations: tuple[str, ...]
     speaker: frozenset[str]
     pronouns: frozenset[str]
     levels: frozenset[str]
     bare_goal: frozenset[str]
+    leaves: frozenset[str]
     needs: frozenset[Phrase]
     here: frozenset[str]
     there: frozenset[str]
@@ -83,6 +85,8 @@ class Lexicon:
     light_nouns: Mapping[str, frozenset[str]]
     light_whole: frozenset[str]
     written: frozenset[str]
+    prepared: frozenset[str]
+    gives: frozenset[str]
     calls: frozenset[str]
 
 
@@ -96,6 +100,7 @@ def lexicon() -> Lexicon:
         goal_wanted=frozenset(verbs["goal_wanted"]),
         source_wanted=frozenset(verbs["source_wanted"]),
         goes_back=frozenset(verbs["goes_back"]),
+        leaves=frozenset(verbs["leaves"]),
         bare_goal=frozenset(verbs["bare_goal"]),
         needs=_phrases(words["needs"]),
         prepositions={
@@ -108,6 +113,7 @@ def lexicon() -> Lexicon:
         searches=_longest_first(words["searches"]),
         short_forms=words["short_forms"],
         asides=_longest_first(words["asides"]),
+        praises=_longest_first(words["praises"]),
         hesitations=_longest_first(words["hesitations"]),
         openers=_longest_first(words["openers"]),
         requests=_longest_first(words["requests"]),
@@ -139,6 +145,8 @@ _WORD_SETS: Final = (
     "told",
     "light_whole",
     "written",
+    "prepared",
+    "gives",
     "calls",
 )
 

@@ -80,12 +80,24 @@ def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[li
         return done, ahead
     if ahead and isinstance(ahead[0], Verb):
         return done[: verb or 0], ahead
+    if verb is not None and not ahead and not mark.soft:
+        return _corrected_by_last(done, verb, mark), rest
     if verb is None or not ahead or not isinstance(ahead[0], Chunk | Adverb):
         return (done, rest) if mark.soft else ([*done, Unknown(mark.word)], rest)
     while ahead and isinstance(new := ahead[0], Chunk | Adverb):
         done = [*done[:verb], *_replaced(done[verb:], new)]
         ahead = ahead[1:]
     return done, ahead
+
+
+def _corrected_by_last(done: list[Item], verb: int, mark: Correction) -> list[Item]:
+    """The last chunk in the place of what it corrects: "the bag to the hall, the trunk I mean"."""
+    last = next((n for n in range(len(done) - 1, verb, -1) if not isinstance(done[n], Separator)), None)
+    new = None if last is None else done[last]
+    before = done[verb:last]
+    if not isinstance(new, Chunk) or _corrected_index(before, new) is None:
+        return [*done, Unknown(mark.word)]
+    return [*done[:verb], *_replaced(before, new)]
 
 
 def _without_separators(items: list[Item]) -> list[Item]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import Final
 
 from executive.language.lexicon import lexicon
@@ -21,10 +22,32 @@ _LEISURE: Final = re.compile(
     re.IGNORECASE,
 )
 _FAVOUR: Final = re.compile(
-    r"\b(?:i'd|i would|it would|it'd|that would|that'd|i'm|i am|we'd|we would)\s+(?:\w+\s+){1,4}if you\b"
+    r"\b(?:i'd|i would|it would|it'd|that would|that'd|i'm|i am|we'd|we would|would)\s+(?:\w+\s+){1,4}(?:if|when) you\b"
     r"(?:\s+(?:could|can|would|might))?",
     re.IGNORECASE,
 )
+_WHILE: Final = re.compile(
+    r"\b(?:while|when|as|since|if|once) you(?:'re| are)(?=\s+(?:in|at|on|near|by)\s+the\b)", re.IGNORECASE
+)
+_KNOWN: Final = re.compile(
+    r"\b(?:do you (?:happen to )?know|tell me|show me|i wonder|i need to know|i want to know|any idea)\s+(?=where\b)",
+    re.IGNORECASE,
+)
+_FOUND: Final = re.compile(
+    r"\byou(?:'ll| will| can| should| may| could)?\s+find\s+(it|them)\s+(?=in|on|at|under|next|by|near)", re.IGNORECASE
+)
+_LIKE: Final = re.compile(r"\b(from|in|on|to|at|into) like (?=(?:the|a|an|my|that|this)\b)", re.IGNORECASE)
+_ORDERS: Final = (
+    re.compile(r"^(?P<then>.*?),?\s+but (?:first|before that),?\s+(?P<first>.*)$", re.IGNORECASE),
+    re.compile(r"^before (?:you )?(?P<then>.*?), (?P<first>.*)$", re.IGNORECASE),
+    re.compile(
+        r"^(?P<first>.*),? before (?:you )?(?P<then>(?:go|going|leave|leaving|return|returning)\b.*)$", re.IGNORECASE
+    ),
+)
+_MIND: Final = re.compile(
+    r"^\W*mind\s+(?=\w+ing\b)|\bbe\s+(?:an?\s+)?(?:(?:so|as)\s+)?\w+\s+and\s+(?=\w)", re.IGNORECASE
+)
+_TOLD_TO: Final = re.compile(r"(^\W*|[,.;]\s*|\b(?:please|and|then|now)\s+)you\s+(?=(\w+)\b)", re.IGNORECASE)
 _WISH: Final = re.compile(
     r"^\W*(?:a|an|one|two|three|four|five|six|some|another|\d{1,2})\s+\w+.*\bplease\W*$", re.IGNORECASE
 )
@@ -48,14 +71,41 @@ def open_commands(text: str) -> str:
     Hesitations and words said twice are left out. Where a polite form stands inside the sentence, a comma takes its
     place. "I would like something to drink" becomes "bring me a drink".
     """
-    text = _wished(_said_once(text))
-    text = re.sub(r"^\W*(please\s+)?robot\b[\s,]*", r"\1", text, flags=re.IGNORECASE)
+    text = _wished(_plainly(_said_once(text)))
+    text = re.sub(
+        r"^\W*((?:(?:please|alright|ok|okay|hey|hi|hello|so|now|well|yes|right)\b[\s,]*)*)robot\b[\s,]*",
+        r"\1",
+        text,
+        flags=re.IGNORECASE,
+    )
     for words, command in _wishes():
-        text = re.sub(rf"\b(?:{_any(words)})\s+(?!you\b|to\b)", f", {command} ", text, flags=re.IGNORECASE)
+        text = re.sub(
+            rf"\b(?:{_any(words)})\s+(?!(?:you|to|that you|if|whether|what|who|how|where)\b)",
+            f", {command} ",
+            text,
+            flags=re.IGNORECASE,
+        )
     for something, thing in _SOMETHING.items():
         text = re.sub(something, thing, text, flags=re.IGNORECASE)
-    text = re.sub(rf"(?:(?:\b(?:{_any(lexicon().openers)}))\b[\s,]*)+", _break, text, flags=re.IGNORECASE)
-    return text.strip(" ,;:-.")
+    text = re.sub(
+        rf"(?:(?:\b(?:{_any(lexicon().openers)}))\b[\s,]*)+{_infinitive()}", _break, text, flags=re.IGNORECASE
+    )
+    return " ".join(text.split()).strip(" ,;:-.")
+
+
+def _plainly(text: str) -> str:
+    """The text without praise for what was done before, and with "you go to the hall" as "go to the hall"."""
+    praised = rf"(?:^|(?<=[,.!?;])\s*)\W*(?:{_any(lexicon().praises)})(?=\s*[,.!;]|\s+(?:now|then|next|so|please)\b)\W*"
+    text = re.sub(praised, "", text, flags=re.IGNORECASE)
+    text = _LIKE.sub(r"\1 ", _FOUND.sub(_are, _KNOWN.sub("", text)))
+    for order in _ORDERS:
+        text = order.sub(r"\g<first>, then \g<then>", text)
+    text = _MIND.sub("", _WHILE.sub("", text))
+    return _TOLD_TO.sub(lambda m: m[1] if (m[2].lower(),) in lexicon().verbs else m[0], text)
+
+
+def _are(match: re.Match[str]) -> str:
+    return "they are " if match[1].lower() == "them" else "it is "
 
 
 def _wishes() -> Iterator[tuple[Sequence[str], str]]:
@@ -79,6 +129,12 @@ def _said_once(text: str) -> str:
     return re.sub(
         r"\b(?!her her\b)(\w+(?:\s\w+){0,2})(?:[\s,]+\1\b)+", r"\1", " ".join(text.split()), flags=re.IGNORECASE
     )
+
+
+@cache
+def _infinitive() -> str:
+    """A "to" that may stand before a verb where none belongs ("could you to bring it")."""
+    return rf"(?:to\s+(?=(?:{_any([w for (w, *rest) in lexicon().verbs if not rest])})\b))?"
 
 
 def _wished(text: str) -> str:

@@ -148,6 +148,11 @@ class Phrase:
         return bool(words - {_ALL}) or (bool(words) and (self.person or not self.plural))
 
     @property
+    def addressed(self) -> bool:
+        """Whether it is a thing of who is spoken to ("your phone"): a robot has none."""
+        return self.kind is NounKind.THING and any(t.word == "your" and t.index < self.head.index for t in self.tokens)
+
+    @property
     def negative(self) -> bool:
         """Whether it says that there is none ("no milk")."""
         return len(self.tokens) > 1 and self.tokens[0].word == "no"
@@ -195,8 +200,9 @@ class Phrase:
         return self.with_extra(*(t.text for t in tokens if t.tag != "DT"))
 
     def consisting_of(self, inner: Phrase) -> Phrase:
-        """The phrase with "of" and what it consists of behind the noun."""
-        return replace(self.with_extra("of", inner.text), of_kind=inner.kind)
+        """The phrase with "of" and what it consists of behind the noun; of a mere number nothing is held."""
+        head = replace(self.head, kind=NounKind.ABSTRACT) if inner.counts else self.head
+        return replace(self.with_extra("of", inner.text), tokens=(*self.tokens[:-1], head), of_kind=inner.kind)
 
     def with_count(self, count: int) -> Phrase:
         """So many of the same."""

@@ -23,6 +23,11 @@ def check_reach(deeds: Sequence[Deed], knowledge: Knowledge | None) -> None:
     Raises:
         RefusalError: any deed is out of reach; it names all that is.
     """
+    shared = [
+        d.goal.phrase.spoken for d in deeds if d.goal is not None and d.goal.phrase is not None and _serves_all(d)
+    ]
+    if shared:
+        raise RefusalError(f"I bring things to one person at a time, not to {', '.join(shared)}; name one", shared)
     people = [f"{d.verb} {d.target.text}" for d in deeds if _carries(d) and d.target is not None and d.target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
@@ -43,6 +48,12 @@ def _named(words: Sequence[str], clause: str) -> str:
     """The words in quotes, and the clause, unless that is all the same."""
     quoted = ", ".join(map(repr, words))
     return quoted if not clause or clause in words else f"{quoted} in {clause!r}"
+
+
+def _serves_all(deed: Deed) -> bool:
+    """Whether a thing is brought to all of some people."""
+    goal = None if deed.goal is None else deed.goal.phrase
+    return _carries(deed) and goal is not None and goal.universal and deed.target is not None
 
 
 def _carries(deed: Deed) -> bool:
@@ -68,7 +79,9 @@ def _moved(deed: Deed) -> bool:
         and goal.phrase.kind is NounKind.PLACE
     ):
         return deed.target.kind is not NounKind.ELSEWHERE
-    if goal not in (None, HERE) and deed.verb in _BY_HAND and deed.target.head.lemma in lexicon().written:
+    laid = deed.kind is VerbKind.PLACE and goal is not None and goal.phrase is not None
+    laid = laid and goal is not None and goal.phrase is not None and goal.phrase.kind is NounKind.PLACE
+    if goal not in (None, HERE) and (deed.verb in _BY_HAND or laid) and deed.target.head.lemma in lexicon().written:
         return True
     role = lexicon().prepositions.get(tuple(deed.source.preposition.split())) if deed.source is not None else None
     place = None if deed.source is None else deed.source.phrase
@@ -79,7 +92,9 @@ def _moved(deed: Deed) -> bool:
 
 def _outside(deed: Deed, moved: bool) -> Iterator[str]:
     """The parts of a deed that are out of reach; `moved` says that its thing lies in a place of the house."""
-    if deed.target is not None and (deed.target.universal or not (moved or _holdable(deed.target, deed))):
+    if deed.target is not None and (
+        deed.target.universal or deed.target.addressed or not (moved or _holdable(deed.target, deed))
+    ):
         yield f"{deed.verb} {deed.target.spoken}"
     for place in (deed.source, deed.goal):
         yield from _outside_place(place, deed)
@@ -89,7 +104,7 @@ def _holdable(phrase: Phrase, deed: Deed) -> bool:
     """Whether it is something to be found, and taken where the deed takes it."""
     if phrase.known:
         return True
-    if deed.kind is VerbKind.FIND and _anybody(phrase) and deed.source is None:
+    if deed.kind is VerbKind.FIND and deed.source is None and (_anybody(phrase) or _cuisine(phrase)):
         return False
     called = phrase.kind is NounKind.VEHICLE and (phrase.indefinite or deed.kind is not VerbKind.FIND)
     if called or (deed.kind is not VerbKind.FIND and _fixture(phrase)):
@@ -100,6 +115,12 @@ def _holdable(phrase: Phrase, deed: Deed) -> bool:
 def _anybody(phrase: Phrase) -> bool:
     """Whether it is any one of some trade ("a good dentist"), who is not looked for in a house."""
     return phrase.kind is NounKind.PERSON and phrase.indefinite and not phrase.named_person
+
+
+def _cuisine(phrase: Phrase) -> bool:
+    """Whether it is any food of some style, as recipes and menus have it ("pasta dishes")."""
+    styled = any(t.relation in ("compound", "amod") and not t.adjective for t in phrase.tokens[:-1])
+    return styled and phrase.plural and phrase.indefinite and phrase.head.lemma in lexicon().prepared
 
 
 def _fixture(phrase: Phrase) -> bool:

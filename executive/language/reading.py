@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from executive.language.items import (
@@ -23,39 +24,32 @@ from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
 from executive.language.nouns import NounKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
+from executive.language.row import LONGEST, Row, command_position
+from executive.language.statements import belongs, narrated, needed, told
+from executive.language.wondering import how_many, where_is
 
 __all__ = ["split_items"]
 
 _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
-_LONGEST: Final = 6
-_RELATIVE: Final = frozenset({"that", "which", "what"})
-_PUT: Final = "put"
-_BELONGS: Final = frozenset({"go", "goes", "belong", "belongs"})
-_WHERE: Final = frozenset({"in", "on", "into", "onto", "inside", "under", "next"})
 _TIMES: Final = frozenset({"early", "hourly", "daily", "nightly", "weekly", "monthly", "yearly", "annually"})
-_BRING: Final = "bring"
+_HAVING: Final = frozenset({"with", "containing", "holding"})
+_WITHIN: Final = frozenset({"in", "on"})
+_AFTER: Final = frozenset({"after", "upon", "by"})
+_LIKE: Final = "like"
 _SIDES: Final = frozenset({"left", "right"})
 _SHOWN: Final = frozenset({"that", "this", "those", "these"})
 _WHO: Final = frozenset({"who", "that", "which"})
 _IS: Final = frozenset({"is", "'s", "are", "'re"})
 
 
-@dataclass
-class _Reader:
+class _Reader(Row):
     """Reads the row from left to right."""
 
-    tokens: Sequence[Token]
-    phrases: Mapping[int, Phrase]
-    words: Lexicon
-    at: int = 0
-
     def read(self) -> Iterable[Item]:
-        steps = (
+        steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
-            self._told,
-            self._needed,
-            self._belongs,
+            *(partial(step, self) for step in (where_is, how_many, told, narrated, needed, belongs)),
             self._verb,
             self._being,
             self._chunk,
@@ -64,22 +58,16 @@ class _Reader:
         )
         items: list[Item] = []
         while self.at < len(self.tokens):
+            if self.at in self.silent:
+                self.at += 1
+                continue
             item = next((found for step in steps if (found := step(items)) is not None), None)
             items.append(item if item is not None else self._unknown())
         return items
 
-    def _match(self, phrases: Container[tuple[str, ...]]) -> tuple[str, ...] | None:
-        """The longest of the phrases that stands here."""
-        for length in range(_LONGEST, 0, -1):
-            piece = self.tokens[self.at : self.at + length]
-            spoken = tuple(t.word for t in piece)
-            if len(piece) == length and spoken in phrases:
-                return spoken
-        return None
-
     def _mark(self, items: list[Item]) -> Item | None:
         """What takes something back: "not", "no, the hammer"."""
-        correction, negation = self._match(self.words.corrections), self._match(self.words.negations)
+        correction, negation = self.match(self.words.corrections), self.match(self.words.negations)
         if correction is not None and len(correction) >= len(negation or ()) and self._is_correction(len(correction)):
             self.at += len(correction)
             return Correction(" ".join(correction), self.words.corrections[correction])
@@ -93,54 +81,8 @@ class _Reader:
         behind = self.tokens[self.at + length : self.at + length + 1]
         return self.tokens[self.at].word != "no" or length > 1 or not behind or behind[0].pos not in ("NOUN", "ADJ")
 
-    def _told(self, items: list[Item]) -> Item | None:
-        """ "I left it in the hall" tells where a thing is; behind a noun it tells only which one is meant."""
-        subject = items[-1] if items else None
-        if not isinstance(subject, Chunk) or self.tokens[self.at].word not in self.words.told:
-            return None
-        phrase = subject.phrase
-        if subject.role is not None or not (phrase.head.word in self.words.subjects or phrase.person):
-            return None
-        items.pop()
-        text = self._words(1)
-        if items and isinstance(items[-1], Unknown) and items[-1].word.lower() in _RELATIVE:
-            items.pop()
-        relative = bool(items) and isinstance(items[-1], Chunk)
-        teller = phrase if phrase.person else None
-        return Separator("") if relative else Being(text, existential=True, asked=False, teller=teller)
-
-    def _needed(self, items: list[Item]) -> Item | None:
-        """ "The patient in room four needs a blanket" asks to bring somebody something."""
-        found = self._match(self.words.needs)
-        first = len(items) - 1
-        while found is not None and first > 0 and isinstance(item := items[first], Chunk) and item.role is not None:
-            first -= 1
-        who = items[first] if found is not None and first >= 0 else None
-        behind = self.tokens[self.at + len(found or ()) :][:1]
-        if found is None or not isinstance(who, Chunk) or not _may_need(who) or not _command_position(items[:first]):
-            return None
-        if not behind or behind[0].tag in ("TO", "IN") or behind[0].pos in ("PUNCT", "CCONJ"):
-            return None
-        self.at += len(found)
-        items.insert(first, Verb(_BRING, self.words.verbs[(_BRING,)]))
-        return Separator("")
-
-    def _belongs(self, items: list[Item]) -> Item | None:
-        """ "The plates go in the cupboard" asks to put them there."""
-        thing = items[-1] if items else None
-        behind = self.tokens[self.at + 1 : self.at + 2]
-        if self.tokens[self.at].word not in _BELONGS or not behind or behind[0].word not in _WHERE:
-            return None
-        if not isinstance(thing, Chunk) or thing.role is not None or not _command_position(items[:-1]):
-            return None
-        if thing.phrase.speaker or thing.phrase.person or thing.phrase.kind is NounKind.PERSON:
-            return None
-        self.at += 1
-        items.insert(-1, Verb(_PUT, self.words.verbs[(_PUT,)]))
-        return Separator("")
-
     def _verb(self, items: list[Item]) -> Item | None:
-        found = self._match(self.words.verbs) or self._gerund(items)
+        found = self.match(self.words.verbs) or self._gerund(items)
         if found is not None and self._takes_preposition(found):
             found = found[:-1]
         if found is None or not self._is_verb(items, len(found)):
@@ -153,16 +95,19 @@ class _Reader:
         if verb[:-1] not in self.words.verbs:
             return False
         start = self.at + len(verb) - 1
-        ahead = tuple(t.word for t in self.tokens[start : start + _LONGEST])
+        place = self.phrase_at(start + 1)
+        if verb[-1] in _WITHIN and place is not None and place.kind is NounKind.PLACE:
+            return True
+        ahead = tuple(t.word for t in self.tokens[start : start + LONGEST])
         return any(ahead[:n] in self.words.prepositions for n in range(2, len(ahead) + 1))
 
     def _gerund(self, items: list[Item]) -> tuple[str, ...] | None:
         """A verb that stands as "bringing" or "brought" where a command begins, as behind "would you mind"."""
         first = self.tokens[self.at]
         past = first.tag in ("VBD", "VBN") and not items
-        if not (past or (first.tag == "VBG" and _command_position(items))):
+        if not (past or (first.tag == "VBG" and command_position(items))):
             return None
-        spoken = (first.lemma, *(t.word for t in self.tokens[self.at + 1 : self.at + _LONGEST]))
+        spoken = (first.lemma, *(t.word for t in self.tokens[self.at + 1 : self.at + LONGEST]))
         return next((spoken[:n] for n in range(len(spoken), 0, -1) if spoken[:n] in self.words.verbs), None)
 
     def _is_verb(self, items: list[Item], length: int) -> bool:
@@ -171,30 +116,25 @@ class _Reader:
         if token.pos == "VERB" and token.tag in _VERB_TAGS and not inside:
             return True
         following = self.tokens[self.at + length : self.at + length + 1]
-        return _command_position(items) and bool(following) and following[0].word not in _SEPARATORS
+        return command_position(items) and bool(following) and following[0].word not in _SEPARATORS
 
     def _being(self, items: list[Item]) -> Item | None:
         token = self.tokens[self.at]
         after = self.tokens[self.at + 1 : self.at + 2]
         modal = int(token.tag == "MD" and bool(after) and after[0].word == "be")
-        if modal or (token.lemma == "be" and token.pos in ("AUX", "VERB") and self._match(self.words.fillers) is None):
+        if modal or (token.lemma == "be" and token.pos in ("AUX", "VERB") and self.match(self.words.fillers) is None):
             second = self.tokens[self.at + 1 + modal : self.at + 2 + modal]
             existential = bool(second) and second[0].tag == "EX"
-            return Being(self._words(1 + modal + existential), existential, asked=not modal)
+            return Being(self.take(1 + modal + existential), existential, asked=not modal)
         if token.tag == "EX" or (token.word == "there" and after and after[0].lemma == "be"):
             verb = next((t.index for t in self.tokens[self.at + 1 : self.at + 4] if t.lemma == "be"), self.at)
-            return Being(self._words(verb + 1 - self.at), existential=True, asked=False)
+            return Being(self.take(verb + 1 - self.at), existential=True, asked=False)
         return None
 
-    def _words(self, count: int) -> str:
-        """The next words, which are then read."""
-        self.at += count
-        return " ".join(t.text for t in self.tokens[self.at - count : self.at])
-
     def _chunk(self, items: list[Item]) -> Item | None:
-        preposition = self._match(self.words.prepositions) or ()
+        preposition = self.match(self.words.prepositions) or ()
         start = self.at + len(preposition)
-        phrase = self._phrase_at(start) or self._shown_at(start)
+        phrase = self.phrase_at(start) or self._shown_at(start)
         if phrase is None:
             return None if preposition else self._level(items)
         self.at = start + len(phrase.tokens)
@@ -218,18 +158,10 @@ class _Reader:
         role = PrepositionRole.AT if looks else PrepositionRole.GOAL
         return Chunk(Phrase((replace(token, pos="NOUN", tag="NN", kind=NounKind.PLACE),)), "", role)
 
-    def _phrase_at(self, start: int) -> Phrase | None:
-        """The noun phrase that begins at `start`, also when what came before took its first words."""
-        whole = self.phrases.get(start)
-        if whole is not None:
-            return whole
-        cut = next((p for first, p in self.phrases.items() if first < start < first + len(p.tokens)), None)
-        return None if cut is None else Phrase(tuple(t for t in cut.tokens if t.index >= start))
-
     def _shown_at(self, start: int) -> Phrase | None:
         """The noun phrase behind a "that" which was not read as its article ("hand me that cup")."""
         shown = start < len(self.tokens) and self.tokens[start].word in _SHOWN
-        phrase = self._phrase_at(start + 1) if shown else None
+        phrase = self.phrase_at(start + 1) if shown else None
         if phrase is None or phrase.named_person or phrase.head.word in self.words.subjects:
             return None
         return Phrase((replace(self.tokens[start], tag="DT", pos="DET"), *phrase.tokens))
@@ -237,7 +169,7 @@ class _Reader:
     def _of(self, phrase: Phrase) -> Phrase:
         """Join "of wine" to a bottle, and "of cups" to "two" or "a couple"."""
         while self.at < len(self.tokens) and self.tokens[self.at].word == "of":
-            inner = self._phrase_at(self.at + 1)
+            inner = self.phrase_at(self.at + 1)
             if inner is None:
                 break
             self.at += 1 + len(inner.tokens)
@@ -272,12 +204,12 @@ class _Reader:
         token = self.tokens[self.at]
         if phrase.person and token.tag == "VBG":
             return self._doing_end()
-        side = self._phrase_at(self.at + 1) if token.word == "on" else None
+        side = self.phrase_at(self.at + 1) if token.word == "on" else None
         if side is not None and side.head.word in _SIDES:
             end = self.at + 1 + len(side.tokens)
             return end if end == len(self.tokens) or self.tokens[end].word != "of" else self.at
-        joins = token.word == "with" or (phrase.person and token.word in ("in", "wearing") and self._worn())
-        inner = self._phrase_at(self.at + 1) if joins else None
+        joins = token.word in _HAVING or (phrase.person and token.word in ("in", "wearing") and self._worn())
+        inner = self.phrase_at(self.at + 1) if joins else None
         if inner is None or inner.person or inner.speaker or inner.pronoun:
             return self.at
         return self.at + 1 + len(inner.tokens)
@@ -291,13 +223,13 @@ class _Reader:
 
     def _worn(self) -> bool:
         """Whether what stands behind the next word is worn: clothes, or a colour."""
-        inner = self._phrase_at(self.at + 1)
+        inner = self.phrase_at(self.at + 1)
         return inner is not None and inner.head.lemma in self.words.worn
 
     def _doing_end(self) -> int:
         """The end of "raising their left arm" or "wearing a blue shirt": what is done, and in which direction."""
         end = self.at + 1
-        inner = self._phrase_at(end)
+        inner = self.phrase_at(end)
         if inner is not None and not inner.person:
             end += len(inner.tokens)
         while end < len(self.tokens) and (more := self._directional(end)):
@@ -309,7 +241,7 @@ class _Reader:
         if self.tokens[start].relation == "prt":
             return 1
         preposition = int(self.tokens[start].pos in ("ADP", "PART"))
-        phrase = self._phrase_at(start + preposition)
+        phrase = self.phrase_at(start + preposition)
         if phrase is None or phrase.head.lemma not in self.words.directions:
             return 0
         return preposition + len(phrase.tokens)
@@ -320,6 +252,12 @@ class _Reader:
             self.at += 1
             return Separator("")
         behind = self.tokens[self.at + 1 : self.at + 2]
+        if token.word == _LIKE and self._wanting(items) and self.phrase_at(self.at + 1):
+            self.at += 1
+            return Separator("")
+        if self._purpose(items) or (not items and token.word in _AFTER and behind and behind[0].tag == "VBG"):
+            self.at += 1
+            return Separator("")
         if token.tag == "RB" and token.word.endswith("ly") and token.word not in _TIMES:
             self.at += 1
             return Separator(token.word)
@@ -332,18 +270,35 @@ class _Reader:
         if token.word in ("if", "whether"):
             self.at += 1
             return Whether()
-        filler = self._particle(items) or self._match(self.words.fillers)
+        filler = self._particle(items) or self.match(self.words.fillers)
         if filler is None:
             return None
         self.at += len(filler)
         return Separator(" ".join(filler))
 
+    def _purpose(self, items: Sequence[Item]) -> bool:
+        """Whether "to" stands between going and what is gone for ("go to take the broom")."""
+        going = bool(items) and isinstance(items[-1], Verb) and VerbKind.GO in items[-1].kinds
+        behind = self.ahead()
+        verb = bool(behind) and behind[0].tag == "VB" and (behind[0].word,) in self.words.verbs
+        return going and verb and self.tokens[self.at].tag == "TO"
+
+    def _wanting(self, items: Sequence[Item]) -> bool:
+        """Whether what is wanted comes next, so that "like" says nothing ("I need like a towel")."""
+        asked = isinstance(items[-1], Verb) if items else False
+        return asked or (bool(items) and self.tokens[self.at - 1].word in ("me", "us"))
+
     def _points(self, items: Sequence[Item]) -> bool:
         """Whether "over there" only goes with a "that", as in "that clamp over there"."""
         thing = next((item for item in reversed(items) if not isinstance(item, Separator)), None)
-        if not isinstance(thing, Chunk) or thing.role is not None or self.tokens[self.at - 1].word != "over":
+        if not isinstance(thing, Chunk) or thing.role is not None or not self._beyond():
             return False
         return thing.phrase.tokens[0].word in _SHOWN and not thing.phrase.pronoun
+
+    def _beyond(self) -> bool:
+        """Whether "over" stands before the next word, or a preposition behind it."""
+        behind = self.ahead()
+        return self.tokens[self.at - 1].word == "over" or (bool(behind) and behind[0].tag == "IN")
 
     def _particle(self, items: list[Item]) -> tuple[str, ...] | None:
         """Join a particle to its verb: "put the cup down"."""
@@ -361,7 +316,7 @@ class _Reader:
     def _outside(self, items: list[Item]) -> Item | None:
         """A verb that the robot does not know, where a clause may begin."""
         token = self.tokens[self.at]
-        if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (_command_position(items) or token.tag == "VB"):
+        if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (command_position(items) or token.tag == "VB"):
             return None
         self.at += 1
         return Outside(token.text)
@@ -370,17 +325,6 @@ class _Reader:
         token = self.tokens[self.at]
         self.at += 1
         return Unknown(token.text)
-
-
-def _may_need(chunk: Chunk) -> bool:
-    """Whether it is somebody else who can be brought what they need."""
-    somebody = chunk.phrase.person or chunk.phrase.kind is NounKind.PERSON
-    return chunk.role is None and somebody and chunk.phrase.head.word not in ("her", "him", "them")
-
-
-def _command_position(items: Sequence[Item]) -> bool:
-    """Whether a command may begin behind these items."""
-    return not items or isinstance(items[-1], Separator)
 
 
 def split_items(tokens: Sequence[Token], phrases: Mapping[int, Phrase], words: Lexicon) -> tuple[Item, ...]:

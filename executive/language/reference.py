@@ -121,8 +121,11 @@ def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
 def _stated(action: Action, before: Resolved) -> Resolved:
     """Remember a statement; "it is in the drawer" tells where the thing of an earlier deed is."""
     where = _place(action.source, before.memory)
-    person = before.memory.person if action.teller is None else Location(action.teller)
+    at = where if not action.objects else None
+    person = before.memory.person if action.teller is None else Location(action.teller, within=at)
     memory = replace(before.memory, where=where, place=where or before.memory.place, person=person)
+    if where is not None and any(phrase.stands_for_somebody for phrase in action.objects) and before.memory.person:
+        return _met(replace(before.memory.person, within=where), before)
     if not any(phrase.pronoun for phrase in action.objects):
         return replace(before, memory=_told(action, where, memory))
     told = tuple(
@@ -130,6 +133,13 @@ def _stated(action: Action, before: Resolved) -> Resolved:
         for deed in before.deeds
     )
     return replace(before, deeds=told, memory=memory)
+
+
+def _met(person: Location, before: Resolved) -> Resolved:
+    """Remember where somebody who was spoken of is to be met: "bring it to Robin, he is in the hall"."""
+    old = before.memory.person
+    deeds = tuple(replace(deed, goal=person) if deed.goal == old else deed for deed in before.deeds)
+    return replace(before, deeds=deeds, memory=replace(before.memory, person=person, place=person.within))
 
 
 def _told(action: Action, where: Location | None, memory: Memory) -> Memory:

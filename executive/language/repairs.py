@@ -33,7 +33,11 @@ def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
             found[at] = replace(found[at], pos="ADJ", tag="JJ", head=at + 1, relation="amod")
         elif found[at].word == "no" and _pos(found, at + 1) not in ("NOUN", "ADJ"):
             found[at] = replace(found[at], pos="INTJ", tag="UH", relation="intj")
-        elif _container(found, at) or _noun(found, at):
+        elif _contracted(found, at):
+            found[at] = replace(found[at], pos="AUX", tag="VBZ", lemma="be", relation="root")
+        elif _particle_within(found, at):
+            found[at] = replace(found[at], relation="compound", head=at + 1)
+        elif _named_thing(found, at) or _container(found, at) or _noun(found, at):
             _join_noun(found, at)
         elif _name(found, at):
             found[at] = replace(found[at], pos="PROPN", tag="NNP", relation="obl", head=at - 1)
@@ -53,6 +57,25 @@ def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
     return tuple(found)
 
 
+def _contracted(tokens: Sequence[Token], at: int) -> bool:
+    """Whether "'s" is the verb and no possessive: a preposition follows ("Anna's in the hall")."""
+    behind = tokens[at + 1 : at + 2]
+    return tokens[at].tag == "POS" and tokens[at].word == "'s" and bool(behind) and behind[0].tag in ("IN", "VBG")
+
+
+def _particle_within(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a particle stands within the name of a thing ("the washing up liquid")."""
+    article = at > 1 and tokens[at - 2].pos == "DET"
+    gerund = article and tokens[at - 1].word.endswith("ing") and tokens[at].tag == "RP"
+    return gerund and _pos(tokens, at + 1) == "NOUN"
+
+
+def _named_thing(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a word behind an article that was read as an adverb is the noun ("the brolly")."""
+    adverb = tokens[at].tag == "RB" and tokens[at - 1].tag in ("DT", "PRP$")
+    return adverb and _pos(tokens, at + 1) in _AFTER_NOUN
+
+
 def _attribute(tokens: Sequence[Token], at: int) -> bool:
     """Whether a verb before a noun is an attribute of it ("clean towels")."""
     return tokens[at].pos == "VERB" and is_attribute(tokens[at].text) and _pos(tokens, at + 1) == "NOUN"
@@ -66,9 +89,10 @@ def _container(tokens: Sequence[Token], at: int) -> bool:
 
 
 def _noun(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a verb stands right behind a noun, has nothing to do there, and is a good name for a place or a thing."""
+    """Whether a verb or a name in lower case behind a noun has nothing to do there, and can be a place or a thing."""
     token = tokens[at]
     verb = token.pos == "VERB" and token.tag in ("VB", "VBP") and _pos(tokens, at - 1) == "NOUN"
+    verb = verb or (token.pos == "PROPN" and token.text.islower() and _pos(tokens, at - 1) == "NOUN")
     alone = _pos(tokens, at + 1) in _AFTER_NOUN and not _begins_command(tokens, at)
     return verb and alone and token.kind in (NounKind.PLACE, NounKind.THING)
 

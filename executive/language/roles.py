@@ -49,6 +49,7 @@ class Location:
         return f"{self.name} {self.within.preposition} {self.within.text}"
 
 
+_JOINTS: Final = frozenset({",", ";", "and", "or", "then", "also", "plus", "second", "but"})
 _LISTING: Final = frozenset({",", ""})
 _HERE_NAME: Final = "start"
 HERE: Final = Location(None)
@@ -60,7 +61,7 @@ class Roles:
     """What stands behind a verb, sorted: bare noun phrases, places by their prepositions, and what is left over.
 
     `first_at` is where the first of the bare phrases is to be found when that is somebody, `listed` says that "and"
-    stands between them. `choices` are phrases with "or" between them.
+    stands between them. `choices` are phrases with "or" between them. `favour` says that "for me" stands there.
     """
 
     objects: list[Phrase] = field(default_factory=list)
@@ -75,6 +76,7 @@ class Roles:
     paths: list[Location] = field(default_factory=list)
     choices: list[list[Phrase]] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
+    favour: bool = False
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Spoken]:
             roles.unknown.append(item.word)
         elif isinstance(item, Whether):
             roles.unknown.append("if")
-        joint = item.word if isinstance(item, Separator) else ""
+        joint = "" if not isinstance(item, Separator) else item.word if item.word in _JOINTS else joint
 
 
 def _describe(spoken: list[_Spoken]) -> list[_Spoken]:
@@ -193,7 +195,9 @@ def _alike(before: Chunk, chunk: Chunk) -> bool:
 
 def _add_bare(roles: Roles, one: _Placed) -> None:
     roles.listed = roles.listed or (bool(one.joint) and bool(roles.objects))
-    if one.joint and (roles.goals or roles.ats) and not roles.sources:
+    if one.chunk.phrase.stands_for_one and roles.objects and one.joint in _LISTING and one.within is None:
+        roles.objects[-1] = one.chunk.phrase.instead_of_one(roles.objects[-1])
+    elif one.joint and (roles.goals or roles.ats) and not roles.sources:
         roles.joined_goals.append(one.location)
     elif one.within is not None and one.chunk.phrase.person and not roles.objects:
         roles.objects.append(one.chunk.phrase)
@@ -220,6 +224,7 @@ def _add_at(roles: Roles, one: _Placed) -> None:
 def _add_for(roles: Roles, one: _Placed) -> None:
     if one.chunk.phrase.speaker or one.chunk.phrase.person:
         roles.recipient = one.location
+        roles.favour = one.chunk.phrase.speaker
     else:
         roles.searched = one.chunk.phrase
 

@@ -1,5 +1,5 @@
 """`python -m executive.cli` is `errand`."""
 
-from executive.cli.main import main
+from executive.cli.entry import main
 
 main()

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from executive.cli.output import console_for, print_json, refusals
+from executive.cli.score_command import score_command
 from executive.errors import InputError
 from plant.dataset.errors import DatasetError
 from plant.dataset.shards import Summary, render
@@ -26,6 +27,9 @@ dataset = typer.Typer(name="dataset", help="Pictures with labels, made in the pl
 @dataset.callback()
 def _group() -> None:
     """Pictures with labels, made in the plant."""
+
+
+dataset.command(name="score")(score_command)
 
 
 @dataset.command(name="render")

@@ -16,6 +16,7 @@ from rich.table import Table
 from executive.cli.answers import Answers
 from executive.cli.check_command import check
 from executive.cli.dataset_command import dataset
+from executive.cli.detect_command import detect
 from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run
 from executive.cli.listen_command import hear_request, listen
 from executive.cli.log_command import log
@@ -66,6 +67,7 @@ app.command()(new_skill)
 app.command()(resume)
 app.add_typer(queue)
 app.add_typer(dataset)
+app.command()(detect)
 
 
 @app.command()

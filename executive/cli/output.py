@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -22,8 +22,8 @@ def console_for(as_json: bool) -> Console:
     return Console(stderr=as_json, highlight=False, soft_wrap=True)
 
 
-def print_json(value: Mapping[str, Any]) -> None:
-    """One JSON object on one line of standard output."""
+def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:
+    """One JSON object or array on one line of standard output."""
     sys.stdout.write(json.dumps(value, ensure_ascii=False, allow_nan=False) + "\n")
     sys.stdout.flush()
 

@@ -19,7 +19,7 @@ from skills.detect.scoring_matching import Matches, match
 from skills.detect.scoring_precision import Counts, average_precision, counts_at
 from skills.detection import Detection
 
-__all__ = ["SURE_SCORE", "Bin", "ClassScore", "Score", "picture_errors", "score"]
+__all__ = ["SURE_SCORE", "Bin", "ClassScore", "Judged", "Score", "judged", "picture_errors", "score"]
 
 OVERLAPS: Final = tuple(float(value) for value in np.linspace(0.5, 0.95, 10))
 SURE_SCORE: Final = 0.5
@@ -100,6 +100,35 @@ def score(pictures: Sequence[LabelledPicture], found: Sequence[Found], class_nam
         by_distance_m=_bins(labels, DISTANCE_EDGES_M, lambda one: one.distance_m if one.seen_enough else None),
         by_visibility=_bins(labels, VISIBILITY_EDGES, lambda one: one.visibility if one.large_enough else None),
     )
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What is right and wrong in a picture of the detections from SURE_SCORE on, and which labels are missed.
+
+    What is passed over is in neither.
+    """
+
+    right: tuple[Detection, ...]
+    wrong: tuple[Detection, ...]
+    missed: tuple[Label, ...]
+
+
+def judged(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -> Judged:
+    """Sort a picture's detections and labels."""
+    sure = tuple(one for one in _limited(found) if one.score >= SURE_SCORE)
+    right, wrong, missed = list[Detection](), list[Detection](), list[Label]()
+    for name in class_names:
+        own = [one for one in sure if one.class_name == name]
+        labels = [label for label in picture.labels if label.class_name == name]
+        result = _matches(picture, sure, name, counts=lambda label: label.counts, at=OVERLAPS[:1])
+        told = zip(own, result.found[0], result.passed[0], strict=True)
+        for one, hit, passed in told:
+            if not passed:
+                (right if hit else wrong).append(one)
+        found_by = zip(labels, result.label_found[0], strict=True)
+        missed += [label for label, finder in found_by if label.counts and finder < 0]
+    return Judged(tuple(right), tuple(wrong), tuple(missed))
 
 
 def picture_errors(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -> float:

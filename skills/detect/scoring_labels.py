@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final
 
 __all__ = ["LEAST_LONG_PX", "LEAST_SHORT_PX", "LEAST_VISIBILITY", "Label", "LabelledPicture", "pictures_of_coco"]
@@ -53,10 +53,11 @@ class Label:
 
 @dataclass(frozen=True)
 class LabelledPicture:
-    """A picture's file, as named by its data set, and all that is known to be in it."""
+    """A picture's file, as named by its data set, all that is known to be in it, and its width and height if told."""
 
     file: str
-    labels: tuple[Label, ...] = field(default=())
+    labels: tuple[Label, ...] = ()
+    size_px: tuple[int, int] | None = None
 
     @property
     def only_distractors(self) -> bool:
@@ -93,7 +94,11 @@ def pictures_of_coco(document: Mapping[str, Any], class_names: Sequence[str]) ->
             labels[picture].append(_label(entry, name, k))
     order = sorted(files, key=lambda number: (isinstance(number, str), number))
     return tuple(
-        LabelledPicture(str(_value(files[number], "file_name", "images", k)), tuple(labels[number]))
+        LabelledPicture(
+            file=str(_value(files[number], "file_name", "images", k)),
+            labels=tuple(labels[number]),
+            size_px=_size(files[number]),
+        )
         for k, number in enumerate(order)
     )
 
@@ -126,6 +131,11 @@ def _label(entry: Mapping[str, Any], name: str, k: int) -> Label:
         )
     except (TypeError, ValueError) as error:
         raise ValueError(f"annotations[{k}]: bbox is four numbers (x, y, width, height), not {box!r}") from error
+
+
+def _size(image: Mapping[str, Any]) -> tuple[int, int] | None:
+    width, height = image.get("width"), image.get("height")
+    return (width, height) if isinstance(width, int) and isinstance(height, int) else None
 
 
 def _number(value: Any) -> float | None:

@@ -9,7 +9,7 @@ CLASSES = ("hammer", "person")
 
 def coco(**changes):
     document = {
-        "images": [{"id": 7, "file_name": "b.jpg"}, {"id": 3, "file_name": "a.jpg"}],
+        "images": [{"id": 7, "file_name": "b.jpg", "width": 64, "height": 48}, {"id": 3, "file_name": "a.jpg"}],
         "annotations": [
             {"id": 1, "image_id": 7, "category_id": 90, "bbox": [10, 20, 30, 40], "visibility": 0.5, "distance_m": 2.5},
             {"id": 2, "image_id": 7, "category_id": 4, "bbox": [1, 2, 3, 4], "iscrowd": 1},
@@ -23,6 +23,7 @@ def coco(**changes):
 def test_categories_go_by_name_and_pictures_by_their_ids():
     first, second = pictures_of_coco(coco(), CLASSES)
     assert (first.file, first.labels, first.only_distractors) == ("a.jpg", (), True)
+    assert (first.size_px, second.size_px) == (None, (64, 48))
     assert second.labels == (
         Label("hammer", (10.0, 20.0, 40.0, 60.0), visibility=0.5, distance_m=2.5),
         Label("person", (1.0, 2.0, 4.0, 6.0), crowd=True),

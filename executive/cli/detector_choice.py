@@ -1,0 +1,54 @@
+"""The detector that a command uses, and detections drawn into pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.errors import InputError
+from skills.detect.detector_file import MODEL_FILE, ModelFileError
+from skills.detect.onnx_detector import DetectorOptions, OnnxDetector, load_detector
+from skills.detection import Detection
+
+__all__ = ["FOUND_COLOUR", "detector_of", "draw_box", "drawn"]
+
+Picture = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+FOUND_COLOUR: Final = (40, 200, 60)
+_LINE_PER_PX: Final = 1 / 320
+
+
+def detector_of(file: Path | None, options: DetectorOptions) -> OnnxDetector:
+    """The detector of a file, or the one that comes with Errand. Raises InputError when it cannot be used."""
+    try:
+        return load_detector(file or MODEL_FILE, options)
+    except ModelFileError as error:
+        raise InputError(error.message, mend=error.mend, file=error.file) from error
+
+
+def drawn(picture: Picture, found: Sequence[Detection]) -> Picture:
+    """A copy of a picture (H, W, 3) RGB with the boxes of what was found, the surest on top."""
+    copy = picture.copy()
+    for one in reversed(found):
+        draw_box(copy, one.box, f"{one.class_name} {one.score:.2f}", FOUND_COLOUR)
+    return copy
+
+
+def draw_box(picture: Picture, box: tuple[float, float, float, float], text: str, colour: Colour) -> None:
+    """Draw a box and its name above it, or inside where there is no room, into a picture."""
+    u0, v0, u1, v1 = (round(value) for value in box)
+    line = max(1, round(max(picture.shape[:2]) * _LINE_PER_PX))
+    size = 0.4 * line
+    cv2.rectangle(picture, (u0, v0), (u1, v1), colour, line)
+    (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size / 2 + 0.25, line)
+    top = v0 - height - 2 * line if v0 - height - 2 * line >= 0 else v0
+    left = max(0, min(u0, picture.shape[1] - width))
+    cv2.rectangle(picture, (left, top), (left + width, top + height + 2 * line), colour, cv2.FILLED)
+    place = (left, top + height + line)
+    cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, size / 2 + 0.25, (0, 0, 0), line, cv2.LINE_AA)

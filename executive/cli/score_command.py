@@ -1,0 +1,151 @@
+"""`errand dataset score`: how good the detector is on labelled pictures."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from executive.cli.detector_choice import detector_of
+from executive.cli.output import console_for, print_json, refusals
+from executive.cli.picture_files import Picture, read_picture, write_picture
+from executive.cli.score_report import score_json, show_score
+from executive.cli.worst_sheet import Shown, contact_sheet
+from executive.errors import InputError
+from skills.detect.onnx_detector import DetectorOptions, OnnxDetector
+from skills.detect.scoring import judged, picture_errors, score
+from skills.detect.scoring_labels import LabelledPicture, pictures_of_coco
+from skills.detection import Detection
+
+__all__ = ["score_command"]
+
+LEAST_SCORE: Final = 0.01
+TIMED_PICTURES: Final = 200
+WORST: Final = 20
+
+Found = tuple[Detection, ...]
+
+
+@dataclass(frozen=True)
+class _Work:
+    """Labelled pictures, where they are, and the detector that is judged."""
+
+    pictures: tuple[LabelledPicture, ...]
+    files: tuple[Path, ...]
+    detector: OnnxDetector
+
+
+def score_command(
+    data: Annotated[Path, typer.Option(help="A COCO file; its pictures' names count from its folder.")],
+    model: Annotated[Path | None, typer.Option(help="Another detector's file; else the one of Errand.")] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Another folder from which the names count.")] = None,
+    limit: Annotated[int | None, typer.Option(min=1, help="Only so many pictures, the first.")] = None,
+    worst: Annotated[int | None, typer.Option(min=1, help="How many of the worst pictures to name.")] = None,
+    sheet: Annotated[Path | None, typer.Option(help="Draw the worst pictures, 20 unless said, into this PNG.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
+) -> None:
+    """Judge the detector by labelled pictures: average precision as COCO has it, precision, recall, speed."""
+    console = console_for(as_json)
+    with refusals():
+        drawing = _png(sheet)
+        work = _work(data, pictures or data.parent, limit, detector_of(model, DetectorOptions(threshold=LEAST_SCORE)))
+        found = _all_found(work, console)
+        names = work.detector.class_names
+        told = score(work.pictures, found, names)
+        speed = _pictures_per_second(work)
+        order = _worst_first(work, found)[: worst or (WORST if drawing else 0)]
+        if drawing is not None:
+            write_picture(drawing, contact_sheet([_shown(work, found, k) for k in order]))
+    named = [{"file": work.pictures[k].file, "error": round(_error(work, found, k), 3)} for k in order]
+    if as_json:
+        print_json({"data": str(data), **score_json(told, speed), **({"worst": named} if named else {})})
+    else:
+        show_score(console, told, speed)
+        for one in named:
+            console.print(f"{one['error']:7.3f}  {one['file']}", markup=False)
+
+
+def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector) -> _Work:
+    """Read the labels, and see that all pictures are there. Raises InputError."""
+    try:
+        labelled = pictures_of_coco(_document(data), detector.class_names)[:limit]
+    except ValueError as error:
+        raise InputError(str(error), mend="name a COCO file with --data", file=data) from error
+    files = tuple(folder / picture.file for picture in labelled)
+    missing = [file for file in files if not file.is_file()]
+    if missing:
+        what = f"{len(missing)} of {len(files)} pictures are not there"
+        raise InputError(what, mend="name the folder from which their names count with --pictures", file=missing[0])
+    if not files:
+        raise InputError("it names no pictures", mend="name a COCO file with pictures with --data", file=data)
+    return _Work(labelled, files, detector)
+
+
+def _document(data: Path) -> Any:
+    """The JSON value of a file. Raises InputError, or ValueError for what is no JSON."""
+    try:
+        return json.loads(data.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(
+            f"cannot read it ({error.strerror})", mend="name a COCO file with --data", file=data
+        ) from error
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise ValueError(f"it is no JSON ({error})") from error
+
+
+def _all_found(work: _Work, console: Console) -> list[Found]:
+    """What is found in each picture, also what is hardly sure."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        numbers = bar.track(range(len(work.files)), description="pictures")
+        return [work.detector.detect([_read(work, k)])[0] for k in numbers]
+
+
+def _read(work: _Work, k: int) -> Picture:
+    """A picture of the size that its labels are for. Raises InputError."""
+    picture, told = read_picture(work.files[k]), work.pictures[k].size_px
+    size = picture.shape[1], picture.shape[0]
+    if told is not None and told != size:
+        what = f"it has {size[0]} x {size[1]} pixels, and its labels are for {told[0]} x {told[1]}"
+        raise InputError(what, mend="label it as it is, or put back the picture that was labelled", file=work.files[k])
+    return picture
+
+
+def _pictures_per_second(work: _Work) -> float:
+    """From a picture in memory to its final boxes at the usual threshold: one over the median of the times."""
+    detector = OnnxDetector(work.detector.model)
+    times_s = list[float]()
+    for k in range(min(len(work.files), TIMED_PICTURES)):
+        picture = _read(work, k)
+        begun = time.perf_counter()
+        detector.detect([picture])
+        times_s.append(time.perf_counter() - begun)
+    return 1.0 / statistics.median(times_s)
+
+
+def _worst_first(work: _Work, found: Sequence[Found]) -> list[int]:
+    return sorted(range(len(work.files)), key=lambda k: -_error(work, found, k))
+
+
+def _error(work: _Work, found: Sequence[Found], k: int) -> float:
+    return picture_errors(work.pictures[k], found[k], work.detector.class_names)
+
+
+def _shown(work: _Work, found: Sequence[Found], k: int) -> Shown:
+    told = judged(work.pictures[k], found[k], work.detector.class_names)
+    return Shown(work.pictures[k].file, _read(work, k), told)
+
+
+def _png(sheet: Path | None) -> Path | None:
+    """Raises InputError for a name that does not end in .png."""
+    if sheet is not None and sheet.suffix.lower() != ".png":
+        raise InputError("the sheet is a PNG", mend=f"call it {sheet.with_suffix('.png').name}", file=sheet)
+    return sheet

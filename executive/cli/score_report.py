@@ -1,0 +1,99 @@
+"""Figures of a detector, for scripts and for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from skills.detect.scoring import Bin, ClassScore, Score
+
+__all__ = ["score_json", "show_score"]
+
+
+def score_json(told: Score, pictures_per_second: float) -> dict[str, Any]:
+    """All figures as JSON values; null where there are none."""
+    return {
+        "pictures": told.pictures,
+        "mAP50": _rounded(told.map50),
+        "mAP50-95": _rounded(told.map50_95),
+        "precision": _rounded(told.precision),
+        "recall": _rounded(told.recall),
+        "per_class": {one.name: _class_json(one) for one in told.classes},
+        "distractor_pictures": told.distractor_pictures,
+        "false_per_100_distractor_pictures": _rounded(told.false_per_100_distractor_pictures),
+        "frames_per_second": round(pictures_per_second, 1),
+        "by_size_px": _bins_json(told.by_size_px),
+        "by_distance_m": _bins_json(told.by_distance_m),
+        "by_visibility": _bins_json(told.by_visibility),
+    }
+
+
+def _class_json(one: ClassScore) -> dict[str, Any]:
+    return {
+        "labels": one.labels,
+        "AP50": _rounded(one.ap50),
+        "AP50-95": _rounded(one.ap50_95),
+        "precision": _rounded(one.precision),
+        "recall": _rounded(one.recall),
+    }
+
+
+def _bins_json(bins: Sequence[Bin]) -> list[dict[str, Any]]:
+    return [
+        {
+            "from": one.low,
+            "to": None if math.isinf(one.high) else one.high,
+            "labels": one.labels,
+            "recall": _rounded(one.recall),
+        }
+        for one in bins
+    ]
+
+
+def show_score(console: Console, told: Score, pictures_per_second: float) -> None:
+    """Print tables and a line on the rest."""
+    table = Table("class", "labels", "AP50", "AP50-95", "precision", "recall")
+    for one in told.classes:
+        figures = (one.ap50, one.ap50_95, one.precision, one.recall)
+        table.add_row(one.name, str(one.labels), *(_shown(value) for value in figures))
+    table.add_section()
+    labels = sum(one.labels for one in told.classes)
+    figures = (told.map50, told.map50_95, told.precision, told.recall)
+    table.add_row("all", str(labels), *(_shown(value) for value in figures))
+    console.print(table)
+    for name, bins in (
+        ("longer side, px", told.by_size_px),
+        ("distance, m", told.by_distance_m),
+        ("visibility", told.by_visibility),
+    ):
+        _show_bins(console, name, bins)
+    false = _shown(told.false_per_100_distractor_pictures, digits=1)
+    console.print(
+        f"{told.pictures} pictures, {told.distractor_pictures} of them with nothing to find: {false} false detections "
+        f"in a hundred of those; {pictures_per_second:.0f} pictures a second"
+    )
+
+
+def _show_bins(console: Console, name: str, bins: Sequence[Bin]) -> None:
+    filled = [one for one in bins if one.labels]
+    if filled:
+        table = Table(name, *(_range(one) for one in filled))
+        table.add_row("labels", *(str(one.labels) for one in filled))
+        table.add_row("recall", *(_shown(one.recall) for one in filled))
+        console.print(table)
+
+
+def _range(one: Bin) -> str:
+    return f"{one.low:g} -" if math.isinf(one.high) else f"{one.low:g} - {one.high:g}"
+
+
+def _shown(value: float | None, digits: int = 3) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 4)

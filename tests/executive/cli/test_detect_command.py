@@ -1,0 +1,140 @@
+"""`errand detect` with a small network whose pictures tell what it sees."""
+
+import json
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from tiny_detector import picture_of, write_model
+from typer.testing import CliRunner
+
+from executive.cli.entry import light_app
+
+HAMMER = ("hammer", 0.9, (100, 50, 200, 80))
+BEER = ("beer", 0.6, (0, 0, 50, 50))
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    return write_model(tmp_path_factory.mktemp("model") / "tiny.onnx")
+
+
+@pytest.fixture
+def detect(model):
+    def invoked(*arguments):
+        return CliRunner().invoke(light_app(), ["detect", "--model", str(model), *(str(one) for one in arguments)])
+
+    return invoked
+
+
+def picture(file, *things):
+    cv2.imwrite(str(file), picture_of(*things)[:, :, ::-1])
+    return file
+
+
+def told(result):
+    return json.loads(result.stdout.splitlines()[-1])
+
+
+def test_pictures_are_told_in_their_order(detect, tmp_path):
+    both = picture(tmp_path / "z.png", HAMMER, BEER)
+    nothing = picture(tmp_path / "a.png")
+    result = detect(both, nothing, "--json")
+    assert result.exit_code == 0
+    first, second = told(result)
+    assert first["file"] == str(both)
+    assert first["detections"] == [
+        {"class": "hammer", "score": 0.9, "box": [100.0, 50.0, 200.0, 80.0]},
+        {"class": "beer", "score": 0.6, "box": [0.0, 0.0, 50.0, 50.0]},
+    ]
+    assert (second["file"], second["detections"]) == (str(nothing), [])
+    assert first["ms"] > 0
+    assert set(first) == {"file", "detections", "ms"}
+
+
+def test_the_threshold_is_heeded(detect, tmp_path):
+    file = picture(tmp_path / "a.png", HAMMER, BEER)
+    assert len(told(detect(file, "--json", "--threshold", "0.7"))[0]["detections"]) == 1
+    assert len(told(detect(file, "--json", "--threshold", "0"))[0]["detections"]) >= 2
+
+
+def test_a_table_is_shown_to_people(detect, tmp_path):
+    result = detect(picture(tmp_path / "a.png", HAMMER), picture(tmp_path / "b.png"))
+    assert "hammer" in result.stdout
+    assert "100, 50, 200, 80" in result.stdout
+    assert "nothing" in result.stdout
+
+
+def test_boxes_are_drawn_under_the_pictures_names(detect, tmp_path):
+    (tmp_path / "other").mkdir()
+    files = [picture(tmp_path / "a.png", HAMMER), picture(tmp_path / "other" / "a.png", BEER)]
+    assert detect(*files, "--draw", tmp_path / "drawn").exit_code == 0
+    assert sorted(file.name for file in (tmp_path / "drawn").iterdir()) == ["a-2.png", "a.png"]
+    drawn = cv2.imread(str(tmp_path / "drawn" / "a.png"))
+    assert drawn.shape == (480, 640, 3)
+    assert drawn[80, 150].any()
+    assert not drawn[65, 150].any()
+
+
+def test_an_unreadable_picture_keeps_no_other_from_being_told(detect, tmp_path):
+    (tmp_path / "b.txt").write_text("no picture")
+    result = detect(
+        picture(tmp_path / "a.png", HAMMER), tmp_path / "b.txt", picture(tmp_path / "c.png", BEER), "--json"
+    )
+    assert result.exit_code == 2
+    assert result.stderr == (
+        f"errand: {tmp_path / 'b.txt'}: it is no picture; name a file in PNG, JPEG, WebP, TIFF or BMP\n"
+    )
+    assert [len(one["detections"]) for one in told(result)] == [1, 0, 1]
+    assert "it is no picture" in told(result)[1]["error"]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [np.zeros((1, 1), np.uint8), np.zeros((480, 640, 3), np.uint8), np.zeros((9, 30_000), np.uint8)],
+    ids=["one pixel", "black", "long"],
+)
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_odd_pictures_hold_nothing(detect, tmp_path, content, dtype):
+    cv2.imwrite(str(tmp_path / "a.png"), content.astype(dtype))
+    result = detect(tmp_path / "a.png", "--json")
+    assert result.exit_code == 0
+    assert told(result)[0]["detections"] == []
+
+
+@pytest.mark.parametrize("arguments", [(), ("--threshold", "2", "a.png"), ("--threshold", "nan", "a.png")])
+def test_wrong_arguments_are_refused(detect, arguments):
+    assert detect(*arguments).exit_code == 2
+
+
+def test_a_missing_model_is_named_with_the_command_that_makes_one(tmp_path):
+    arguments = ["detect", str(picture(tmp_path / "a.png")), "--model", str(tmp_path / "none.onnx"), "--json"]
+    result = CliRunner().invoke(light_app(), arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert result.stderr == (
+        f"errand: {tmp_path / 'none.onnx'}: there is no such model of the detector; "
+        "make a new one: errand dataset train --data DIR --out DIR\n"
+    )
+
+
+def test_neither_the_plant_nor_the_language_is_loaded_for_it(model, tmp_path):
+    file = picture(tmp_path / "a.png", HAMMER)
+    program = (
+        "import sys; from executive.cli.entry import main\n"
+        f"sys.argv = ['errand', 'detect', '--json', '--model', {str(model)!r}, {str(file)!r}]\n"
+        "try: main()\n"
+        "except SystemExit as end: assert not end.code, end.code\n"
+        "print(sorted({name.split('.')[0] for name in sys.modules} & {'pydrake', 'spacy', 'plant', 'scipy', 'torch'}))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1] == "[]"
+    assert "hammer" in run.stdout
+
+
+def test_all_other_commands_are_there_too(tmp_path):
+    run = subprocess.run([sys.executable, "-m", "executive.cli", "--help"], capture_output=True, text=True, check=True)
+    for name in ("detect", "dataset", "parse", "run"):
+        assert f" {name} " in run.stdout

@@ -24,7 +24,7 @@ from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind, lexic
 from executive.language.nouns import NounKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
-from executive.language.roles import HERE, Location, Roles, read_roles
+from executive.language.roles import HERE, THERE, Location, Roles, read_roles
 
 __all__ = ["Action", "read_actions"]
 
@@ -53,6 +53,7 @@ class Action:
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
 _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
 _FRONTED: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
+_IF: Final = "if"
 _OUT_OF: Final = "out of"
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
@@ -106,7 +107,8 @@ def _named_first(fronted: Sequence[Item], clause: Clause) -> bool:
     chunks = [item for item in fronted if isinstance(item, Chunk)]
     named = len(chunks) == len(fronted) and bool(chunks) and chunks[0].role is None and not chunks[0].phrase.pronoun
     placed = named and all(chunk.role in _FRONTED for chunk in chunks[1:]) and not chunks[0].phrase.speaker
-    return placed and any(isinstance(item, Chunk) and item.phrase.pronoun for item in clause.items)
+    meant = [item.phrase for item in clause.items if isinstance(item, Chunk)]
+    return placed and any(phrase.pronoun or phrase.text == chunks[0].phrase.text for phrase in meant)
 
 
 def _without_reasons(clauses: Sequence[Clause]) -> Sequence[Clause]:
@@ -122,11 +124,20 @@ def _without_reasons(clauses: Sequence[Clause]) -> Sequence[Clause]:
 
 def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
     """Leave out "see" and "check" before "if there is": the question stands alone."""
+    before: Clause | None = None
     for clause, after in zip_longest(clauses, clauses[1:]):
-        checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
+        checks = _checks(clause)
         tries = checks and after is not None and isinstance(after.verb, Verb) and _only_whether(clause)
+        if clause.whether and not _checks(before):
+            clause = replace(clause, verb=Outside(_IF))
         if not (checks and after is not None and after.whether) and not tries:
             yield clause
+        before = clause
+
+
+def _checks(clause: Clause | None) -> bool:
+    """Whether its verb asks how things stand."""
+    return clause is not None and isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
 
 
 def _only_whether(clause: Clause) -> bool:
@@ -158,9 +169,10 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     objects = [*([clause.subject.phrase] if clause.subject else []), *roles.objects]
     if clause.subject and not being.asked and roles.recipient is not None and len(objects) == 1 and not roles.unknown:
         return Action(None, being.text, tuple(objects), teller=roles.recipient.phrase)
-    places = [*roles.ats, *roles.sources]
+    there = [place for place in roles.goals if place == THERE]
+    places = [*roles.ats, *roles.sources, *there]
     place = next(iter(places), None)
-    simple = len(objects) == 1 and len(places) <= 1 and not roles.goals and not roles.unknown
+    simple = len(objects) == 1 and len(places) <= 1 and len(roles.goals) == len(there) and not roles.unknown
     fits = simple and (place or being.existential)
     asked_for = any(map(_asks, objects))
     before = [clause.subject] if clause.subject else []
@@ -251,6 +263,8 @@ def _kind(verb: Verb, roles: Roles) -> VerbKind:
 def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     """One action for each place to go to."""
     bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
+    if len(bare) == 1 and bare[0] is not HERE and len(roles.ats) == 1 and not roles.goals:
+        bare = [replace(bare[0], within=roles.ats.pop())]
     if bare and blank.verb.endswith((" down", " up", " along")):
         bare = [] if roles.goals else bare
     elif bare and blank.verb not in words.bare_goal:
@@ -260,7 +274,7 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     places = places or roles.paths
     if not places and blank.verb in words.goes_back:
         places = [HERE]
-    recipient = None if roles.favour else roles.recipient
+    recipient = None if roles.recipient is HERE and roles.favour else roles.recipient
     unfit = (recipient, None if headed is not None else roles.searched)
     extra = [part.text for part in unfit if part is not None]
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
@@ -288,12 +302,14 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     """
     goals, sources, ats = list(roles.goals), list(roles.sources), list(roles.ats)
     if roles.recipient is not None:
-        goals = [*goals, roles.recipient] if goals and not goals[0].person else [roles.recipient, *goals]
+        to_place = bool(goals) and not goals[0].person
+        rest = [] if to_place and roles.favour else [roles.recipient]
+        goals = [*goals, *rest] if to_place else [roles.recipient, *goals]
     at_is_goal = blank.kind is VerbKind.PLACE or blank.verb in words.at_is_goal or len(ats) > 1
     if ats and not goals and at_is_goal:
         goals.append(ats.pop())
     sources += ats
-    goal = next(iter(goals), None)
+    goal = next(iter(goals), HERE if blank.verb in words.hands and not sources else None)
     shared = roles.joined_goals if goal is not None and _for_each(roles) else []
     rivals = [place.phrase for place in ([] if shared else [goal, *roles.joined_goals]) if place and place.phrase]
     if len(rivals) > 1:

@@ -40,6 +40,11 @@ def split_clauses(items: Iterable[Item]) -> tuple[Clause, ...]:
 
 def _ungapped(clause: Clause) -> Iterator[Clause]:
     """Say the verb again where it was left out: "a beer to Robin and a coke to Charlie"."""
+    given = next((n for n in range(1, len(clause.items) - 1) if _gives_another(clause.items, n)), None)
+    if given is not None and isinstance(clause.verb, Verb):
+        yield replace(clause, items=clause.items[:given])
+        yield from _ungapped(Clause(clause.verb, clause.items[given + 1 :]))
+        return
     cut = next((n for n in range(1, len(clause.items) - 1) if _gap(clause.items, n)), None)
     if cut is None or not isinstance(clause.verb, Verb):
         yield clause
@@ -48,6 +53,15 @@ def _ungapped(clause: Clause) -> Iterator[Clause]:
     first = clause.items[0]
     recipient = (first,) if isinstance(first, Chunk) and first.role is None and first.phrase.speaker else ()
     yield from _ungapped(Clause(clause.verb, (*recipient, *clause.items[cut + 1 :])))
+
+
+def _gives_another(items: Sequence[Item], at: int) -> bool:
+    """Whether somebody else and what they are given stand behind a separator: "me the book and Anna the pen"."""
+    joint, who, what = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
+    if not (isinstance(joint, Separator) and isinstance(who, Chunk) and isinstance(what, Chunk)):
+        return False
+    bare = who.role is None and what.role is None and isinstance(items[at - 1], Chunk)
+    return bare and (who.phrase.person or who.phrase.speaker) and not (what.phrase.person or what.phrase.speaker)
 
 
 def _gap(items: Sequence[Item], at: int) -> bool:

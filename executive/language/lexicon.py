@@ -87,6 +87,7 @@ class Lexicon:
     written: frozenset[str]
     prepared: frozenset[str]
     gives: frozenset[str]
+    hands: frozenset[str]
     calls: frozenset[str]
 
 
@@ -147,6 +148,7 @@ _WORD_SETS: Final = (
     "written",
     "prepared",
     "gives",
+    "hands",
     "calls",
 )
 

@@ -16,6 +16,10 @@ MAX_WORDS: Final = 60
 MAX_CHARACTERS: Final = 800
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _SOMETHING: Final = {r"\b(?:something|anything) to drink\b": "a drink", r"\b(?:something|anything) to eat\b": "food"}
+_RESTART: Final = re.compile(
+    r"\b((?:i|we|you) \w+) to (?=\1\b)|\b(\w+) (?:the|a|an|my|this|that) (?=\2 (?:the|a|an|my|this|that|it)\b)",
+    re.IGNORECASE,
+)
 _LEISURE: Final = re.compile(
     r"\b(?:if|when|whenever|once|as soon as) you(?:'ve)? (?:have|get|got|find|can spare)? ?(?:a|an|the|some|any)? ?"
     r"(?:free |spare )?(?:minute|second|moment|sec|time|chance|opportunity)\b,?",
@@ -31,6 +35,21 @@ _WHILE: Final = re.compile(
 )
 _KNOWN: Final = re.compile(
     r"\b(?:do you (?:happen to )?know|tell me|show me|i wonder|i need to know|i want to know|any idea)\s+(?=where\b)",
+    re.IGNORECASE,
+)
+_RELATIVE: Final = re.compile(
+    r"\b(?:which|that)\s+you(?:'ll| will| can| should)?\s+find\s+(?=in|on|at|under|next|by|near)", re.IGNORECASE
+)
+_BACK: Final = re.compile(
+    r"\b(?:to )?where (?:i am|we are|i'm|we're|you (?:started|were|came|began)(?: from)?)\b", re.IGNORECASE
+)
+_TASK: Final = re.compile(
+    r"^\W*(?:so )?(?:the|your|our|my)\s+(?:(?:last|next|first|other|only)\s+)?(?:thing|one|item|step|task|job)\b"
+    r"[^,.]{0,30}?\bis(?: to)?\s+(?!in\b|on\b|at\b|not\b)",
+    re.IGNORECASE,
+)
+_CALLED: Final = re.compile(
+    r"(?:,|\bplease\b)\s*(?:mate|buddy|pal|dude|love|dear|darling|sweetie|honey|bro)\W*$|^\W*(?:mate|buddy|pal|dude|bro),",
     re.IGNORECASE,
 )
 _FOUND: Final = re.compile(
@@ -95,8 +114,11 @@ def open_commands(text: str) -> str:
 
 def _plainly(text: str) -> str:
     """The text without praise for what was done before, and with "you go to the hall" as "go to the hall"."""
-    praised = rf"(?:^|(?<=[,.!?;])\s*)\W*(?:{_any(lexicon().praises)})(?=\s*[,.!;]|\s+(?:now|then|next|so|please)\b)\W*"
+    praise = rf"(?:(?:almost|nearly|all|very|so|really)\s+)?(?:{_any(lexicon().praises)})"
+    praised = rf"(?:^|(?<=[,.!?;])\s*)\W*{praise}(?=\s*[,.!;]|\s+(?:now|then|next|so|please)\b)\W*"
     text = re.sub(praised, "", text, flags=re.IGNORECASE)
+    text = _CALLED.sub("", _TASK.sub("", text))
+    text = _BACK.sub("here", _RELATIVE.sub("that is ", text))
     text = _LIKE.sub(r"\1 ", _FOUND.sub(_are, _KNOWN.sub("", text)))
     for order in _ORDERS:
         text = order.sub(r"\g<first>, then \g<then>", text)
@@ -121,6 +143,7 @@ def _said_once(text: str) -> str:
     text = re.sub(
         rf"(?<![\w'])(?:{_any(list(full))})(?![\w'])", lambda m: full[m[0].lower()], text, flags=re.IGNORECASE
     )
+    text = _RESTART.sub("", text)
     text = _FAVOUR.sub("please", _LEISURE.sub("", text))
     verbs = [" ".join(words) for words in lexicon().verbs if len(words) == 1]
     text = re.sub(rf"(?<!\bi )(?<!d )\blike,?\s+(?=(?:{_any(verbs)})\b)", "", text, flags=re.IGNORECASE)

@@ -149,7 +149,9 @@ class Phrase:
 
     @property
     def addressed(self) -> bool:
-        """Whether it is a thing of who is spoken to ("your phone"): a robot has none."""
+        """Whether it is who is spoken to, or a thing of theirs ("your phone"): a robot has none."""
+        if len(self.tokens) == 1 and self.head.word in ("you", "yourself"):
+            return True
         return self.kind is NounKind.THING and any(t.word == "your" and t.index < self.head.index for t in self.tokens)
 
     @property

@@ -153,6 +153,8 @@ class _Reader(Row):
         ahead = self.tokens[self.at : self.at + 1]
         if ahead and (ahead[0].pos == "ADP" or ahead[0].tag in ("TO", "IN")):
             return Separator("")
+        if items and isinstance(items[-1], Chunk) and items[-1].role is not None:
+            return Separator("")
         verb = next((item for item in reversed(items) if isinstance(item, Verb | Being)), None)
         looks = not isinstance(verb, Verb) or VerbKind.FIND in verb.kinds
         role = PrepositionRole.AT if looks else PrepositionRole.GOAL

@@ -18,7 +18,7 @@ from executive.language.tokens import Token
 
 __all__ = ["repaired"]
 
-_AFTER_NOUN: Final = frozenset({"", "ADP", "PUNCT", "CCONJ"})
+_AFTER_NOUN: Final = frozenset({"", "ADP", "PUNCT", "CCONJ", "INTJ"})
 _BEGINS_OBJECT: Final = frozenset({"DT", "PRP", "PRP$", "CD"})
 _DEMONSTRATIVES: Final = frozenset({"that", "this", "these", "those"})
 _BEFORE_INFINITIVE: Final = frozenset({"want", "need", "like", "love", "have", "try", "wish", "hope", "plan", "ask"})
@@ -92,6 +92,8 @@ def _noun(tokens: Sequence[Token], at: int) -> bool:
     """Whether a verb or a name in lower case behind a noun has nothing to do there, and can be a place or a thing."""
     token = tokens[at]
     verb = token.pos == "VERB" and token.tag in ("VB", "VBP") and _pos(tokens, at - 1) == "NOUN"
+    past = token.tag in ("VBD", "VBN") and (token.word,) not in lexicon().fillers
+    verb = verb or (past and token.kind is NounKind.PLACE and tokens[at - 1].pos == "NOUN")
     verb = verb or (token.pos == "PROPN" and token.text.islower() and _pos(tokens, at - 1) == "NOUN")
     alone = _pos(tokens, at + 1) in _AFTER_NOUN and not _begins_command(tokens, at)
     return verb and alone and token.kind in (NounKind.PLACE, NounKind.THING)

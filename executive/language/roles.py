@@ -61,7 +61,8 @@ class Roles:
     """What stands behind a verb, sorted: bare noun phrases, places by their prepositions, and what is left over.
 
     `first_at` is where the first of the bare phrases is to be found when that is somebody, `listed` says that "and"
-    stands between them. `choices` are phrases with "or" between them. `favour` says that "for me" stands there.
+    stands between them. `choices` are phrases with "or" between them. `favour` says that the recipient stood
+    behind "for".
     """
 
     objects: list[Phrase] = field(default_factory=list)
@@ -133,6 +134,8 @@ def _describe(spoken: list[_Spoken]) -> list[_Spoken]:
     beside, named = spoken[first].chunk, spoken[first - 1].chunk
     if beside.role is not PrepositionRole.BESIDE or named.role is not None:
         return spoken
+    if spoken[places[1]].chunk.role is PrepositionRole.AT and beside.phrase.kind is NounKind.THING:
+        return spoken
     phrase = named.phrase.with_extra(*beside.preposition.split(), beside.phrase.text)
     described = replace(spoken[first - 1], chunk=replace(named, phrase=phrase))
     return [*spoken[: first - 1], described, *spoken[first + 1 :]]
@@ -197,7 +200,7 @@ def _add_bare(roles: Roles, one: _Placed) -> None:
     roles.listed = roles.listed or (bool(one.joint) and bool(roles.objects))
     if one.chunk.phrase.stands_for_one and roles.objects and one.joint in _LISTING and one.within is None:
         roles.objects[-1] = one.chunk.phrase.instead_of_one(roles.objects[-1])
-    elif one.joint and (roles.goals or roles.ats) and not roles.sources:
+    elif one.joint and (roles.goals or roles.ats) and not roles.sources and not _another_thing(roles, one.chunk.phrase):
         roles.joined_goals.append(one.location)
     elif one.within is not None and one.chunk.phrase.person and not roles.objects:
         roles.objects.append(one.chunk.phrase)
@@ -207,6 +210,12 @@ def _add_bare(roles: Roles, one: _Placed) -> None:
         roles.ats.append(one.within)
     else:
         roles.objects.append(one.chunk.phrase)
+
+
+def _another_thing(roles: Roles, phrase: Phrase) -> bool:
+    """Whether what is joined to a place is one more thing for it ("the salt to the kitchen and the pepper too")."""
+    place = (roles.goals or roles.ats)[-1].phrase
+    return phrase.kind is NounKind.THING and place is not None and place.kind is NounKind.PLACE and bool(roles.objects)
 
 
 def _add_source(roles: Roles, one: _Placed) -> None:
@@ -224,7 +233,7 @@ def _add_at(roles: Roles, one: _Placed) -> None:
 def _add_for(roles: Roles, one: _Placed) -> None:
     if one.chunk.phrase.speaker or one.chunk.phrase.person:
         roles.recipient = one.location
-        roles.favour = one.chunk.phrase.speaker
+        roles.favour = True
     else:
         roles.searched = one.chunk.phrase
 
@@ -246,7 +255,8 @@ _ADD: Final = {
 
 def _receives(first: Phrase, roles: Roles) -> bool:
     """Whether the first of several bare phrases is given the others: somebody, or an animal."""
-    return first.person or (first.kind is NounKind.PERSON and not roles.listed)
+    them = first.stands_for_somebody and not roles.listed
+    return first.person or them or (first.kind is NounKind.PERSON and not roles.listed)
 
 
 def _split_recipient(roles: Roles) -> None:

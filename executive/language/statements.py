@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from executive.language.items import Being, Chunk, Item, Separator, Unknown, Verb
+from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
 from executive.language.row import Row, command_position
 
@@ -54,16 +56,22 @@ def needed(row: Row, items: list[Item]) -> Item | None:
 
 def belongs(row: Row, items: list[Item]) -> Item | None:
     """ "The plates go in the cupboard" asks to put them there."""
-    thing = items[-1] if items else None
+    first = len(items) - 1
+    while first > 0 and isinstance(item := items[first], Chunk) and item.role is not None:
+        first -= 1
+    thing = items[first] if first >= 0 else None
     behind = row.tokens[row.at + 1 : row.at + 2]
     if row.tokens[row.at].word not in _BELONGS or not behind or behind[0].word not in _WHERE:
         return None
-    if not isinstance(thing, Chunk) or thing.role is not None or not command_position(items[:-1]):
+    if not isinstance(thing, Chunk) or thing.role is not None or not command_position(items[:first]):
         return None
     if thing.phrase.speaker or thing.phrase.person or thing.phrase.kind is NounKind.PERSON:
         return None
     row.at += 1
-    items.insert(-1, Verb(_PUT, row.words.verbs[(_PUT,)]))
+    items[first + 1 :] = [
+        replace(item, role=PrepositionRole.SOURCE) if isinstance(item, Chunk) else item for item in items[first + 1 :]
+    ]
+    items.insert(first, Verb(_PUT, row.words.verbs[(_PUT,)]))
     return Separator("")
 
 
@@ -99,7 +107,9 @@ def _told_verb(row: Row) -> int:
     progressive = first.lemma == "be" and tags[1:2] == ["VBG"] and (words[1],) not in row.words.fillers
     perfect = first.lemma == "have" and first.pos == "AUX" and tags[1:2] == ["VBN"]
     future = words[1:] == ["going", "to"] and [t.tag for t in row.tokens[row.at + 3 : row.at + 4]] == ["VB"]
-    return 2 if (progressive or perfect) and not future else 0
+    if progressive and future:
+        return 4
+    return 2 if progressive or perfect else 0
 
 
 def _may_need(chunk: Chunk) -> bool:

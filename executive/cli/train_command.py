@@ -1,0 +1,109 @@
+"""`errand dataset train`: the detector learns from a data set's pictures."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from executive.cli.output import console_for, print_json, refusals
+from executive.errors import InputError
+from skills.detect.training.labels import TrainingDataError, read_split
+from skills.detect.training.schedule import Budget
+
+if TYPE_CHECKING:
+    from skills.detect.training.train import Report
+
+__all__ = ["train_command"]
+
+NEEDED: Final = ("torch", "onnx")
+UNLESS_SAID_MINUTES: Final = 240.0
+
+
+def train_command(
+    data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
+    out: Annotated[Path, typer.Option(help="Folder for checkpoints, curves and the ONNX file.")],
+    minutes: Annotated[
+        float | None, typer.Option(min=0.01, help="How long to learn; four hours unless said.", show_default=False)
+    ] = None,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how often to see each picture.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all that is drawn by chance.")] = 1,
+    jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
+    start: Annotated[Path | None, typer.Option(help="A checkpoint whose weights are taken over at first.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
+) -> None:
+    """Train the detector and export it, with checkpoints and curves on the way."""
+    console = console_for(as_json)
+    with refusals():
+        _check(minutes, epochs, out, resume)
+        model, figures = _trained(data, out, minutes, epochs, seed, jobs or os.cpu_count() or 1, resume, start, console)
+    console.print(f"{model}: {_line(figures)}")
+    if as_json:
+        print_json({"model": str(model), "figures": figures})
+
+
+def _check(minutes: float | None, epochs: int | None, out: Path, resume: bool) -> None:
+    """Raise InputError for what cannot be begun."""
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(f"training needs {' and '.join(missing)}", mend="pip install '.[train]'")
+    if minutes is not None and epochs is not None:
+        raise InputError("--minutes and --epochs are both given", mend="give one of them")
+    if (out / "checkpoint.pt").exists() and not resume:
+        raise InputError(f"{out}: holds a training already", mend="go on with it by --resume, or name another --out")
+
+
+def _trained(
+    data: Path,
+    out: Path,
+    minutes: float | None,
+    epochs: int | None,
+    seed: int,
+    jobs: int,
+    resume: bool,
+    start: Path | None,
+    console: Console,
+) -> tuple[Path, dict[str, float]]:
+    """The ONNX file and its figures. Raises InputError."""
+    from skills.detect.training.train import TrainOptions, train
+
+    figures = dict[str, float]()
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
+        task = bar.add_task("learning", total=1.0)
+
+        def told(report: Report) -> None:
+            bar.update(task, completed=report.progress, description=_told(report))
+            if report.figures is not None:
+                figures.update(report.figures)
+                console.print(f"{report.progress:4.0%}  {_line(report.figures)}")
+
+        try:
+            budget = _budget(data, minutes, epochs)
+            options = TrainOptions(data, out, budget, seed=seed, processes=jobs, resume=resume, start=start)
+            return train(options, told), figures
+        except TrainingDataError as error:
+            raise InputError(error.message, mend=error.mend) from error
+        except OSError as error:
+            raise InputError(f"{out}: cannot be written ({error})", mend="name another folder, or make room") from error
+
+
+def _budget(data: Path, minutes: float | None, epochs: int | None) -> Budget:
+    if epochs is not None:
+        return Budget(pictures=epochs * len(read_split(data, "train")))
+    return Budget(seconds=60.0 * (UNLESS_SAID_MINUTES if minutes is None else minutes))
+
+
+def _told(report: Report) -> str:
+    scores, boxes = report.losses
+    return f"learning, {report.pictures_per_s:.0f}/s, losses {scores:.2f} {boxes:.2f}"
+
+
+def _line(figures: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.3f}" for name, value in figures.items())

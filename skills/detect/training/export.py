@@ -1,0 +1,95 @@
+"""The network as an ONNX file that takes pictures as bytes and gives boxes and scores in the letterbox's pixels."""
+
+from __future__ import annotations
+
+import copy
+import json
+import tempfile
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import onnx
+import torch
+from torch import Tensor, nn
+
+from skills.detect.detector_file import FORMAT, sealed
+from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX
+from skills.detect.training.network import DetectorNetwork
+
+__all__ = ["Exportable", "export", "fused"]
+
+_OPSET = 17
+
+
+class Exportable(nn.Module):
+    """Pictures (N, 480, 640, 3) of bytes to boxes (N, A, 4) and scores (N, A, K)."""
+
+    def __init__(self, network: DetectorNetwork) -> None:
+        super().__init__()
+        self.network = fused(network)
+        first = next(module for module in self.network.modules() if isinstance(module, nn.Conv2d))
+        with torch.no_grad():
+            first.weight.mul_(1.0 / 255.0)
+
+    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
+        """Boxes and scores. The first convolution takes values from 0 to 255, its weights being so much smaller."""
+        logits, boxes = self.network(images.permute(0, 3, 1, 2).float())
+        return boxes, logits.sigmoid()
+
+
+def fused(network: DetectorNetwork) -> DetectorNetwork:
+    """A copy for use only, with every normalisation taken into the convolution before it."""
+    made: DetectorNetwork = copy.deepcopy(network).cpu().float().eval()
+    for module in made.modules():
+        if isinstance(module, nn.Sequential) and len(module) >= 2 and isinstance(module[1], nn.BatchNorm2d):
+            convolution = module[0]
+            assert isinstance(convolution, nn.Conv2d)
+            module[0] = nn.utils.fusion.fuse_conv_bn_eval(convolution, module[1])
+            module[1] = nn.Identity()
+    return made
+
+
+def export(network: DetectorNetwork, file: Path, *, class_names: Sequence[str], facts: Mapping[str, str]) -> None:
+    """Write the ONNX file with its format, class names and other facts; whole or not at all."""
+    model = Exportable(network).eval()
+    example = torch.zeros((1, HEIGHT_PX, WIDTH_PX, 3), dtype=torch.uint8)
+    with torch.no_grad():
+        shapes = [tuple(output.shape) for output in model(example)]
+    with tempfile.TemporaryDirectory() as folder:
+        raw = Path(folder) / "raw.onnx"
+        _trace(model, example, raw)
+        told = {"format": FORMAT, "class_names": json.dumps(list(class_names)), **facts}
+        content = _described(onnx.load(raw), shapes, told)
+    fresh = file.with_name(f".{file.name}.new")
+    fresh.write_bytes(sealed(content))
+    fresh.replace(file)
+
+
+def _trace(model: Exportable, example: Tensor, file: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torch.onnx.export(
+            model,
+            (example,),
+            str(file),
+            dynamo=False,
+            opset_version=_OPSET,
+            input_names=["images"],
+            output_names=["boxes", "scores"],
+            dynamic_axes={name: {0: "N"} for name in ("images", "boxes", "scores")},
+        )
+
+
+def _described(model: onnx.ModelProto, shapes: Sequence[Sequence[int]], facts: Mapping[str, str]) -> bytes:
+    """The file's bytes with the sizes of its outputs and facts as its metadata."""
+    for port, sizes in zip(model.graph.output, shapes, strict=True):
+        for axis, size in enumerate(sizes[1:], start=1):
+            port.type.tensor_type.shape.dim[axis].dim_value = size
+    del model.metadata_props[:]
+    for key, value in facts.items():
+        model.metadata_props.add(key=key, value=value)
+    model.producer_name, model.producer_version = "errand", ""
+    onnx.checker.check_model(model)
+    content: bytes = model.SerializeToString(deterministic=True)
+    return content

@@ -1,0 +1,126 @@
+"""The state of learning: network, its running mean, optimiser, and how far it has come; and one step of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from skills.detect.training.averaging import WeightAverage
+from skills.detect.training.batches import Batch
+from skills.detect.training.labels import TrainingDataError
+from skills.detect.training.losses import LossOptions, TruthBatch, losses
+from skills.detect.training.muon import Muon
+from skills.detect.training.network import DetectorNetwork, cells
+from skills.detect.training.peers import Peers
+from skills.detect.training.records import Course
+
+__all__ = ["Learner", "Progress"]
+
+FORMAT = 1
+_LONGEST_STEP = 10.0
+
+
+@dataclass
+class Progress:
+    """How many steps, canvases and seconds of learning there were."""
+
+    steps: int = 0
+    taken: int = 0
+    seconds: float = 0.0
+
+
+@dataclass
+class Learner:
+    """All that changes while learning."""
+
+    network: DetectorNetwork
+    average: WeightAverage
+    optimisers: tuple[torch.optim.Optimizer, ...]
+    device: torch.device
+    loss: LossOptions = field(default_factory=LossOptions)
+    progress: Progress = field(default_factory=Progress)
+    course: Course = field(default_factory=Course)
+
+    @staticmethod
+    def new(classes: int, seed: int, device: torch.device) -> Learner:
+        """A network that has learnt nothing yet."""
+        torch.manual_seed(seed)
+        network = DetectorNetwork(classes).to(device, memory_format=torch.channels_last)
+        return Learner(network, WeightAverage(network), optimisers_of(network), device)
+
+    def step(self, batch: Batch, rate: float, peers: Peers, clock: float) -> tuple[float, float, float]:
+        """Learn from one batch: score loss, box loss, and the first process's clock."""
+        for optimiser in self.optimisers:
+            for group in optimiser.param_groups:
+                group["lr"] = rate
+        self.network.train()
+        with torch.autocast(self.device.type, torch.bfloat16):
+            logits, boxes = self.network(batch.pictures.to(self.device))
+        middles = cells(batch.pictures.shape[2], batch.pictures.shape[3])[0].to(self.device)
+        found = losses(logits, boxes, middles, _moved(batch.truth, self.device), self.loss)
+        self.network.zero_grad(set_to_none=True)
+        found.total.backward()
+        clock = peers.mean_gradients(self.network, clock)
+        nn.utils.clip_grad_norm_(self.network.parameters(), _LONGEST_STEP)
+        for optimiser in self.optimisers:
+            optimiser.step()
+        self.average.follow(self.network)
+        return float(found.scores.detach()), float(found.boxes.detach()), clock
+
+    def save(self, file: Path) -> None:
+        """Write everything; whole or not at all."""
+        state = {
+            "format": FORMAT,
+            "network": self.network.state_dict(),
+            "average": self.average.state(),
+            "optimisers": [optimiser.state_dict() for optimiser in self.optimisers],
+            "progress": vars(self.progress),
+            "course": self.course.state(),
+        }
+        fresh = file.with_name(f".{file.name}.new")
+        torch.save(state, fresh)
+        fresh.replace(file)
+
+    def restore(self, file: Path) -> None:
+        """Go on where a file left off. Raises TrainingDataError."""
+        state = _state(file)
+        self.network.load_state_dict(state["network"])
+        self.average.restore(state["average"])
+        for optimiser, kept in zip(self.optimisers, state["optimisers"], strict=True):
+            optimiser.load_state_dict(kept)
+        self.progress = Progress(**state["progress"])
+        self.course = Course.of(state["course"])
+
+    def start_from(self, file: Path) -> None:
+        """Take over only the averaged weights of a file; all else begins anew. Raises TrainingDataError."""
+        weights = _state(file)["average"]["network"]
+        self.network.load_state_dict(weights)
+        self.average.network.load_state_dict(weights)
+
+
+def optimisers_of(network: DetectorNetwork) -> tuple[torch.optim.Optimizer, ...]:
+    """Muon for the weights of convolutions, AdamW (Loshchilov and Hutter, 2019) for the rest and the last layers."""
+    last = {id(weight) for head in network.heads for layer in (head.scores, head.sides) for weight in [layer.weight]}
+    weights = [weight for weight in network.parameters() if weight.ndim == 4 and id(weight) not in last]
+    chosen = {id(weight) for weight in weights}
+    others = [weight for weight in network.parameters() if id(weight) not in chosen]
+    return Muon(weights, lr=1e-3), torch.optim.AdamW(others, lr=1e-3, betas=(0.9, 0.99), weight_decay=0.0)
+
+
+def _moved(truth: TruthBatch, device: torch.device) -> TruthBatch:
+    return TruthBatch(*(part.to(device) for part in (truth.boxes, truth.classes, truth.ignored, truth.present)))
+
+
+def _state(file: Path) -> dict[str, Any]:
+    mend = "begin anew without it"
+    try:
+        state = torch.load(file, map_location="cpu", weights_only=True)
+    except (OSError, RuntimeError, ValueError, EOFError) as error:
+        raise TrainingDataError(f"{file}: is no checkpoint that can be read ({error})", mend=mend) from error
+    if not isinstance(state, dict) or state.get("format") != FORMAT:
+        raise TrainingDataError(f"{file}: is a checkpoint of another version", mend=mend)
+    return state

@@ -1,0 +1,74 @@
+"""How long to learn, how fast, and on what canvases at what time. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.detect.training.canvases import CanvasOptions
+
+__all__ = ["Budget", "Phase", "Schedule", "shuffled"]
+
+_WINDOWS: Final = CanvasOptions(320, 256, mosaic=0.5, scales=(0.4, 1.5))
+_LARGER: Final = CanvasOptions(448, 352, mosaic=0.3, scales=(0.5, 1.4))
+_PICTURES: Final = CanvasOptions(640, 480, mosaic=0.0, scales=(0.8, 1.25), whole=True)
+
+
+@dataclass(frozen=True)
+class Phase:
+    """From which share of the time on canvases are made in which way, and how many each process takes at once."""
+
+    begins: float
+    canvas: CanvasOptions
+    batch: int
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How long to learn: so many pictures, or so many seconds of learning; whichever is given."""
+
+    pictures: int | None = None
+    seconds: float | None = None
+
+    def progress(self, pictures: int, seconds: float) -> float:
+        """The share that is done, from 0 to 1."""
+        shares = [pictures / self.pictures] if self.pictures else []
+        shares += [seconds / self.seconds] if self.seconds else []
+        return min(1.0, max(shares, default=1.0))
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """A warm-up of so many steps, then half a cosine from the highest rate to the last.
+
+    Windows come first and cost little; whole pictures come last, as the detector will see them.
+    """
+
+    highest_rate: float = 2e-3
+    last_share: float = 0.02
+    warm_up_steps: int = 100
+    phases: Sequence[Phase] = field(
+        default=(Phase(0.0, _WINDOWS, 16), Phase(0.6, _LARGER, 8), Phase(0.82, _PICTURES, 4)),
+    )
+
+    def rate(self, step: int, progress: float) -> float:
+        """The learning rate of a step."""
+        cosine = 0.5 + 0.5 * math.cos(math.pi * min(progress, 1.0))
+        rate = self.highest_rate * (self.last_share + (1.0 - self.last_share) * cosine)
+        return rate * min(1.0, (step + 1) / max(self.warm_up_steps, 1))
+
+    def phase(self, progress: float) -> Phase:
+        """The phase at some share of the time."""
+        return [phase for phase in self.phases if phase.begins <= progress][-1]
+
+
+def shuffled(seed: int, first: int, count: int, of: int) -> NDArray[np.int64]:
+    """The numbers `first` to `first + count` of an endless sequence in which every round holds each of `of` once."""
+    numbers = np.arange(first, first + count)
+    rounds = {int(k): np.random.default_rng([seed, int(k)]).permutation(of) for k in np.unique(numbers // of)}
+    return np.array([rounds[int(n // of)][n % of] for n in numbers], dtype=np.int64)

@@ -15,6 +15,7 @@ from rich.table import Table
 
 from executive.cli.output import console_for, print_json, refusals
 from executive.cli.score_command import score_command
+from executive.cli.train_command import train_command
 from executive.errors import InputError
 from plant.dataset.errors import DatasetError
 from plant.dataset.shards import Summary, render
@@ -30,6 +31,7 @@ def _group() -> None:
 
 
 dataset.command(name="score")(score_command)
+dataset.command(name="train")(train_command)
 
 
 @dataset.command(name="render")

@@ -9,10 +9,11 @@ import typer
 
 from executive.cli.detect_command import detect
 from executive.cli.score_command import score_command
+from executive.cli.train_command import train_command
 
 __all__ = ["main"]
 
-LIGHT: Final = (("detect",), ("dataset", "score"))
+LIGHT: Final = (("detect",), ("dataset", "score"), ("dataset", "train"))
 
 
 def light_app() -> typer.Typer:
@@ -21,6 +22,7 @@ def light_app() -> typer.Typer:
     app.command()(detect)
     dataset = typer.Typer(name="dataset", help="Pictures with labels.")
     dataset.command(name="score")(score_command)
+    dataset.command(name="train")(train_command)
     dataset.callback()(_group)
     app.add_typer(dataset)
     return app

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["train_command"]
 
 NEEDED: Final = ("torch", "onnx")
+RENDER: Final = "make one: errand dataset render --out DIR --images 8000"
 UNLESS_SAID_MINUTES: Final = 240.0
 
 
@@ -41,22 +42,35 @@ def train_command(
     """Train the detector and export it, with checkpoints and curves on the way."""
     console = console_for(as_json)
     with refusals():
-        _check(minutes, epochs, out, resume)
+        _check_folders(data, out, resume)
+        _check_time(minutes, epochs)
+        _check_libraries()
         model, figures = _trained(data, out, minutes, epochs, seed, jobs or os.cpu_count() or 1, resume, start, console)
     console.print(f"{model}: {_line(figures)}")
     if as_json:
         print_json({"model": str(model), "figures": figures})
 
 
-def _check(minutes: float | None, epochs: int | None, out: Path, resume: bool) -> None:
-    """Raise InputError for what cannot be begun."""
+def _check_folders(data: Path, out: Path, resume: bool) -> None:
+    """Raises InputError."""
+    for name in ("train.json", "val.json"):
+        if not (data / name).is_file():
+            raise InputError(f"{data / name}: there is no such file of a data set", mend=RENDER)
+    if (out / "checkpoint.pt").exists() and not resume:
+        raise InputError(f"{out}: holds a training already", mend="go on with it by --resume, or name another --out")
+
+
+def _check_time(minutes: float | None, epochs: int | None) -> None:
+    """Raises InputError."""
+    if minutes is not None and epochs is not None:
+        raise InputError("--minutes and --epochs are both given", mend="give one of them")
+
+
+def _check_libraries() -> None:
+    """Raises InputError."""
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
         raise InputError(f"training needs {' and '.join(missing)}", mend="pip install '.[train]'")
-    if minutes is not None and epochs is not None:
-        raise InputError("--minutes and --epochs are both given", mend="give one of them")
-    if (out / "checkpoint.pt").exists() and not resume:
-        raise InputError(f"{out}: holds a training already", mend="go on with it by --resume, or name another --out")
 
 
 def _trained(

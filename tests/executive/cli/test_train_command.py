@@ -1,0 +1,50 @@
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from executive.cli import train_command
+from executive.cli.entry import light_app
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(light_app(), ["dataset", "train", *words])
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    for name in ("train.json", "val.json"):
+        (folder / name).write_text(json.dumps({"images": [], "annotations": [], "categories": []}))
+    return folder
+
+
+def test_without_torch_the_extra_is_named(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(train_command.importlib.util, "find_spec", lambda _name: None)
+    result = run("--data", str(data), "--out", str(tmp_path / "out"))
+    assert result.exit_code == 2
+    assert "torch and onnx" in result.stderr
+    assert "pip install '.[train]'" in result.stderr
+
+
+def test_a_folder_that_is_no_data_set_is_named(tmp_path: Path) -> None:
+    result = run("--data", str(tmp_path), "--out", str(tmp_path / "out"))
+    assert result.exit_code == 2
+    assert "train.json" in result.stderr
+    assert "errand dataset render" in result.stderr
+
+
+def test_minutes_and_epochs_together_are_refused(data: Path, tmp_path: Path) -> None:
+    result = run("--data", str(data), "--out", str(tmp_path / "out"), "--minutes", "1", "--epochs", "1")
+    assert result.exit_code == 2
+    assert "--minutes and --epochs" in result.stderr
+
+
+def test_a_training_that_is_there_already_is_not_overwritten(data: Path, tmp_path: Path) -> None:
+    (tmp_path / "checkpoint.pt").write_bytes(b"kept")
+    result = run("--data", str(data), "--out", str(tmp_path))
+    assert result.exit_code == 2
+    assert "--resume" in result.stderr
+    assert (tmp_path / "checkpoint.pt").read_bytes() == b"kept"

@@ -19,7 +19,9 @@ from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
-from skills.detect.appearance import load_appearance
+from skills.api import Detector
+from skills.detect.attributes import known_attributes
+from skills.detect.interim_segmentation import SurfaceSegmentationDetector
 from skills.detect.onnx_detector import SharedDetector
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
@@ -83,7 +85,7 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
         robot=simulation.robots[tree.robot_name],
         localiser=_localiser(scan_map, world.start, believed),
         costmap=LayeredCostmap(keepout_map),
-        detector=shared_detector(),
+        detector=thing_detector(),
     )
 
 
@@ -91,6 +93,12 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
 def shared_detector() -> SharedDetector:
     """The one detector of this process, loaded when it is first used."""
     return SharedDetector()
+
+
+@cache
+def thing_detector() -> Detector:
+    """What finds the things for the skills; INTERIM: on surfaces by size and colour."""
+    return SurfaceSegmentationDetector(shared_detector())
 
 
 def _localiser(scan_map: GridMap, start: Pose2D, believed: Pose2D | None) -> ScanMatchingLocaliser:
@@ -132,8 +140,7 @@ def itinerary_of(world: World) -> PlannedWays:
 def abilities_of() -> Abilities:
     """What the robot can lift, and what the things weigh that there are models of."""
     masses = {name: _mass_kg(one.path()) for name, one in load_catalogue().items() if one.file is not None}
-    seen = load_appearance()
-    return Abilities(masses, LIFT_KG, frozenset(seen.classes), frozenset(seen.attributes))
+    return Abilities(masses, LIFT_KG, frozenset(thing_detector().class_names), known_attributes())
 
 
 def _mass_kg(sdf: Path) -> float:

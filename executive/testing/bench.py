@@ -13,8 +13,8 @@ from executive.behaviours.context import RunContext
 from executive.behaviours.skill_leaf import SkillLeaf
 from executive.worker import LockStepWorker
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
-from skills.detection import NoDetector
 from skills.robot import Clock, Robot
+from skills.testing.detector import PlainColours
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.testing.faults import Fault, parse_fault, with_faults
@@ -67,7 +67,7 @@ class SkillBench:
             publish=lambda topic, message: self.published.append((topic, message)),
             seed=seed,
             board=Board(_PREFIX),
-            detector=detector or NoDetector(),
+            detector=detector or PlainColours(),
         )
         self._sense(robot)
 

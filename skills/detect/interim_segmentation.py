@@ -1,169 +1,57 @@
-"""INTERIM: things on a surface by depth and colour alone, until the learned detector takes this module's place.
+"""INTERIM: a detector that takes the things on a surface for what they resemble in size and colour (`appearance.yaml`).
 
-Points above the surface's plane are grouped on a grid; each group is measured and compared with `appearance.yaml`.
+It stands in for the learned detector and looks at surfaces, not at pictures, so it finds nothing elsewhere.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
-import cv2
 import numpy as np
-from pydrake.math import RigidTransform
+from numpy.typing import NDArray
 
-from skills.api import ObjectObservation, Surface, Thing
-from skills.detect.appearance import Appearance, score_class
-from skills.detect.points import PointCloud, camera_pose_W, cloud_from_image, inside_polygon
-from skills.detect.shape import SeenShape, measure
-from skills.robot import FloatArray, Image
-
-_CELL_M = 0.008
-_LOWEST_M = 0.008
-_HIGHEST_M = 0.4
-_FEWEST_POINTS = 40
-_PLANE_BAND_M = 0.05
+from skills.api import Detection, Detector
+from skills.detect.appearance import load_appearance, score_class
+from skills.detect.surface_view import SurfaceView
 
 
-@dataclass(frozen=True)
-class Plane:
-    """A nearly level plane in W: z = height + slope . ((x, y) - origin); noise_m is the spread of its points."""
+@runtime_checkable
+class SurfaceDetector(Protocol):
+    """A detector that needs to be told what stands on the surfaces of a picture."""
 
-    origin: tuple[float, float]
-    height_m: float
-    slope: tuple[float, float]
-    noise_m: float
-
-    def z(self, xy: FloatArray) -> FloatArray:
-        """Height of the plane at rows of xy (N, 2)."""
-        return np.asarray(self.height_m + (xy - np.array(self.origin)) @ np.array(self.slope))
+    def detect_on(self, views: Sequence[SurfaceView]) -> tuple[Detection, ...]:
+        """What is on the surfaces, the surest first."""
 
 
 @dataclass(frozen=True)
-class Cluster:
-    """The points of one thing, the plane that it stands on, its shape and its box (u0, v0, u1, v1) in the picture."""
+class SurfaceSegmentationDetector:
+    """Compares each cluster with each class; a cluster is what it resembles most, or nothing.
 
-    points: PointCloud
-    surface: str
-    plane: Plane
-    shape: SeenShape
-    box: tuple[int, int, int, int]
+    `learned` looks through pictures without surfaces.
+    """
+
+    learned: Detector
 
     @property
-    def base_m(self) -> float:
-        """Height of the surface under the thing."""
-        return float(self.plane.z(np.array([self.shape.centre]))[0])
+    def class_names(self) -> tuple[str, ...]:
+        """The classes that it knows."""
+        return tuple(load_appearance().classes)
 
+    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
+        """What the learned detector finds."""
+        return self.learned.detect(pictures)
 
-@dataclass(frozen=True)
-class Sighting:
-    """A cluster that was taken for a thing of some class."""
-
-    cluster: Cluster
-    class_name: str
-    score: float
-
-
-@dataclass(frozen=True)
-class SurfaceView:
-    """What one picture shows of a surface: the plane, its own points, and the clusters on it."""
-
-    plane: Plane
-    plane_points: PointCloud
-    clusters: tuple[Cluster, ...]
-
-
-def view_surface(image: Image, X_WO: RigidTransform, surface: Surface, margin_m: float = 0.03) -> SurfaceView | None:
-    """Plane and clusters of one surface in a picture; None when too little of the surface is seen."""
-    cloud = cloud_from_image(image, X_WO)
-    above = cloud.p_W[:, 2] - surface.height_m
-    cloud = cloud.where((above > -_PLANE_BAND_M) & (above < _HIGHEST_M))
-    cloud = cloud.where(inside_polygon(cloud.p_W[:, :2], surface.polygon_W, margin_m))
-    plane = fit_plane(cloud.p_W, surface.height_m)
-    if plane is None:
-        return None
-    height = cloud.p_W[:, 2] - plane.z(cloud.p_W[:, :2])
-    standing = cloud.where(height > max(_LOWEST_M, 3.0 * plane.noise_m))
-    p_WC = camera_pose_W(image, X_WO).translation()
-    clusters = tuple(_cluster(points, surface, plane, p_WC) for points in _groups(standing))
-    return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
-
-
-def fit_plane(points_W: FloatArray, height_m: float) -> Plane | None:
-    """The plane near a surveyed height, robust against things standing on it; None when too few points show it."""
-    near = points_W[np.abs(points_W[:, 2] - height_m) < _PLANE_BAND_M]
-    if len(near) < 80:
-        return None
-    counts, edges = np.histogram(near[:, 2], bins=np.arange(height_m - _PLANE_BAND_M, height_m + _PLANE_BAND_M, 0.004))
-    smooth = np.convolve(counts, [1, 2, 1], mode="same")
-    level = float(edges[int(np.argmax(smooth))] + 0.002)
-    origin = near[:, :2].mean(axis=0)
-    plane = Plane((float(origin[0]), float(origin[1])), level, (0.0, 0.0), 0.004)
-    for _ in range(4):
-        plane = _refined(plane, near) or plane
-    return plane
-
-
-def _refined(plane: Plane, points_W: FloatArray) -> Plane | None:
-    """One step of trimmed least squares; slopes beyond 2 degrees are taken for other things and dropped."""
-    residual = points_W[:, 2] - plane.z(points_W[:, :2])
-    inliers = points_W[np.abs(residual) < max(0.006, 2.5 * plane.noise_m)]
-    if len(inliers) < 40:
-        return None
-    design = np.column_stack([np.ones(len(inliers)), inliers[:, :2] - np.array(plane.origin)])
-    (height, slope_x, slope_y), *_ = np.linalg.lstsq(design, inliers[:, 2], rcond=None)
-    if np.hypot(slope_x, slope_y) > 0.035:
-        height, slope_x, slope_y = float(np.median(inliers[:, 2])), 0.0, 0.0
-    fitted = Plane(plane.origin, float(height), (float(slope_x), float(slope_y)), plane.noise_m)
-    noise = 1.48 * float(np.median(np.abs(inliers[:, 2] - fitted.z(inliers[:, :2]))))
-    return Plane(fitted.origin, fitted.height_m, fitted.slope, max(noise, 0.001))
-
-
-def _groups(points: PointCloud) -> list[PointCloud]:
-    """Points grouped by neighbourhood on a grid seen from above."""
-    if len(points) < _FEWEST_POINTS:
-        return []
-    cells = np.floor((points.p_W[:, :2] - points.p_W[:, :2].min(axis=0)) / _CELL_M).astype(np.int64) + 1
-    counts = np.zeros(cells.max(axis=0) + 2, dtype=np.int32)
-    np.add.at(counts, (cells[:, 0], cells[:, 1]), 1)
-    occupied = (counts >= 2).astype(np.uint8)
-    count, labels = cv2.connectedComponents(cv2.dilate(occupied, np.ones((3, 3), np.uint8)), connectivity=8)
-    labels = np.where(occupied > 0, labels, 0)
-    label = labels[cells[:, 0], cells[:, 1]]
-    groups = [points.where(label == k) for k in range(1, count)]
-    return [group for group in groups if len(group) >= _FEWEST_POINTS]
-
-
-def _cluster(points: PointCloud, surface: Surface, plane: Plane, p_WC: FloatArray) -> Cluster:
-    (u0, v0), (u1, v1) = points.pixels.min(axis=0), points.pixels.max(axis=0)
-    shape = measure(points.p_W, plane.z(points.p_W[:, :2]), p_WC)
-    return Cluster(points, surface.name, plane, shape, (int(u0), int(v0), int(u1), int(v1)))
-
-
-def sightings(
-    clusters: tuple[Cluster, ...], appearance: Appearance, classes: tuple[str, ...], attributes: tuple[str, ...] = ()
-) -> list[Sighting]:
-    """Clusters that pass for one of the classes, the surest first. A cluster is what it resembles most, or nothing."""
-    found = []
-    for cluster in clusters:
-        scores = {
-            name: score_class(appearance, name, cluster.shape, cluster.points.colours) for name in appearance.classes
-        }
-        best = max(scores, key=lambda name: scores[name])
-        shown = all(appearance.shows(cluster.points.colours, attribute) for attribute in attributes)
-        if best in classes and scores[best] >= appearance.accept_score and shown:
-            found.append(Sighting(cluster, best, scores[best]))
-    return sorted(found, key=lambda sighting: -sighting.score)
-
-
-def observation(sighting: Sighting, stamp_s: float, attributes: tuple[str, ...] = ()) -> ObjectObservation:
-    """A sighting as an observation."""
-    shape, base = sighting.cluster.shape, sighting.cluster.base_m
-    return ObjectObservation(
-        stamp_s=stamp_s,
-        thing=Thing(sighting.class_name, attributes),
-        position_W=(*shape.centre, base + 0.5 * shape.height_m),
-        size_m=(shape.length_m, shape.width_m, shape.height_m),
-        yaw_rad=shape.yaw_rad,
-        score=round(sighting.score, 3),
-        surface=sighting.cluster.surface or None,
-    )
+    def detect_on(self, views: Sequence[SurfaceView]) -> tuple[Detection, ...]:
+        """What is on the surfaces, the surest first."""
+        appearance, found = load_appearance(), []
+        for cluster in (cluster for view in views for cluster in view.clusters):
+            scores = {
+                name: score_class(appearance, name, cluster.shape, cluster.points.colours) for name in self.class_names
+            }
+            best = max(scores, key=lambda name: scores[name])
+            u0, v0, u1, v1 = cluster.box
+            if scores[best] >= appearance.accept_score:
+                found.append(Detection(best, scores[best], (float(u0), float(v0), float(u1 + 1), float(v1 + 1))))
+        return tuple(sorted(found, key=lambda detection: -detection.score))

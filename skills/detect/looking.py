@@ -11,9 +11,10 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Surface
 from skills.arm.collision import Box
-from skills.detect.interim_segmentation import Cluster
 from skills.detect.points import inside_polygon
-from skills.robot import FloatArray
+from skills.detect.sighting import depth_ahead_m
+from skills.detect.surface_view import Cluster
+from skills.robot import FloatArray, Image
 
 NEAREST_M = 0.35
 FURTHEST_M = 3.2
@@ -26,6 +27,9 @@ _CELL_M = 0.03
 _WHOLE_M = 0.15
 _LEAST_FILLED = 0.5
 _SPLITS = 5
+_EDGE_M = 0.05
+_PLAIN_M = 2.0
+_BEFORE_M = 0.08
 
 
 def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
@@ -72,6 +76,15 @@ def _samples(surface: Surface, step_m: float = 0.1) -> FloatArray:
     rows = grid.reshape(-1, 2)
     xy = np.concatenate([corners, rows[inside_polygon(rows, surface.polygon_W)]])
     return np.column_stack([xy, np.full(len(xy), surface.height_m)])
+
+
+def in_plain_view(image: Image, X_WO: RigidTransform, p_W: FloatArray) -> bool:
+    """Whether a picture should show a thing at a point: well inside, near, and with nothing before it."""
+    beside = p_W + np.array([[0.0, 0.0, 0.0], *(_EDGE_M * np.eye(3)), *(-_EDGE_M * np.eye(3))])
+    depth, seen = depth_ahead_m(image, X_WO, beside)
+    if not np.all(np.isfinite(depth)) or depth[0] > _PLAIN_M:
+        return False
+    return bool(np.isfinite(seen[0]) and seen[0] > depth[0] - _BEFORE_M)
 
 
 def surface_boxes(surfaces: Iterable[Surface], X_WB: RigidTransform) -> list[Box]:

@@ -2,55 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from pydrake.math import RigidTransform
 
-from skills.api import ObjectObservation, SkillContext
-from skills.detect.appearance import load_appearance
-from skills.detect.interim_segmentation import Sighting, observation
+from skills.api import Detection, ObjectObservation, SkillContext
+from skills.detect.coverage import SurfaceShares
+from skills.detect.forms import class_forms
 from skills.detect.points import camera_pose_W
+from skills.detect.sighting import Sighting
+from skills.detect.tracks import Track
 from skills.robot import Image
 
+Message = Mapping[str, Any]
 
-def detections_message(image: Image, found: Sequence[Sighting]) -> Mapping[str, Any]:
-    """All sightings of one picture, with boxes (u0, v0, u1, v1) in its pixels, and the picture itself."""
+
+def detections_message(image: Image, found: Iterable[Detection], placed: Sequence[Sighting]) -> Message:
+    """All detections of one picture, with boxes (u0, v0, u1, v1) in its pixels, and the picture itself."""
+    places = {id(sighting.detection): sighting for sighting in placed}
     return {
         "stamp_s": image.stamp_s,
         "source": image.source,
-        "detections": [_detection(image, sighting) for sighting in found],
-        "image": image.colour,
+        "detections": [_detection(each, places.get(id(each))) for each in found],
+        "image": image.grey if image.colour is None else image.colour,
     }
 
 
-def _detection(image: Image, sighting: Sighting) -> Mapping[str, Any]:
-    seen = observation(sighting, image.stamp_s)
-    return {
-        "class_id": load_appearance().classes[sighting.class_name].id,
-        "class_name": sighting.class_name,
-        "score": round(sighting.score, 3),
-        "box": list(sighting.cluster.box),
-        "surface": seen.surface or "",
-        "position_W": [round(value, 4) for value in seen.position_W],
-        "size_m": [round(value, 4) for value in seen.size_m],
+def _detection(detection: Detection, placed: Sighting | None) -> Message:
+    told = {
+        "class_id": class_id(detection.class_name),
+        "class_name": detection.class_name,
+        "score": round(detection.score, 3),
+        "box": [round(value) for value in detection.box],
+        "surface": "",
     }
+    if placed is None:
+        return told
+    place = {
+        "surface": placed.surface or "",
+        "position_W": _rounded(placed.position_W),
+        "sigma_m": _rounded(placed.place_covariance.diagonal() ** 0.5),
+        "size_m": _rounded(placed.size_m),
+    }
+    return {**told, **place}
 
 
-def object_to_detect_message(context: SkillContext, classes: Sequence[str]) -> Mapping[str, Any]:
+def class_id(class_name: str) -> int:
+    """The number of a class in messages; 0 for one without a form."""
+    forms = class_forms()
+    return forms[class_name].id if class_name in forms else 0
+
+
+def object_to_detect_message(context: SkillContext, classes: Sequence[str]) -> Message:
     """What is being looked for."""
-    known = load_appearance().classes
     return {
         "stamp": context.clock.now(),
         "robot_name": context.robot.name,
-        "class_id": [known[name].id for name in classes],
+        "class_id": [class_id(name) for name in classes],
         "class_name": list(classes),
     }
 
 
 def object_destination_message(
     context: SkillContext, seen: ObjectObservation, image: Image, X_WO: RigidTransform
-) -> Mapping[str, Any]:
+) -> Message:
     """Where the thing is: in the world, and from the camera."""
     p_CO = camera_pose_W(image, X_WO).inverse() @ seen.position_W
     sequence = round(image.stamp_s * 1000)
@@ -58,7 +74,7 @@ def object_destination_message(
         "stamp": context.clock.now(),
         "sequence": sequence,
         "message_id": f"{context.robot.name}-{sequence}",
-        "class_id": load_appearance().classes[seen.thing.name].id,
+        "class_id": class_id(seen.thing.name),
         "class_name": seen.thing.name,
         "goal_x": seen.position_W[0],
         "goal_y": seen.position_W[1],
@@ -67,3 +83,36 @@ def object_destination_message(
         "distance_from_robot_y": float(p_CO[1]),
         "distance_from_robot_z": float(p_CO[2]),
     }
+
+
+def tracks_message(context: SkillContext, tracks: Sequence[Track]) -> Message:
+    """What is known of the things around."""
+    return {"stamp": context.clock.now(), "tracks": [_track(track) for track in tracks]}
+
+
+def _track(track: Track) -> Message:
+    return {
+        "number": track.number,
+        "class_name": track.class_name,
+        "class_belief": round(track.classes[track.class_name], 3),
+        "belief": round(track.belief, 3),
+        "views": track.views,
+        "missed": track.missed,
+        "last_seen_s": track.last_seen_s,
+        "surface": track.latest.surface or "",
+        "position_W": _rounded(track.position_W),
+        "sigma_m": _rounded(track.covariance.diagonal() ** 0.5),
+    }
+
+
+def coverage_message(context: SkillContext, shares: Mapping[str, SurfaceShares]) -> Message:
+    """How much of each surface was seen."""
+    told = {
+        name: {"seen": round(s.seen, 3), "hidden": round(s.hidden, 3), "out_of_view": round(s.out_of_view, 3)}
+        for name, s in shares.items()
+    }
+    return {"stamp": context.clock.now(), "surfaces": told}
+
+
+def _rounded(values: Iterable[float]) -> list[float]:
+    return [round(float(value), 4) for value in values]

@@ -36,9 +36,8 @@ def camera_pose_W(image: Image, X_WO: RigidTransform) -> RigidTransform:
 
 
 def cloud_from_image(image: Image, X_WO: RigidTransform, max_depth_m: float = MAX_DEPTH_M) -> PointCloud:
-    """All valid depth pixels as world points. Raises ValueError for a picture without colour."""
-    if image.colour is None:
-        raise ValueError(f"picture of camera '{image.source}': it has no colour")
+    """All valid depth pixels as world points; those of a grey picture are grey."""
+    colour = np.repeat(image.grey[..., None], 3, axis=2) if image.colour is None else image.colour
     lens, depth = image.depth_intrinsics, image.depth_m
     rows, columns = np.nonzero((depth > MIN_DEPTH_M) & (depth < max_depth_m))
     z = depth[rows, columns].astype(np.float64)
@@ -46,7 +45,7 @@ def cloud_from_image(image: Image, X_WO: RigidTransform, max_depth_m: float = MA
     X_WC = camera_pose_W(image, X_WO)
     p_W = np.stack([x, y, z], axis=1) @ X_WC.rotation().matrix().T + X_WC.translation()
     pixels = _colour_pixels(image, np.stack([x / z, y / z], axis=1))
-    return PointCloud(p_W, pixels, image.colour[pixels[:, 1], pixels[:, 0]])
+    return PointCloud(p_W, pixels, colour[pixels[:, 1], pixels[:, 0]])
 
 
 def _colour_pixels(image: Image, rays: FloatArray) -> NDArray[np.int64]:

@@ -32,7 +32,7 @@ def measure(points_W: FloatArray, plane_m: FloatArray, p_WC: FloatArray) -> Seen
     height = float(np.percentile(above, 98))
     if height > 0.06:
         body = points_W[(above > 0.15 * height) & (above < 0.6 * height), :2]
-        circle = _circle(body, p_WC) if len(body) >= 12 else None
+        circle = circle_seen(body, p_WC) if len(body) >= 12 else None
         if circle is not None:
             x, y, radius = circle
             return SeenShape((x, y), 2 * radius, 2 * radius, height, 0.0, True)
@@ -45,15 +45,15 @@ def _upper(points_W: FloatArray, above: FloatArray, height: float) -> FloatArray
     return kept if len(kept) >= 8 else points_W[:, :2]
 
 
-def _circle(xy: FloatArray, p_WC: FloatArray) -> tuple[float, float, float] | None:
-    """Centre and radius of the visible front of a round thing, or None when it is not round."""
+def circle_seen(xy: FloatArray, p_WC: FloatArray, largest_m: float = 0.09) -> tuple[float, float, float] | None:
+    """Centre and radius, at most largest_m, of the visible front (N, 2) of a round thing; None when it is not round."""
     view = np.mean(xy, axis=0) - p_WC[:2]
     distance = float(np.linalg.norm(view))
     view = view / max(distance, 1e-6)
     across = xy @ np.array([-view[1], view[0]])
     left, right = np.percentile(across, [1, 99])
     radius = 0.5 * (right - left)
-    if not 0.008 < radius < 0.09:
+    if not 0.008 < radius < largest_m:
         return None
     near = float(np.percentile(xy @ view, 4))
     guess = (near + radius) * view + 0.5 * (left + right) * np.array([-view[1], view[0]])
@@ -70,7 +70,7 @@ def _circle(xy: FloatArray, p_WC: FloatArray) -> tuple[float, float, float] | No
 
 def _rectangle(xy: FloatArray, height: float) -> SeenShape:
     """The smallest rectangle about points (N, 2), without stray ones."""
-    kept = _without_strays(xy)
+    kept = without_strays(xy)
     (x, y), (first, second), angle_deg = cv2.minAreaRect((kept - kept.mean(axis=0)).astype(np.float32))
     yaw = np.radians(angle_deg) + (0.0 if first >= second else np.pi / 2)
     centre = kept.mean(axis=0) + (x, y)
@@ -79,7 +79,7 @@ def _rectangle(xy: FloatArray, height: float) -> SeenShape:
     return SeenShape((float(centre[0]), float(centre[1])), length, width, height, yaw, False)
 
 
-def _without_strays(xy: FloatArray, cell_m: float = 0.006) -> FloatArray:
+def without_strays(xy: FloatArray, cell_m: float = 0.006) -> FloatArray:
     """Points whose grid cell holds at least two of them, or all when that leaves too few."""
     cells = np.floor(xy / cell_m).astype(np.int64)
     _, inverse, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)

@@ -2,50 +2,67 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, ObjectObservation, Running, Succeeded, Surface
+from skills.api import Cause, Detection, LocalisationEstimate, ObjectObservation, Running, Succeeded, Surface
 from skills.arm.arm_skill import ArmSkill, hand_camera_in_hand
 from skills.arm.collision import ArmScene
 from skills.arm.poses import look_configuration, overview_stations
 from skills.arm.routine import Routine, SkillFailure
-from skills.detect.appearance import load_appearance
-from skills.detect.interim_segmentation import Sighting, SurfaceView, observation, sightings, view_surface
-from skills.detect.looking import look_targets, surface_boxes
-from skills.detect.messages import detections_message, object_destination_message, object_to_detect_message
+from skills.detect.attributes import known_attributes, shows
+from skills.detect.coverage import Coverage
+from skills.detect.forms import class_forms
+from skills.detect.looking import in_plain_view, look_targets, surface_boxes
+from skills.detect.messages import (
+    coverage_message,
+    detections_message,
+    object_destination_message,
+    object_to_detect_message,
+    tracks_message,
+)
+from skills.detect.seeing import DETECTION_LATENCY_S, detections_in, is_dark
+from skills.detect.sighting import FLOOR, Sighting, observation, sightings
+from skills.detect.tracks import Track, TrackBook
+from skills.detect.words import counted, describe, surface_names, wanted
 from skills.robot import FloatArray, Image
 
-SEGMENTATION_LATENCY_S = 0.15
-_CONFIRM_SHIFT_RAD = 0.14
-_CONFIRM_DISTANCE_M = 0.08
+_CONFIRM_SHIFTS_RAD = (0.25, -0.3)
+_CANDIDATES = 3
 _EXPECTED_WITHIN_M = 0.35
+_FLOOR_WITHIN_M = 2.2
+_LEAST_SEEN = 0.02
 
 
 @dataclass(frozen=True)
 class DetectInputs:
     """What to look for (any of `classes`, with all `attributes`) and on which surfaces.
 
-    With `expected_W` only that place is looked at, and only what is within 0.35 m of it counts.
+    The look ends with the first `count` things; with a count of 0 all surfaces are looked at and all things counted.
+    With `expected_W` only that place is looked at, and only what is within 0.35 m of it counts. With `floor` a thing on
+    the floor beside the surfaces counts as well, where it comes into view.
     """
 
     classes: tuple[str, ...]
     surfaces: tuple[Surface, ...]
     attributes: tuple[str, ...] = ()
     expected_W: tuple[float, float, float] | None = None
+    count: int = 1
+    floor: bool = False
 
 
 @dataclass(frozen=True)
 class Look:
-    """One picture and the sightings in it, the surest first."""
+    """One picture, where the robot was, and what was found in it, with and without a place."""
 
     image: Image
-    X_WO: RigidTransform
-    views: tuple[SurfaceView, ...]
+    localisation: LocalisationEstimate
+    detections: tuple[Detection, ...]
     sightings: tuple[Sighting, ...]
 
 
@@ -54,33 +71,50 @@ class Detect(ArmSkill[DetectInputs]):
 
     name = "detect"
     Inputs = DetectInputs
-    outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
+    outputs: ClassVar[Mapping[str, type]] = {
+        "observation": ObjectObservation,
+        "observations": tuple[ObjectObservation, ...],
+    }
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "a class, attribute or surface cannot be looked for from here, or there is no arm",
         Cause.PLANNING: "the arm finds no pose to look from",
-        Cause.EXECUTION: "the arm did not get to where it looks from",
-        Cause.POSTCONDITION: "no such thing is seen",
+        Cause.EXECUTION: "the arm did not get to where it looks from, or the camera shows nothing",
+        Cause.POSTCONDITION: "no such thing is seen, or fewer than asked for",
     }
     default_timeout_s = 90.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"observation": 3.0}
 
     def run(self, inputs: DetectInputs) -> Routine[Succeeded]:
-        """Look at each surface in turn; a sighting counts when a second look from beside agrees."""
+        """Look at each surface in turn; a thing counts when a second look from beside agrees."""
         self._check(inputs)
         self.context.publish("object_to_detect", object_to_detect_message(self.context, inputs.classes))
         X_WB = self.X_WB()
         self.boxes = surface_boxes(inputs.surfaces, X_WB)
         targets = self._targets(inputs, X_WB)
         if not targets:
-            raise SkillFailure(Cause.PRECONDITION, f"{_names(inputs)} is out of sight from here")
+            raise SkillFailure(Cause.PRECONDITION, f"{surface_names(inputs.surfaces)} is out of sight from here")
+        self._book, self._coverage = TrackBook(self.context.detector.class_names), Coverage(inputs.surfaces)
+        self._tried: dict[int, int] = {}
         X_HC = hand_camera_in_hand((yield from self.picture("looking")))
+        blocked: list[SkillFailure] = []
         for k, target in enumerate(targets):
-            found = yield from self._look_and_confirm(inputs, X_HC, target)
-            if found is not None:
-                return Succeeded(f"saw {_describe(found)}", {"observation": found})
-            yield Running(f"looking for {_wanted(inputs)}", (k + 1) / len(targets))
-        yield from self.try_stow()
-        raise SkillFailure(Cause.POSTCONDITION, f"no {_wanted(inputs)} seen on {_names(inputs)} from here")
+            yield from self._look_and_confirm(inputs, X_HC, target, blocked)
+            if 0 < inputs.count <= len(self._found(inputs)):
+                break
+            yield Running(f"looking for {wanted(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
+        self.context.publish("surfaces_seen", coverage_message(self.context, self._coverage.shares()))
+        return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
+
+    def _check(self, inputs: DetectInputs) -> None:
+        """Raise SkillFailure with cause PRECONDITION for what cannot be looked for."""
+        knows = set(self.context.detector.class_names) & set(class_forms())
+        unknown = [name for name in inputs.classes if name not in knows]
+        unknown += [word for word in inputs.attributes if word.lower() not in known_attributes()]
+        if unknown:
+            raise SkillFailure(Cause.PRECONDITION, f"I do not know what {', '.join(unknown)} looks like")
+        if not inputs.surfaces:
+            raise SkillFailure(Cause.PRECONDITION, "there is no surface to look at")
+        assert self.model is not None
 
     def _targets(self, inputs: DetectInputs, X_WB: RigidTransform) -> list[FloatArray]:
         """Points p_BT to look at, one after the other."""
@@ -88,36 +122,62 @@ class Detect(ArmSkill[DetectInputs]):
             return [X_WB.inverse() @ np.array(inputs.expected_W)]
         return [t for s in _by_distance(inputs.surfaces, X_WB) for t in look_targets(s, X_WB, self.model.p_BS)]
 
-    def _check(self, inputs: DetectInputs) -> None:
-        """Raise SkillFailure with cause PRECONDITION for what cannot be looked for."""
-        appearance = load_appearance()
-        unknown = [name for name in inputs.classes if name not in appearance.classes]
-        unknown += [word for word in inputs.attributes if word not in appearance.attributes]
-        if unknown:
-            raise SkillFailure(Cause.PRECONDITION, f"I do not know what {', '.join(unknown)} looks like")
-        if not inputs.surfaces:
-            raise SkillFailure(Cause.PRECONDITION, "there is no surface to look at")
-        assert self.model is not None
-
     def _look_and_confirm(
-        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray
-    ) -> Routine[ObjectObservation | None]:
-        first = yield from self.look(inputs, X_HC, p_BT, 0.0)
-        for sighting in _expected(first.sightings, inputs.expected_W)[:2]:
-            seen = observation(sighting, first.image.stamp_s, inputs.attributes)
-            p_BO = self.X_WB().inverse() @ np.array(seen.position_W)
-            second = yield from self.look(inputs, X_HC, p_BO, _CONFIRM_SHIFT_RAD)
-            for other in second.sightings:
-                again = observation(other, second.image.stamp_s, inputs.attributes)
-                if again.thing == seen.thing and _distance(again, seen) < _CONFIRM_DISTANCE_M:
-                    message = object_destination_message(self.context, again, second.image, second.X_WO)
-                    self.context.publish("object_destination", message)
-                    return again
-        return None
+        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, blocked: list[SkillFailure]
+    ) -> Routine[None]:
+        """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
+        try:
+            yield from self.look(inputs, X_HC, p_BT, 0.0)
+        except SkillFailure as failure:
+            if failure.cause is not Cause.PLANNING:
+                raise
+            blocked.append(failure)
+            return
+        while (track := self._candidate(inputs)) is not None:
+            tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
+            p_BO, shifts_rad = self._from_elsewhere(track)
+            try:
+                yield from self.look(inputs, X_HC, p_BO, shifts_rad[tries - 1])
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING:
+                    raise
+
+    def _from_elsewhere(self, track: Track) -> tuple[FloatArray, list[float]]:
+        """The track's place p_BO and by how much to look at it from aside, farthest first from where it was seen."""
+        X_BW = self.X_WB().inverse()
+        p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
+        seen_rad, bearing = _bearing(eye_B - self.model.p_BS), _bearing(p_BO - self.model.p_BS)
+        off = {shift: abs(math.remainder(bearing + shift - seen_rad, math.tau)) for shift in _CONFIRM_SHIFTS_RAD}
+        return p_BO, sorted(_CONFIRM_SHIFTS_RAD, key=lambda shift: -off[shift])
+
+    def _candidate(self, inputs: DetectInputs) -> Track | None:
+        """The likeliest track that may be what is looked for and is to be looked at again."""
+        if 0 < inputs.count <= len(self._found(inputs)) or len(self._tried) > _CANDIDATES + inputs.count:
+            return None
+        open_ones = (t for t in self._matching(inputs) if not t.confirmed)
+        return next((t for t in open_ones if self._tried.get(t.number, 0) < len(_CONFIRM_SHIFTS_RAD)), None)
+
+    def _found(self, inputs: DetectInputs) -> list[Track]:
+        return [track for track in self._matching(inputs) if track.confirmed]
+
+    def _matching(self, inputs: DetectInputs) -> list[Track]:
+        """The tracks that are of the classes, show the attributes and lie in the right place; the likeliest first."""
+        tracks = [t for t in self._book.snapshot() if t.class_name in inputs.classes and self._in_place(inputs, t)]
+        fitting = [t for t in tracks if all(shows(t.best, word) for word in inputs.attributes)]
+        if inputs.expected_W is None:
+            return sorted(fitting, key=lambda t: -t.belief * t.best.detection.score)
+        off = {t.number: _apart(t.position_W, inputs.expected_W) for t in fitting}
+        return sorted((t for t in fitting if off[t.number] < _EXPECTED_WITHIN_M), key=lambda t: off[t.number])
+
+    def _in_place(self, inputs: DetectInputs, track: Track) -> bool:
+        if track.latest.surface in {surface.name for surface in inputs.surfaces}:
+            return True
+        near = _apart(track.position_W, self.X_WB().translation()) < _FLOOR_WITHIN_M
+        return inputs.floor and track.latest.surface == FLOOR and near
 
     def look(self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, shift_rad: float) -> Routine[Look]:
-        """Point the camera at p_BT, from a little aside when shift_rad is not 0, and publish what is seen."""
-        message = f"looking for {_wanted(inputs)}"
+        """Point the camera at p_BT, from a little aside when shift_rad is not 0, and take in what is seen."""
+        message = f"looking for {wanted(inputs.classes, inputs.attributes)}"
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
             return look_configuration(scene, X_HC, overview_stations(self.model, p_BT, shift_rad), p_BT, q)
@@ -125,48 +185,68 @@ class Detect(ArmSkill[DetectInputs]):
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)
         image = yield from self.picture(message)
-        X_WO = self.context.localiser.estimate().X_WO
-        look = yield from self.compute(
-            lambda: _examine(inputs, image, X_WO), latency_s=SEGMENTATION_LATENCY_S, name="segment", message=message
-        )
-        self.context.publish("detections", detections_message(look.image, look.sightings))
+        place, detector = self.context.localiser.estimate(), self.context.detector
+
+        def examine() -> Look:
+            found = detections_in(detector, image, place.X_WO, inputs.surfaces)
+            return Look(image, place, found, sightings(image, place, found, inputs.surfaces))
+
+        look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
+        self._take_in(look)
         return look
 
+    def _take_in(self, look: Look) -> None:
+        X_WO = look.localisation.X_WO
+        if not is_dark(look.image):
+            self._coverage.add(look.image, X_WO)
+        tracks = self._book.update(look.sightings, lambda t: in_plain_view(look.image, X_WO, t.position_W))
+        self.context.publish("detections", detections_message(look.image, look.detections, look.sightings))
+        self.context.publish("tracks", tracks_message(self.context, tracks))
+        self._last = look
 
-def _examine(inputs: DetectInputs, image: Image, X_WO: RigidTransform) -> Look:
-    seen = (view_surface(image, X_WO, surface) for surface in inputs.surfaces)
-    views = tuple(view for view in seen if view is not None)
-    clusters = tuple(cluster for view in views for cluster in view.clusters)
-    found = sightings(clusters, load_appearance(), inputs.classes, inputs.attributes)
-    return Look(image, X_WO, views, tuple(found))
+    def _ended(self, inputs: DetectInputs, blocked: Sequence[SkillFailure]) -> Routine[Succeeded]:
+        """The answer. Raises SkillFailure when there is none, or not enough."""
+        found = [_observed(track, inputs.attributes) for track in self._found(inputs)]
+        if found and len(found) >= inputs.count:
+            look = self._last
+            for seen in found:
+                message = object_destination_message(self.context, seen, look.image, look.localisation.X_WO)
+                self.context.publish("object_destination", message)
+            told = f"saw {describe(found[0])}" if inputs.count == 1 else counted(found, inputs.surfaces)
+            return Succeeded(told, {"observation": found[0], "observations": tuple(found)})
+        yield from self.try_stow()
+        if blocked:
+            raise blocked[0]
+        raise self._nothing(inputs, found)
+
+    def _nothing(self, inputs: DetectInputs, found: Sequence[ObjectObservation]) -> SkillFailure:
+        """What to say when not enough was found: how much was seen of which surface."""
+        shares = self._coverage.shares()
+        what, names = wanted(inputs.classes, inputs.attributes), surface_names(inputs.surfaces)
+        seen = "; ".join(f"{name}: {share}" for name, share in shares.items())
+        if all(share.seen < _LEAST_SEEN for share in shares.values()):
+            why = "it is dark" if is_dark(self._last.image) else "the camera shows none of it"
+            return SkillFailure(Cause.EXECUTION, f"{names} could not be looked at from here: {why}")
+        if found:
+            told = f"{counted(found, inputs.surfaces)}, and not {inputs.count} ({seen})"
+            return SkillFailure(Cause.POSTCONDITION, told)
+        return SkillFailure(Cause.POSTCONDITION, f"no {what} seen on {names} from here ({seen})")
 
 
-def _expected(found: Sequence[Sighting], place_W: tuple[float, float, float] | None) -> list[Sighting]:
-    """The sightings near an expected place, the nearest first; all where none is expected."""
-    if place_W is None:
-        return list(found)
-    off = {id(s): float(np.linalg.norm(np.subtract(s.cluster.shape.centre, place_W[:2]))) for s in found}
-    return sorted((s for s in found if off[id(s)] < _EXPECTED_WITHIN_M), key=lambda s: off[id(s)])
+def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
+    """A track as an observation: its fused place, the rest from its last sighting."""
+    return observation(replace(track.latest, position_W=track.position_W), attributes)
+
+
+def _bearing(p_B: FloatArray) -> float:
+    return math.atan2(p_B[1], p_B[0])
+
+
+def _apart(p_W: FloatArray, q_W: Sequence[float] | FloatArray) -> float:
+    """Level distance of two points."""
+    return float(np.linalg.norm(np.asarray(p_W)[:2] - np.asarray(q_W)[:2]))
 
 
 def _by_distance(surfaces: tuple[Surface, ...], X_WB: RigidTransform) -> list[Surface]:
     here = X_WB.translation()[:2]
     return sorted(surfaces, key=lambda s: float(np.min(np.linalg.norm(np.asarray(s.polygon_W) - here, axis=1))))
-
-
-def _distance(a: ObjectObservation, b: ObjectObservation) -> float:
-    return float(np.linalg.norm(np.subtract(a.position_W, b.position_W)))
-
-
-def _wanted(inputs: DetectInputs) -> str:
-    return " or ".join(" ".join((*inputs.attributes, name)) for name in inputs.classes)
-
-
-def _names(inputs: DetectInputs) -> str:
-    return " or ".join(f"the {surface.name}" for surface in inputs.surfaces)
-
-
-def _describe(seen: ObjectObservation) -> str:
-    x, y, z = seen.position_W
-    place = f" on the {seen.surface}" if seen.surface else ""
-    return f"a {seen.thing}{place} at ({x:.2f}, {y:.2f}, {z:.2f}), score {seen.score:.2f}"

@@ -9,14 +9,15 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, ObjectObservation, Succeeded, Surface
+from skills.api import Cause, LocalisationEstimate, ObjectObservation, Succeeded, Surface
 from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
 from skills.arm.collision import ArmScene, Box
 from skills.arm.poses import carry_configuration, close_stations, look_configuration, overview_stations
 from skills.arm.routine import Routine, SkillFailure
-from skills.detect.appearance import load_appearance
-from skills.detect.interim_segmentation import Cluster, SurfaceView, sightings, view_surface
 from skills.detect.looking import cluster_box, cluster_boxes, surface_boxes
+from skills.detect.seeing import DETECTION_LATENCY_S, detections_in
+from skills.detect.sighting import Sighting, sightings
+from skills.detect.surface_view import Cluster, SurfaceView, cluster_of, view_surface
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, plan_grasp
@@ -166,10 +167,14 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)
         image = yield from self.picture(message)
-        X_WO, X_WB = self.context.localiser.estimate().X_WO, self.X_WB()
-        view = yield from self.compute(
-            lambda: _examine(image, X_WO, X_WB, surface, seen), latency_s=0.15, name="segment closely", message=message
-        )
+        place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
+
+        def examine() -> CloseView | None:
+            found = detections_in(detector, image, place.X_WO, [surface])
+            same_class = [each for each in found if each.class_name == seen.thing.name]
+            return _examine(image, X_WB, surface, seen, place, sightings(image, place, same_class, [surface]))
+
+        view = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message)
         if view is None:
             raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} is no longer where it was seen")
         return view
@@ -285,10 +290,15 @@ def _square(
 
 
 def _examine(
-    image: Image, X_WO: RigidTransform, X_WB: RigidTransform, surface: Surface, seen: ObjectObservation
+    image: Image,
+    X_WB: RigidTransform,
+    surface: Surface,
+    seen: ObjectObservation,
+    place: LocalisationEstimate,
+    found: tuple[Sighting, ...],
 ) -> CloseView | None:
-    view = view_surface(image, X_WO, surface, margin_m=0.0)
-    cluster = _same_thing(view, seen) if view is not None else None
+    view = view_surface(image, place.X_WO, surface, margin_m=0.0)
+    cluster = _same_thing(view, seen, found) if view is not None else None
     if view is None or cluster is None:
         return None
     others = [each for each in view.clusters if each is not cluster]
@@ -309,14 +319,14 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
     return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), view.plane.height_m)
 
 
-def _same_thing(view: SurfaceView, seen: ObjectObservation) -> Cluster | None:
-    """The cluster that is the thing: of its class and nearest, else nearest of all; None when all are far."""
+def _same_thing(view: SurfaceView, seen: ObjectObservation, found: tuple[Sighting, ...]) -> Cluster | None:
+    """The cluster that is the thing: detected as of its class and nearest, else nearest of all; None: all are far."""
     expected = np.array(seen.position_W[:2])
 
     def off(cluster: Cluster) -> float:
         return float(np.linalg.norm(np.array(cluster.shape.centre) - expected))
 
-    classed = [s.cluster for s in sightings(view.clusters, load_appearance(), (seen.thing.name,))]
+    classed = [cluster for each in found if (cluster := cluster_of(view.clusters, each)) is not None]
     for clusters in (classed, view.clusters):
         near = [cluster for cluster in clusters if off(cluster) < _SAME_THING_M]
         if near:

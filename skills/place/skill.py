@@ -17,8 +17,8 @@ from skills.arm.collision import ArmScene
 from skills.arm.motion import plan_line, time_path
 from skills.arm.poses import look_configuration, overview_stations
 from skills.arm.routine import PlanningError, Routine, SkillFailure
-from skills.detect.interim_segmentation import SurfaceView, view_surface
 from skills.detect.looking import cluster_boxes, surface_boxes
+from skills.detect.surface_view import SurfaceView, view_surface
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.place.free_spot import free_spots, spots
 from skills.robot import FloatArray, Pose2D

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
+from table_scene import BLUE, RED, taken
+from table_scene import LENS as TABLE_LENS
 
 from executive.worker import LockStepWorker
 from plant.spot.capabilities import spot_capabilities
@@ -24,6 +26,7 @@ from skills.robot import (
     Lease,
     Odometry,
 )
+from skills.testing.detector import PlainColours
 
 CAPABILITIES = spot_capabilities()
 MODEL = arm_model(CAPABILITIES)
@@ -32,7 +35,10 @@ LENS = Intrinsics(64, 48, 55.2, 55.2, 32.0, 24.0)
 
 @dataclass
 class ScriptedRobot:
-    """Commands are done one tick later; `arm_answers` and `jaw_stops_rad` script what goes wrong."""
+    """Commands are done one tick later; `arm_answers` and `jaw_stops_rad` script what goes wrong.
+
+    Pictures are dark and without depth unless there are `things` on a table (`table_scene`).
+    """
 
     name: str = "Alice"
     now_s: float = 0.0
@@ -42,6 +48,7 @@ class ScriptedRobot:
     holding: bool = False
     jaw_stops_rad: float = 0.0
     scan_now: Any = None
+    things: Any = None
     arm_answers: dict[int, CommandStatus] = field(default_factory=dict)
     arm_commands: list[Any] = field(default_factory=list)
     stopped: list[CommandId] = field(default_factory=list)
@@ -83,6 +90,10 @@ class ScriptedRobot:
                 ),
             }
         )
+        if self.things is not None:
+            colour, depth = taken(frames.pose("hand_camera"), self.things)
+            grey = colour.mean(axis=-1).astype(np.uint8)
+            return Image(self.now_s, source, "hand_camera", TABLE_LENS, TABLE_LENS, colour, grey, depth, frames)
         shape = (LENS.height, LENS.width)
         colour, depth = np.zeros((*shape, 3), np.uint8), np.zeros(shape, np.float32)
         return Image(self.now_s, source, "hand_camera", LENS, LENS, colour, colour[..., 0], depth, frames)
@@ -136,7 +147,18 @@ class OpenFloor:
         pass
 
 
-def context_of(robot, published=None, costmap=None):
+class Colours(PlainColours):
+    """Knows all nine classes; red things are cokes, blue ones beers."""
+
+    @property
+    def class_names(self):
+        return ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "person", "cylinder", "cube")
+
+    def __init__(self, colours=None):
+        super().__init__(colours or {"coke": RED, "beer": BLUE})
+
+
+def context_of(robot, published=None, costmap=None, detector=None):
     """A context with the scripted robot as clock, too; what is published is appended to a list."""
     log = [] if published is None else published
     return SkillContext(
@@ -148,6 +170,7 @@ def context_of(robot, published=None, costmap=None):
         costmap=costmap or OpenFloor(),
         publish=lambda topic, message: log.append((topic, message)),
         seed=1,
+        detector=detector or Colours(),
     )
 
 

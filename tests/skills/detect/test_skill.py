@@ -1,13 +1,26 @@
-"""What the detect skill does when it cannot look or sees nothing."""
+"""What the detect skill finds, what it says when it finds nothing, and what it does when it cannot look."""
+
+from dataclasses import replace
 
 import numpy as np
-from scripted_robot import MODEL, ScriptedRobot, context_of, failed
+import pytest
+from scripted_robot import MODEL, Colours, ScriptedRobot, context_of, failed, outcome
+from table_scene import BLUE, COKE, GREY, PINK, RED, TABLE, Can
 
-from skills.api import Cause, Surface
+from skills.api import Cause, Succeeded, Surface
 from skills.detect.skill import Detect, DetectInputs
 
-TABLE = Surface("kitchen table", ((0.8, -0.6), (1.4, -0.6), (1.4, 0.6), (0.8, 0.6)), 0.75)
 FAR = Surface("shelf", ((8.0, -0.6), (8.4, -0.6), (8.4, 0.6), (8.0, 0.6)), 0.75)
+SECOND = Can(1.1, 0.25, 0.033, 0.115, RED)
+BEER = Can(1.0, 0.1, 0.03, 0.23, BLUE)
+
+
+def found(things, inputs, **options):
+    """The success of a look at a table with things on it, and the log."""
+    log = []
+    step = outcome(Detect(context_of(ScriptedRobot(things=things), log, **options)), inputs)
+    assert isinstance(step, Succeeded), step
+    return step, log
 
 
 def test_an_unknown_class_is_named():
@@ -29,22 +42,124 @@ def test_a_surface_out_of_sight_is_a_failed_precondition():
     failed(skill, DetectInputs(("coke",), (FAR,)), Cause.PRECONDITION, "the shelf is out of sight")
 
 
-def test_nothing_seen_is_a_failed_postcondition_and_the_arm_is_stowed():
-    robot, log = ScriptedRobot(), []
-    skill = Detect(context_of(robot, log))
+def test_a_thing_is_found_where_it_stands_and_seen_from_two_places():
+    step, log = found([COKE], DetectInputs(("coke", "hammer"), (TABLE,)))
+    seen = step.outputs["observation"]
+    assert (seen.thing.name, seen.surface) == ("coke", "table")
+    assert seen.position_W == pytest.approx((COKE.x, COKE.y, 0.8075), abs=0.008)
+    assert seen.size_m == pytest.approx((0.066, 0.066, 0.115), abs=0.01)
+    topics = [topic for topic, _ in log]
+    assert topics.count("detections") == 2
+    assert [m["class_name"] for topic, m in log if topic == "object_destination"] == ["coke"]
+    (track,) = [m for topic, m in log if topic == "tracks"][-1]["tracks"]
+    assert (track["views"], track["class_name"]) == (2, "coke")
+
+
+def test_what_is_seen_only_once_does_not_count():
+    class Flickering(Colours):
+        pictures = 0
+
+        def detect(self, pictures):
+            object.__setattr__(self, "pictures", self.pictures + 1)
+            return super().detect(pictures) if self.pictures == 1 else [()]
+
+    skill = Detect(context_of(ScriptedRobot(things=[COKE]), detector=Flickering()))
+    failed(skill, DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "no coke seen on the table")
+
+
+def test_a_thing_of_another_class_is_not_what_is_looked_for():
+    skill = Detect(context_of(ScriptedRobot(things=[COKE])))
+    failed(skill, DetectInputs(("beer",), (TABLE,)), Cause.POSTCONDITION, "no beer seen")
+
+
+def test_a_thing_beside_the_surface_is_not_on_it():
+    half = replace(TABLE, polygon_W=((0.8, 0.1), (1.4, 0.1), (1.4, 0.6), (0.8, 0.6)))
+    skill = Detect(context_of(ScriptedRobot(things=[COKE])))
+    failed(skill, DetectInputs(("coke",), (half,)), Cause.POSTCONDITION, "no coke seen")
+
+
+@pytest.mark.parametrize(("attribute", "colour"), [("red", RED), ("pink", PINK)])
+def test_the_one_that_shows_the_attribute_is_taken(attribute, colour):
+    colours = Colours({"coke": RED, "beer": PINK} if colour == RED else {"coke": PINK, "beer": RED})
+    things = [COKE, replace(SECOND, colour=PINK)]
+    step, _ = found(things, DetectInputs(("coke",), (TABLE,), (attribute,)), detector=colours)
+    assert step.outputs["observation"].thing.attributes == (attribute,)
+
+
+def test_a_thing_without_the_attribute_is_none():
+    skill = Detect(context_of(ScriptedRobot(things=[COKE])))
+    failed(skill, DetectInputs(("coke",), (TABLE,), ("blue",)), Cause.POSTCONDITION, "no blue coke seen")
+
+
+def test_all_things_are_counted_when_asked_for():
+    step, log = found([COKE, SECOND, BEER], DetectInputs(("coke",), (TABLE,), count=0))
+    assert step.message == "there are two cokes on the table"
+    assert len(step.outputs["observations"]) == 2
+    assert sum(topic == "object_destination" for topic, _ in log) == 2
+
+
+def test_the_look_ends_with_as_many_as_were_asked_for():
+    step, _ = found([COKE, SECOND], DetectInputs(("coke",), (TABLE,), count=2))
+    assert step.message == "there are two cokes on the table"
+
+
+def test_fewer_than_asked_for_is_a_failure_that_tells_how_many():
+    skill = Detect(context_of(ScriptedRobot(things=[COKE])))
     failed(
-        skill,
-        DetectInputs(("coke", "beer"), (TABLE,)),
-        Cause.POSTCONDITION,
-        "no coke or beer seen on the kitchen table",
+        skill, DetectInputs(("coke",), (TABLE,), count=3), Cause.POSTCONDITION, "there is one coke on the table, and"
     )
+
+
+def test_nothing_seen_is_a_failed_postcondition_that_tells_what_was_seen_and_the_arm_is_stowed():
+    robot, log = ScriptedRobot(things=[]), []
+    skill = Detect(context_of(robot, log))
+    failed(skill, DetectInputs(("coke", "beer"), (TABLE,)), Cause.POSTCONDITION, "no coke or beer seen on the table")
     assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
     assert next(topic for topic, _ in log) == "object_to_detect"
-    assert {topic for topic, _ in log} == {"object_to_detect", "detections"}
+    assert {topic for topic, _ in log} == {"object_to_detect", "detections", "tracks", "surfaces_seen"}
+    (shares,) = [m["surfaces"]["table"] for topic, m in log if topic == "surfaces_seen"]
+    assert shares["seen"] > 0.8
+    assert sum(shares.values()) == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_hidden_part_of_the_surface_is_told():
+    wall = Can(0.95, 0.0, 0.1, 0.4, GREY)
+    log = []
+    skill = Detect(context_of(ScriptedRobot(things=[wall]), log))
+    failed(skill, DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "% hidden")
+    assert next(m["surfaces"]["table"]["hidden"] for topic, m in log if topic == "surfaces_seen") > 0.02
+
+
+def test_without_light_and_depth_nothing_was_looked_at():
+    robot = ScriptedRobot()
+    failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.EXECUTION, "it is dark")
+    assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
+
+
+def test_a_thing_on_the_floor_counts_only_when_the_floor_does():
+    bottle = Can(1.0, -0.85, 0.04, 0.25, BLUE, base=0.0)
+    inputs = DetectInputs(("beer",), (TABLE,))
+    failed(Detect(context_of(ScriptedRobot(things=[bottle]))), inputs, Cause.POSTCONDITION, "no beer seen")
+    step, _ = found([bottle], replace(inputs, floor=True))
+    assert step.outputs["observation"].surface == "floor"
+    assert step.outputs["observation"].position_W == pytest.approx((1.0, -0.85, 0.125), abs=0.03)
+
+
+def test_with_an_expected_place_only_what_is_there_counts():
+    near = DetectInputs(("coke",), (TABLE,), expected_W=(SECOND.x, SECOND.y, 0.8))
+    step, _ = found([COKE, SECOND], near)
+    assert step.outputs["observation"].position_W[1] == pytest.approx(SECOND.y, abs=0.02)
+    skill = Detect(context_of(ScriptedRobot(things=[COKE])))
+    failed(skill, replace(near, expected_W=(1.2, 0.5, 0.8)), Cause.POSTCONDITION, "no coke seen")
 
 
 def test_the_jaw_is_opened_to_look_and_closed_again():
-    robot = ScriptedRobot()
-    skill = Detect(context_of(robot))
-    failed(skill, DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "no coke")
+    robot = ScriptedRobot(things=[])
+    failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "no coke")
     assert robot.opening_rad == 0.0
+
+
+def test_the_same_scene_gives_the_same_log():
+    logs = [found([COKE, BEER], DetectInputs(("coke",), (TABLE,)))[1] for _ in range(2)]
+    plain = [[(topic, {k: v for k, v in m.items() if k != "image"}) for topic, m in log] for log in logs]
+    assert plain[0] == plain[1]

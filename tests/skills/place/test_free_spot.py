@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from skills.api import Surface
-from skills.detect.interim_segmentation import Cluster, Plane, SurfaceView
+from skills.detect.surface_view import Cluster, Plane, SurfaceView
 from skills.detect.points import PointCloud
 from skills.detect.shape import SeenShape
 from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, spots

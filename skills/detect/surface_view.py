@@ -1,0 +1,150 @@
+"""What a picture shows of a surface: its plane, and the points above it grouped on a grid, whatever they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import Surface
+from skills.detect.points import PointCloud, camera_pose_W, cloud_from_image, inside_polygon
+from skills.detect.shape import SeenShape, measure
+from skills.detect.sighting import Sighting
+from skills.robot import FloatArray, Image
+
+_CELL_M = 0.008
+_LOWEST_M = 0.008
+_HIGHEST_M = 0.4
+_FEWEST_POINTS = 40
+_PLANE_BAND_M = 0.05
+_SAME_THING_M = 0.06
+_LEAST_OVERLAP = 0.2
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A nearly level plane in W: z = height + slope . ((x, y) - origin); noise_m is the spread of its points."""
+
+    origin: tuple[float, float]
+    height_m: float
+    slope: tuple[float, float]
+    noise_m: float
+
+    def z(self, xy: FloatArray) -> FloatArray:
+        """Height of the plane at rows of xy (N, 2)."""
+        return np.asarray(self.height_m + (xy - np.array(self.origin)) @ np.array(self.slope))
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """The points of one thing, the plane that it stands on, its shape and its box (u0, v0, u1, v1) in the picture."""
+
+    points: PointCloud
+    surface: str
+    plane: Plane
+    shape: SeenShape
+    box: tuple[int, int, int, int]
+
+    @property
+    def base_m(self) -> float:
+        """Height of the surface under the thing."""
+        return float(self.plane.z(np.array([self.shape.centre]))[0])
+
+
+@dataclass(frozen=True)
+class SurfaceView:
+    """What one picture shows of a surface: the plane, its own points, and the clusters on it."""
+
+    plane: Plane
+    plane_points: PointCloud
+    clusters: tuple[Cluster, ...]
+
+
+def view_surface(image: Image, X_WO: RigidTransform, surface: Surface, margin_m: float = 0.03) -> SurfaceView | None:
+    """Plane and clusters of one surface in a picture; None when too little of the surface is seen."""
+    cloud = cloud_from_image(image, X_WO)
+    above = cloud.p_W[:, 2] - surface.height_m
+    cloud = cloud.where((above > -_PLANE_BAND_M) & (above < _HIGHEST_M))
+    cloud = cloud.where(inside_polygon(cloud.p_W[:, :2], surface.polygon_W, margin_m))
+    plane = fit_plane(cloud.p_W, surface.height_m)
+    if plane is None:
+        return None
+    height = cloud.p_W[:, 2] - plane.z(cloud.p_W[:, :2])
+    standing = cloud.where(height > max(_LOWEST_M, 3.0 * plane.noise_m))
+    p_WC = camera_pose_W(image, X_WO).translation()
+    clusters = tuple(_cluster(points, surface, plane, p_WC) for points in _groups(standing))
+    return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
+
+
+def fit_plane(points_W: FloatArray, height_m: float) -> Plane | None:
+    """The plane near a surveyed height, robust against things standing on it; None when too few points show it."""
+    near = points_W[np.abs(points_W[:, 2] - height_m) < _PLANE_BAND_M]
+    if len(near) < 80:
+        return None
+    counts, edges = np.histogram(near[:, 2], bins=np.arange(height_m - _PLANE_BAND_M, height_m + _PLANE_BAND_M, 0.004))
+    smooth = np.convolve(counts, [1, 2, 1], mode="same")
+    level = float(edges[int(np.argmax(smooth))] + 0.002)
+    origin = near[:, :2].mean(axis=0)
+    plane = Plane((float(origin[0]), float(origin[1])), level, (0.0, 0.0), 0.004)
+    for _ in range(4):
+        plane = _refined(plane, near) or plane
+    return plane
+
+
+def _refined(plane: Plane, points_W: FloatArray) -> Plane | None:
+    """One step of trimmed least squares; slopes beyond 2 degrees are taken for other things and dropped."""
+    residual = points_W[:, 2] - plane.z(points_W[:, :2])
+    inliers = points_W[np.abs(residual) < max(0.006, 2.5 * plane.noise_m)]
+    if len(inliers) < 40:
+        return None
+    design = np.column_stack([np.ones(len(inliers)), inliers[:, :2] - np.array(plane.origin)])
+    (height, slope_x, slope_y), *_ = np.linalg.lstsq(design, inliers[:, 2], rcond=None)
+    if np.hypot(slope_x, slope_y) > 0.035:
+        height, slope_x, slope_y = float(np.median(inliers[:, 2])), 0.0, 0.0
+    fitted = Plane(plane.origin, float(height), (float(slope_x), float(slope_y)), plane.noise_m)
+    noise = 1.48 * float(np.median(np.abs(inliers[:, 2] - fitted.z(inliers[:, :2]))))
+    return Plane(fitted.origin, fitted.height_m, fitted.slope, max(noise, 0.001))
+
+
+def _groups(points: PointCloud) -> list[PointCloud]:
+    """Points grouped by neighbourhood on a grid seen from above."""
+    if len(points) < _FEWEST_POINTS:
+        return []
+    cells = np.floor((points.p_W[:, :2] - points.p_W[:, :2].min(axis=0)) / _CELL_M).astype(np.int64) + 1
+    counts = np.zeros(cells.max(axis=0) + 2, dtype=np.int32)
+    np.add.at(counts, (cells[:, 0], cells[:, 1]), 1)
+    occupied = (counts >= 2).astype(np.uint8)
+    count, labels = cv2.connectedComponents(cv2.dilate(occupied, np.ones((3, 3), np.uint8)), connectivity=8)
+    labels = np.where(occupied > 0, labels, 0)
+    label = labels[cells[:, 0], cells[:, 1]]
+    groups = [points.where(label == k) for k in range(1, count)]
+    return [group for group in groups if len(group) >= _FEWEST_POINTS]
+
+
+def _cluster(points: PointCloud, surface: Surface, plane: Plane, p_WC: FloatArray) -> Cluster:
+    (u0, v0), (u1, v1) = points.pixels.min(axis=0), points.pixels.max(axis=0)
+    shape = measure(points.p_W, plane.z(points.p_W[:, :2]), p_WC)
+    return Cluster(points, surface.name, plane, shape, (int(u0), int(v0), int(u1), int(v1)))
+
+
+def cluster_of(clusters: tuple[Cluster, ...], sighting: Sighting) -> Cluster | None:
+    """The cluster that a detected thing is: the one near it whose box overlaps the detection's most; None if none."""
+    near = [one for one in clusters if _apart(one, sighting) < _SAME_THING_M + 0.5 * one.shape.length_m]
+    overlaps = {id(one): _overlap(one.box, sighting.detection.box) for one in near}
+    best = max(near, key=lambda one: overlaps[id(one)], default=None)
+    return best if best is not None and overlaps[id(best)] > _LEAST_OVERLAP else None
+
+
+def _apart(cluster: Cluster, sighting: Sighting) -> float:
+    return float(np.linalg.norm(np.array(cluster.shape.centre) - sighting.position_W[:2]))
+
+
+def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> float:
+    """Intersection over union of two boxes."""
+    width, height = (min(a[k + 2], b[k + 2]) - max(a[k], b[k]) for k in (0, 1))
+    if width <= 0 or height <= 0:
+        return 0.0
+    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (a, b)]
+    return float(width * height / max(sum(areas) - width * height, 1e-6))

@@ -1,0 +1,198 @@
+"""Things seen over several views: one track for each, with its place, its class and how sure it is that it is there.
+
+A sighting belongs to the track that it fits by place (Mahalanobis distance) and class; places are fused as information
+(inverse covariances add). A track that a picture should show and that is not detected there loses belief.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Protocol
+
+import numpy as np
+
+from skills.detect.sighting import Sighting
+from skills.robot import FloatArray
+
+GATE = 16.3
+"""Squared Mahalanobis distance within which 99.9 % of the sightings of a thing lie."""
+DIFFERENT_PLACES_M = 0.03
+CONFIRMED_BELIEF = 0.6
+_JITTER_M = 0.012
+_NEAR_M = 0.03
+_CONFUSED = 0.02
+_DETECTED_IF_THERE, _DETECTED_IF_NOT = 0.85, 0.12
+_FIRST_BELIEF, _LEAST_BELIEF = 0.5, 0.05
+
+
+@dataclass(frozen=True)
+class Track:
+    """One thing. `position_W` with `covariance` (3, 3) from the views, without the localisation's error.
+
+    `classes` tells how likely each class is, `belief` how likely it is that something is there at all. `views` counts
+    the places that it was seen from; `latest` is its last sighting, `best` its surest one.
+    """
+
+    number: int
+    classes: Mapping[str, float]
+    belief: float
+    position_W: FloatArray
+    covariance: FloatArray
+    eyes_W: tuple[tuple[float, float, float], ...]
+    latest: Sighting
+    best: Sighting
+    missed: int = 0
+
+    @property
+    def class_name(self) -> str:
+        """The likeliest class."""
+        return max(self.classes, key=lambda name: self.classes[name])
+
+    @property
+    def views(self) -> int:
+        """From how many different places it was seen."""
+        return len(self.eyes_W)
+
+    @property
+    def last_seen_s(self) -> float:
+        """When it was seen last."""
+        return self.latest.stamp_s
+
+    @property
+    def confirmed(self) -> bool:
+        """Seen from two places, and believed."""
+        return self.views >= 2 and self.belief >= CONFIRMED_BELIEF and self.classes[self.class_name] >= CONFIRMED_BELIEF
+
+
+class Tracks(Protocol):
+    """Gives what is known of the things around."""
+
+    def snapshot(self) -> tuple[Track, ...]:
+        """All tracks, the surest first; immutable."""
+
+
+class TrackBook:
+    """Keeps tracks up to date with the sightings of each picture. Implements `Tracks`."""
+
+    def __init__(self, class_names: Sequence[str]) -> None:
+        self._names = tuple(class_names)
+        self._tracks: dict[int, Track] = {}
+        self._count = 0
+
+    def snapshot(self) -> tuple[Track, ...]:
+        """All tracks, the surest first."""
+        return tuple(sorted(self._tracks.values(), key=lambda track: (-track.belief, track.number)))
+
+    def update(self, seen: Sequence[Sighting], in_plain_view: Callable[[Track], bool]) -> tuple[Track, ...]:
+        """Take in all sightings of one picture; `in_plain_view` tells of a track whether the picture should show it."""
+        before = tuple(self._tracks.values())
+        pairs = _matched(before, seen)
+        for track in before:
+            if track.number not in pairs.values() and in_plain_view(track):
+                self._miss(track)
+        for k, sighting in enumerate(seen):
+            if k in pairs:
+                self._tracks[pairs[k]] = _fused(self._tracks[pairs[k]], sighting, self._names)
+            else:
+                self._begin(sighting)
+        return self.snapshot()
+
+    def _begin(self, sighting: Sighting) -> None:
+        self._count += 1
+        even = dict.fromkeys(self._names, 1.0 / len(self._names))
+        eye = _point(sighting.eye_W)
+        self._tracks[self._count] = Track(
+            number=self._count,
+            classes=_classes(even, sighting),
+            belief=_FIRST_BELIEF,
+            position_W=sighting.position_W,
+            covariance=_spread(sighting),
+            eyes_W=(eye,),
+            latest=sighting,
+            best=sighting,
+        )
+
+    def _miss(self, track: Track) -> None:
+        belief = _updated(track.belief, 1.0 - _DETECTED_IF_THERE, 1.0 - _DETECTED_IF_NOT)
+        if belief < _LEAST_BELIEF:
+            del self._tracks[track.number]
+        else:
+            self._tracks[track.number] = replace(track, belief=belief, missed=track.missed + 1)
+
+
+def _matched(tracks: Sequence[Track], seen: Sequence[Sighting]) -> dict[int, int]:
+    """Which sighting (its index) belongs to which track (its number): the nearest pairs first, one to one."""
+    options = [(distance2(track, s), k, track.number) for track in tracks for k, s in enumerate(seen) if fits(track, s)]
+    pairs: dict[int, int] = {}
+    for _, k, number in sorted(options):
+        if k not in pairs and number not in pairs.values():
+            pairs[k] = number
+    return pairs
+
+
+def fits(track: Track, sighting: Sighting) -> bool:
+    """Whether a sighting can be of a track's thing: near enough, and of a class that it may have.
+
+    What is within 3 cm is the same thing, whatever its class.
+    """
+    apart_m = float(np.linalg.norm(track.position_W - sighting.position_W))
+    possible = track.classes[sighting.class_name] > _CONFUSED or apart_m < _NEAR_M
+    return possible and distance2(track, sighting) < GATE
+
+
+def distance2(track: Track, sighting: Sighting) -> float:
+    """The squared Mahalanobis distance of a sighting from a track."""
+    off = track.position_W - sighting.position_W
+    return float(off @ np.linalg.solve(track.covariance + _spread(sighting), off))
+
+
+def _spread(sighting: Sighting) -> FloatArray:
+    """The covariance of a sighting with what the localisation jitters between two views."""
+    return np.asarray(sighting.covariance + _JITTER_M**2 * np.eye(3))
+
+
+def _fused(track: Track, sighting: Sighting, names: Sequence[str]) -> Track:
+    """The track with one more sighting."""
+    track_information, information = np.linalg.inv(track.covariance), np.linalg.inv(_spread(sighting))
+    covariance = np.linalg.inv(track_information + information)
+    position = covariance @ (track_information @ track.position_W + information @ sighting.position_W)
+    return replace(
+        track,
+        classes=_classes(track.classes, sighting),
+        belief=_updated(track.belief, _DETECTED_IF_THERE, _DETECTED_IF_NOT),
+        position_W=position,
+        covariance=covariance,
+        eyes_W=_with_eye(track.eyes_W, _point(sighting.eye_W)),
+        latest=sighting,
+        best=max(track.best, sighting, key=lambda one: one.detection.score),
+    )
+
+
+def _classes(before: Mapping[str, float], sighting: Sighting) -> Mapping[str, float]:
+    """Class beliefs after a sighting: its score for its class, the rest spread over the others."""
+    score = float(np.clip(sighting.detection.score, 0.3, 0.97))
+    others = (1.0 - score) / max(len(before) - 1, 1)
+    raw = {name: p * (score if name == sighting.class_name else others) for name, p in before.items()}
+    total = sum(raw.values())
+    return MappingProxyType({name: max(value / total, 1e-3) for name, value in raw.items()})
+
+
+def _updated(belief: float, if_there: float, if_not: float) -> float:
+    """Bayes' rule for something that is there or not."""
+    there, nothing = belief * if_there, (1.0 - belief) * if_not
+    return there / (there + nothing)
+
+
+def _with_eye(
+    eyes: tuple[tuple[float, float, float], ...], eye: tuple[float, float, float]
+) -> tuple[tuple[float, float, float], ...]:
+    """The places seen from, with one more when it is a different one."""
+    return eyes if any(math.dist(one, eye) < DIFFERENT_PLACES_M for one in eyes) else (*eyes, eye)
+
+
+def _point(p: FloatArray) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in p)
+    return x, y, z

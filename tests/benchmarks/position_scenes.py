@@ -1,0 +1,202 @@
+"""Pictures with depth and true boxes of the nine classes in generated rooms, to measure where things are said to be.
+
+The rooms, things and views are those of the data set's held-out part; depth is as noisy as the hand camera's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import Value
+from pydrake.geometry import FramePoseVector, QueryObject
+from pydrake.math import RigidTransform, RotationMatrix
+
+from plant.dataset.coco import box_of
+from plant.dataset.compose import Placed, Scene, compose
+from plant.dataset.lighting import random_lighting
+from plant.dataset.render import Stage, is_validation
+from plant.dataset.silhouette import silhouette
+from plant.dataset.views import View, camera_specs, view_of
+from plant.models.catalogue import load_catalogue
+from plant.sensors.camera_noise import DepthDegrader, DepthNoise
+from plant.sensors.camera_spec import depth_render_camera
+from skills.api import Detection
+from skills.robot import FrameTree, Image, Intrinsics
+
+VIEWS = 8
+FARTHEST_M = 2.0
+LEAST_LONG_PX, LEAST_SHORT_PX, LEAST_VISIBLE = 24, 8, 0.4
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A thing in a picture: its box there, its true middle from the camera (m), extents, share seen."""
+
+    detection: Detection
+    instance: str
+    p_CT: NDArray[np.float64]
+    size_C: tuple[float, float, float]
+    visibility: float
+    truncation: float
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A picture with depth, and what is in it."""
+
+    image: Image
+    truths: tuple[Truth, ...]
+
+
+class DepthStage(Stage):
+    """A stage that gives depth, too."""
+
+    def seen(self, view: View, range_m: tuple[float, float]) -> tuple[NDArray[np.uint8], Any, NDArray[np.float32]]:
+        """Clean picture, labels and depth (m)."""
+        colour, labels = self.take(view)
+        poses = FramePoseVector()
+        poses.set_value(self._hand, self.hand_pose(view))
+        self._graph.get_source_pose_port(self._source).FixValue(self._context, Value(poses))
+        query = self._graph.get_query_output_port().Eval(self._context)
+        assert isinstance(query, QueryObject)
+        camera = depth_render_camera(view.intrinsics, "vtk", range_m)
+        depth = query.RenderDepthImage(camera, self._world, view.X_WC)
+        return colour, labels, np.asarray(depth.data[..., 0], dtype=np.float32)
+
+
+def shots(seed: int, scenes: int, views: int = VIEWS) -> Iterator[Shot]:
+    """Pictures of held-out scenes; the same for the same seed."""
+    held_out = (index for index in range(10 * scenes) if is_validation(index))
+    for _, index in zip(range(scenes), held_out, strict=False):
+        rng = np.random.default_rng([seed, index, 5])
+        scene = compose(rng, index, for_training=False)
+        lighting = random_lighting(rng, scene.room)
+        with tempfile.TemporaryDirectory(prefix="errand-scene-") as folder:
+            stage = DepthStage(Scene(scene.room, scene.things, None, scene.seats), lighting, Path(folder), 1.0)
+            yield from _shots_of(rng, stage, scene, views)
+
+
+def _shots_of(rng: np.random.Generator, stage: DepthStage, scene: Scene, views: int) -> Iterator[Shot]:
+    things = [thing for thing in scene.things if thing.model.class_id]
+    order = [things[k] for k in rng.permutation(len(things))]
+    for number in range(min(views, 3 * len(order))):
+        view = _hand_view(rng, scene, order[number % len(order)])
+        if view is not None:
+            yield _shot(rng, stage, view)
+
+
+def _hand_view(rng: np.random.Generator, scene: Scene, thing: Placed) -> View | None:
+    """A view of the hand camera, with its own intrinsics, within 2 m or a little more."""
+    for _ in range(30):
+        view = view_of(rng, scene.room, thing, camera_specs())
+        if view is None or view.camera != "hand":
+            continue
+        if float(np.linalg.norm(view.X_WC.inverse() @ thing.X_WO.translation())) < FARTHEST_M + 0.3:
+            return View("hand", view.X_WC, camera_specs()["hand"].intrinsics(), False, False)
+    return None
+
+
+def _shot(rng: np.random.Generator, stage: DepthStage, view: View) -> Shot:
+    range_m = camera_specs()[view.camera].depth_range_m
+    colour, labels, clean = stage.seen(view, range_m)
+    grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+    depth = DepthDegrader(rng, view.intrinsics, range_m, DepthNoise()).depth(clean, grey)
+    frames = FrameTree({"hand_camera": ("odom", view.X_WC)})
+    image = Image(0.0, "hand", "hand_camera", view.intrinsics, view.intrinsics, colour, grey, depth, frames)
+    found = (_truth(stage, int(label), labels == label, view) for label in np.unique(labels) if label in stage.labelled)
+    return Shot(image, tuple(truth for truth in found if truth is not None))
+
+
+def _truth(stage: DepthStage, label: int, mask: NDArray[np.bool_], view: View) -> Truth | None:
+    model, X_WO, _ = stage.labelled[label]
+    if mask.sum() < 20:
+        return None
+    points = model.surface.points
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    X_CO = view.X_WC.inverse() @ X_WO
+    alone = silhouette(np.asarray(X_CO @ points.T).T, model.surface.faces, view.intrinsics)
+    x, y, w, h = box_of(mask)
+    name = next(name for name, entry in load_catalogue().items() if entry.id == model.class_id)
+    return Truth(
+        Detection(name, 1.0, (float(x), float(y), float(x + w), float(y + h))),
+        model.name,
+        np.asarray(X_CO @ middle),
+        model.size_m,
+        min(1.0, float(mask.sum()) / max(alone.inside_px, 1)),
+        1.0 - alone.inside_px / max(alone.whole_px, alone.inside_px, 1),
+    )
+
+
+def counts(truth: Truth) -> bool:
+    """Whether the floors of issue 5 speak of it: near, large and well seen."""
+    u0, v0, u1, v1 = truth.detection.box
+    long, short = max(u1 - u0, v1 - v0), min(u1 - u0, v1 - v0)
+    seen = truth.visibility * (1.0 - truth.truncation)
+    near = float(np.linalg.norm(truth.p_CT)) < FARTHEST_M
+    return near and long >= LEAST_LONG_PX and short >= LEAST_SHORT_PX and seen >= LEAST_VISIBLE
+
+
+def save(shot: Shot, path: Path) -> None:
+    """Keep a shot in a file, for another measurement."""
+    rows = [(t.detection.class_name, t.instance, t.visibility, t.truncation, *t.size_C) for t in shot.truths]
+    lens, X_WC = shot.image.intrinsics, shot.image.frames.pose("hand_camera")
+    np.savez_compressed(
+        path,
+        colour=shot.image.colour,
+        depth_mm=np.rint(shot.image.depth_m * 1000).astype(np.uint16),
+        X_WC=X_WC.GetAsMatrix4(),
+        lens=np.array([lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy]),
+        rows=np.array(rows, dtype=str).reshape(-1, 7),
+        boxes=np.array([t.detection.box for t in shot.truths]).reshape(-1, 4),
+        p_CT=np.array([t.p_CT for t in shot.truths]).reshape(-1, 3),
+    )
+
+
+def load(path: Path) -> Shot:
+    """A shot that `save` has kept."""
+    with np.load(path) as data:
+        width, height, *rest = data["lens"].tolist()
+        lens = Intrinsics(int(width), int(height), *rest)
+        matrix = data["X_WC"]
+        X_WC = RigidTransform(RotationMatrix.ProjectToRotationMatrix(matrix[:3, :3]), matrix[:3, 3])
+        frames, colour = FrameTree({"hand_camera": ("odom", X_WC)}), data["colour"]
+        depth = (data["depth_mm"] / 1000.0).astype(np.float32)
+        grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+        image = Image(0.0, "hand", "hand_camera", lens, lens, colour, grey, depth, frames)
+        rows = zip(data["rows"], data["boxes"], data["p_CT"], strict=True)
+        return Shot(image, tuple(_loaded(row, box, p) for row, box, p in rows))
+
+
+def _loaded(row: NDArray[np.str_], box: NDArray[np.float64], p_CT: NDArray[np.float64]) -> Truth:
+    u0, v0, u1, v1 = (float(v) for v in box)
+    sx, sy, sz = (float(v) for v in row[4:7])
+    return Truth(Detection(str(row[0]), 1.0, (u0, v0, u1, v1)), str(row[1]), p_CT, (sx, sy, sz), *map(float, row[2:4]))
+
+
+def main() -> None:
+    """Render scenes into a folder."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, required=True)
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    begun = time.perf_counter()
+    for number, shot in enumerate(shots(args.seed, args.scenes)):
+        save(shot, args.out / f"{number:04d}.npz")
+        sys.stderr.write(f"\r{number + 1} pictures, {time.perf_counter() - begun:.0f} s")
+    sys.stderr.write("\n")
+
+
+if __name__ == "__main__":
+    main()

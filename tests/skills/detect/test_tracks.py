@@ -1,0 +1,119 @@
+"""Tracks over several views."""
+
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+from sighted import sighting
+
+from skills.detect.tracks import TrackBook
+
+CLASSES = ("beer", "coke", "hammer")
+
+
+def book_of(*pictures, in_view=True):
+    """A book that has taken in pictures, each a list of sightings."""
+    book = TrackBook(CLASSES)
+    for seen in pictures:
+        book.update(seen, lambda track: in_view)
+    return book
+
+
+LEFT, RIGHT = (0.0, 0.1, 1.0), (0.0, -0.1, 1.0)
+
+
+def test_two_views_from_different_places_confirm_a_track():
+    (track,) = book_of([sighting(eye=LEFT)], [sighting(1.01, eye=RIGHT)]).snapshot()
+    assert track.confirmed
+    assert (track.views, track.class_name) == (2, "coke")
+
+
+def test_two_views_from_one_place_do_not():
+    (track,) = book_of([sighting(eye=LEFT)], [sighting(eye=LEFT)]).snapshot()
+    assert (track.views, track.confirmed) == (1, False)
+
+
+def test_places_are_fused_by_how_sure_they_are():
+    (track,) = book_of([sighting(1.00, sigma=0.01)], [sighting(1.04, sigma=0.03)]).snapshot()
+    assert 1.0 < track.position_W[0] < 1.015
+    assert track.covariance[0, 0] < 0.01**2 + 0.012**2
+
+
+def test_more_views_make_a_place_surer():
+    sigmas = [book_of(*[[sighting()]] * count).snapshot()[0].covariance.trace() for count in (1, 2, 4, 8)]
+    assert sigmas == sorted(sigmas, reverse=True)
+
+
+def test_fused_places_err_as_their_covariance_says():
+    rng = np.random.default_rng(5)
+    errors = []
+    for _ in range(300):
+        seen = [[sighting(1.0 + rng.normal(0, 0.02), rng.normal(0, 0.02), sigma=0.02)] for _ in range(4)]
+        (track, *_) = book_of(*seen).snapshot()
+        off = track.position_W[:2] - [1.0, 0.0]
+        errors.append(off @ np.linalg.solve(track.covariance[:2, :2], off))
+    assert 0.8 < np.mean(errors) < 2.2  # two for two dimensions, less for the jitter that is allowed for
+
+
+def test_what_is_far_off_is_another_thing():
+    assert len(book_of([sighting(1.0)], [sighting(1.3)]).snapshot()) == 2
+
+
+def test_two_things_in_one_picture_are_never_one_track():
+    close = [sighting(1.0), sighting(1.03)]
+    assert len(book_of(close, close).snapshot()) == 2
+
+
+def test_a_thing_of_another_class_is_another_thing_unless_it_is_at_the_very_place():
+    sure = [[sighting()], [sighting()], [sighting()]]
+    assert len(book_of(*sure, [sighting(1.04, name="hammer")]).snapshot()) == 2
+    assert len(book_of(*sure, [sighting(1.005, name="hammer")]).snapshot()) == 1
+
+
+def test_class_belief_follows_the_scores_of_all_views():
+    (track,) = book_of([sighting(score=0.55, name="beer")], [sighting(score=0.9)], [sighting(score=0.9)]).snapshot()
+    assert track.class_name == "coke"
+    assert track.classes["coke"] > 0.9
+    assert sum(track.classes.values()) == pytest.approx(1.0, abs=0.01)
+
+
+def test_what_should_be_seen_again_and_is_not_loses_belief_and_is_forgotten():
+    beliefs = [t.belief for n in range(1, 4) for t in book_of([sighting()], *[[]] * n).snapshot()]
+    assert beliefs == sorted(beliefs, reverse=True)
+    assert all(belief < 0.5 for belief in beliefs)
+    assert book_of([sighting()], *[[]] * 4).snapshot() == ()
+
+
+def test_what_is_out_of_view_keeps_its_belief():
+    (track,) = book_of([sighting()], [], [], in_view=False).snapshot()
+    assert (track.belief, track.missed) == (0.5, 0)
+
+
+def test_a_track_that_was_confirmed_and_then_missed_is_no_longer_confirmed():
+    seen = [[sighting(eye=LEFT)], [sighting(eye=RIGHT)]]
+    assert book_of(*seen).snapshot()[0].confirmed
+    assert not book_of(*seen, [], []).snapshot()[0].confirmed
+
+
+def test_the_latest_and_the_surest_sighting_are_kept():
+    (track,) = book_of([sighting(score=0.95, stamp=1.0)], [sighting(score=0.7, stamp=2.0)]).snapshot()
+    assert (track.last_seen_s, track.best.stamp_s) == (2.0, 1.0)
+
+
+def test_a_snapshot_does_not_change_afterwards():
+    book = book_of([sighting()])
+    before = book.snapshot()
+    book.update([sighting(1.01)], lambda track: True)
+    assert before[0].position_W[0] == 1.0
+    with pytest.raises(FrozenInstanceError):
+        before[0].belief = 1.0
+
+
+def test_the_order_of_the_sightings_of_a_picture_does_not_matter():
+    both = [sighting(1.0), sighting(1.2)]
+    places = [sorted(t.position_W[0] for t in book_of(both, seen).snapshot()) for seen in (both, both[::-1])]
+    assert places[0] == pytest.approx(places[1])
+
+
+def test_an_empty_book_has_no_tracks():
+    assert book_of([], []).snapshot() == ()

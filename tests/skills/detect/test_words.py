@@ -1,0 +1,39 @@
+"""What was found, in words."""
+
+import pytest
+
+from skills.api import ObjectObservation, Surface, Thing
+from skills.detect.words import counted, plural, wanted
+
+BENCH = Surface("bench", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 0.8)
+
+
+def seen(name, surface="bench", *attributes):
+    return ObjectObservation(0.0, Thing(name, attributes), (1.0, 0.0, 0.8), (0.1, 0.1, 0.1), 0.0, 0.9, surface)
+
+
+@pytest.mark.parametrize(
+    ("found", "told"),
+    [
+        ([seen("wrench"), seen("wrench")], "there are two wrenches on the bench"),
+        ([seen("hammer")], "there is one hammer on the bench"),
+        ([seen("coke"), seen("beer"), seen("coke")], "there are two cokes and one beer on the bench"),
+        ([seen("wrench", "bench", "red")] * 2, "there are two red wrenches on the bench"),
+        ([seen("cube"), seen("cube", "floor")], "there are two cubes on the bench and the floor"),
+    ],
+)
+def test_counts_are_told(found, told):
+    assert counted(found, [BENCH]) == told
+
+
+def test_plurals():
+    assert [plural(name) for name in ("wrench", "beer", "person", "extinguisher")] == [
+        "wrenches",
+        "beers",
+        "people",
+        "extinguishers",
+    ]
+
+
+def test_what_is_wanted():
+    assert wanted(("coke", "beer"), ("red",)) == "red coke or red beer"

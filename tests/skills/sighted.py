@@ -1,0 +1,22 @@
+"""Sightings made by hand."""
+
+import numpy as np
+
+from skills.api import Detection
+from skills.detect.sighting import Sighting
+
+
+def sighting(x=1.0, y=0.0, name="coke", score=0.9, eye=(0.0, 0.0, 1.0), sigma=0.01, stamp=1.0):
+    covariance = sigma**2 * np.eye(3)
+    return Sighting(
+        stamp_s=stamp,
+        detection=Detection(name, score, (0.0, 0.0, 10.0, 10.0)),
+        position_W=np.array([x, y, 0.8]),
+        covariance=covariance,
+        place_covariance=covariance,
+        size_m=(0.07, 0.07, 0.12),
+        yaw_rad=0.0,
+        eye_W=np.array(eye),
+        colours=np.empty((0, 3), np.uint8),
+        surface="table",
+    )

@@ -67,6 +67,21 @@ class Asked:
         )
 
 
+def run_arguments(asked: Asked, request: Request) -> list[str]:
+    """The arguments by which `errand run` does the same in a process of its own, where nobody can be asked.
+
+    A sentence has the answers in their places; to the questions of a file they are given again.
+    """
+    sentence = asked.say if request.meant is None else request.meant.text
+    arguments = [str(asked.file)] if asked.file else ["--say", sentence or ""]
+    arguments += ["--world", asked.world] if asked.world else []
+    arguments += [] if asked.require_wake else ["--no-wake"]
+    given = asked.answers.given if asked.file else ()
+    arguments += [part for answer in given for part in ("--answer", answer)]
+    policy = asked.answers.policy if asked.file else None
+    return [*arguments, *([] if policy is None else ["--questions", policy.value])]
+
+
 @dataclass(frozen=True)
 class Durable:
     """What a run needs to be taken up later, or to take up an earlier one.

@@ -17,7 +17,7 @@ from executive.cli.answers import Answers
 from executive.cli.check_command import check
 from executive.cli.dataset_command import dataset
 from executive.cli.detect_command import detect
-from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run
+from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run, run_arguments
 from executive.cli.listen_command import hear_request, listen
 from executive.cli.log_command import log
 from executive.cli.mission_run import Finished, run_request
@@ -127,15 +127,18 @@ def evaluate(
     seeds: Annotated[str, typer.Option(help="Such as 1-20 or 1,4,7.")] = "1-20",
     jobs: Annotated[int, typer.Option(min=1, help="How many runs at a time.")] = 2,
     no_wake: NoWake = False,
+    answer: Answer = None,
+    questions: Questions = None,
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
     as_json: AsJson = False,
 ) -> None:
     """Run a mission at many seeds and count what the trees claim and what the referee saw."""
     with refusals():
         chosen = seed_range(seeds)
-        Asked(file, say, world, not no_wake).request().compile()
-    arguments = [*([str(file)] if file else ["--say", say or ""]), *(["--world", world] if world else [])]
-    arguments += ["--no-wake"] if no_wake else []
+        asked = Asked(file, say, world, not no_wake, Answers(tuple(answer or ()), questions))
+        request = asked.request()
+        request.compile()
+    arguments = run_arguments(asked, request)
     console = console_for(as_json)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as bar:

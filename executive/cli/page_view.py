@@ -20,7 +20,7 @@ from executive.record.schemas import MAP
 from executive.record.surroundings import map_message
 from executive.runner import Progress
 from executive.store.missions import MissionStore
-from executive.view.actions import Action, RefusedError, control_actions, text_of
+from executive.view.actions import Action, RefusedError, asked_json, control_actions, text_of
 from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer
 from executive.view.watch import ControlWatch, ProgressWatch
@@ -42,6 +42,7 @@ class PageView:
         self._progress = ProgressWatch(self._feed)
         self._parser = LateParser()
         self.conversation = conversation_of(request, self.control, self._parser)
+        self.conversation.listen(lambda waiting: self._feed.tell("asked", asked_json(waiting)))
         self._server: PageServer | None = None
         self._watch: ControlWatch | None = None
 

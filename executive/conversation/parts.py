@@ -15,7 +15,7 @@ from executive.language.questions import ClarifyingQuestion
 from executive.language.reference import Memory
 from executive.language.understand import Understanding
 
-__all__ = ["NEVER_MIND", "OVER", "Hands", "Reply", "ReplyKind", "Speech", "answer", "done", "refused"]
+__all__ = ["NEVER_MIND", "OVER", "Hands", "Reply", "ReplyKind", "Speech", "Waiting", "answer", "done", "refused"]
 
 OVER: Final = "the run is over; begin another with 'errand run'"
 NEVER_MIND: Final = "all right, never mind"
@@ -88,6 +88,14 @@ class Reply:
     text: str
     commands: tuple[Command, ...] = ()
     question: ClarifyingQuestion | None = None
+
+
+@dataclass(frozen=True)
+class Waiting:
+    """A question of the robot that waits for its answer until `until_s` (robot's clock)."""
+
+    question: ClarifyingQuestion
+    until_s: float
 
 
 def answer(text: str) -> Reply:

@@ -14,7 +14,18 @@ from typing import Final
 from executive.command import Command, Task, Thing
 from executive.compiler import CompiledTree
 from executive.control import Mode
-from executive.conversation.parts import NEVER_MIND, OVER, Hands, Reply, ReplyKind, Speech, answer, done, refused
+from executive.conversation.parts import (
+    NEVER_MIND,
+    OVER,
+    Hands,
+    Reply,
+    ReplyKind,
+    Speech,
+    Waiting,
+    answer,
+    done,
+    refused,
+)
 from executive.conversation.remarks import RemarkAnswers
 from executive.errors import InputError
 from executive.language.followups import Amendment, FollowUp, FollowUpKind, amended, follow_up_of, without_fetching
@@ -74,6 +85,11 @@ class Conversation:
         self._names: frozenset[str] = frozenset()
         self._seen: frozenset[str] = frozenset()  # missions that have begun
         self._remarks = RemarkAnswers(speech, hands)
+        self._listeners: tuple[Callable[[Waiting | None], None], ...] = ()
+
+    def listen(self, listener: Callable[[Waiting | None], None]) -> None:
+        """Call `listener` after all that is said with the question that then waits, or None."""
+        self._listeners = (*self._listeners, listener)
 
     def begun(self, tree: CompiledTree, *, memory: Memory | None = None, now_s: float = 0.0) -> None:
         """The run begins with a mission: it can be corrected, and spoken of, as any other."""
@@ -97,7 +113,12 @@ class Conversation:
             seen_s = 0.0 if self._progress is None else self._progress.now_s
             now_s = seen_s if now_s is None else now_s
             said, ignored = self._addressed(text, now_s)
-            return ignored or self._reply(said, now_s)
+            reply = ignored or self._reply(said, now_s)
+            waiting = self._waiting(now_s)
+        asked = None if waiting is None else Waiting(waiting.question, waiting.at_s + REMEMBERED_S)
+        for listener in self._listeners:
+            listener(asked)
+        return reply
 
     # -- to whom -----------------------------------------------------------------------------------------------------
 

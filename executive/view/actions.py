@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from executive.control import Control, ControlState
+from executive.conversation.parts import Waiting
 
 Action = Callable[[Mapping[str, Any]], str]
 
@@ -58,6 +59,14 @@ def control_json(state: ControlState) -> dict[str, Any]:
             for each in state.questions
         ],
     }
+
+
+def asked_json(waiting: Waiting | None) -> dict[str, Any]:
+    """What the page shows of the question that the robot asks back; nothing of it where none waits."""
+    if waiting is None:
+        return {"question": None}
+    question = waiting.question
+    return {"question": {"text": question.text, "options": list(question.candidates), "until_s": waiting.until_s}}
 
 
 _CALLS: Final[Mapping[str, tuple[Callable[[Control, Mapping[str, Any]], None], str]]] = MappingProxyType(

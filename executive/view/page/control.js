@@ -50,6 +50,12 @@
       }
     }
 
+    async answer(text) {
+      this.saying = true;
+      if (await this.do("say", { text })) byId("sentence").value = "";
+      this.saying = false;
+    }
+
     async say(action) {
       const input = byId("sentence"), text = input.value.trim();
       if (!text) return;

@@ -20,7 +20,7 @@
   const map = new MapPanel(byId("map"), byId("where"));
   const camera = new CameraPanel(byId("camera"), byId("seen"), addressOf);
   const scene = new ScenePanel(byId("scene"));
-  const questions = new QuestionPanel(byId("questions"), (id, text) => control.do("answer", { id, text }));
+  const questions = new QuestionPanel(byId("questions"), (id, text) => (id === null ? control.answer(text) : control.do("answer", { id, text })));
   const timeline = new Timeline(store, () => schedule());
   const events = new EventPanel(byId("events"), byId("events-shown"), store, (t) => { timeline.hold(); timeline.go(t); });
 
@@ -53,9 +53,16 @@
     tree.draw(view);
     header.draw(store, view, replaying);
     control.draw(state, store.now.outcomes.length > 0);
-    questions.draw(state ? state.questions : [], store.end);
+    questions.draw(state ? [...state.questions, ...askedBack(state)] : [], store.end);
     measure();
     slowly(view);
+  }
+
+  // What the robot asks of a sentence, as long as it waits for the answer.
+  function askedBack(state) {
+    const asked = (store.live.asked || {}).question;
+    const waits = asked && state.mode !== "ended" && control.actions.has("say") && asked.until_s > store.end;
+    return waits ? [{ ...asked, id: null, default: null, options: asked.options.length ? [...asked.options, "never mind"] : [] }] : [];
   }
 
   const SLOW_MS = 150;

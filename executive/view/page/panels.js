@@ -135,7 +135,7 @@
     constructor(box, onAnswer) { Object.assign(this, { box, onAnswer, shown: "" }); }
 
     draw(questions, now) {
-      const key = JSON.stringify(questions.map((each) => each.id));
+      const key = JSON.stringify(questions.map((each) => [each.id, each.text]));
       if (key !== this.shown) {
         this.shown = key;
         this.box.replaceChildren(...questions.map((each) => this.card(each)));
@@ -143,7 +143,7 @@
       }
       [...this.box.querySelectorAll(".limit")].forEach((limit, n) => {
         const left = Math.max(0, Math.ceil(questions[n].until_s - now));
-        limit.textContent = `${left} s, then “${questions[n].default}”`;
+        limit.textContent = questions[n].default === null ? `${left} s` : `${left} s, then “${questions[n].default}”`;
       });
     }
 
@@ -161,7 +161,7 @@
       } else {
         const input = element("input");
         input.type = "text";
-        input.value = otherwise;
+        input.value = otherwise || "";
         input.setAttribute("aria-label", text);
         card.append(input, element("button", "", "Answer"));
         card.addEventListener("submit", () => this.onAnswer(id, input.value));

@@ -159,6 +159,37 @@ def test_run_shows_commands_tree_and_both_verdicts(no_plant, tmp_path):
     assert any(line.startswith("The referee saw: ✓") for line in lines)
 
 
+AMBIGUOUS = "Hey Alice, put the cube on the table"
+
+
+@pytest.mark.parametrize(
+    ("flags", "table"), [(("--answer", "the coffee table"), "coffee"), (("--questions", "first"), "kitchen")]
+)
+def test_evaluate_answers_once_for_all_seeds(monkeypatch, tmp_path, flags, table):
+    asked = []
+
+    def sweep(arguments, seeds, *, jobs, out, done):
+        asked.append(arguments)
+        return ()
+
+    monkeypatch.setattr(main, "sweep", sweep)
+    result = invoke("evaluate", "--say", AMBIGUOUS, *flags, "--seeds", "1-2", "--out", str(tmp_path))
+    assert asked == [["--say", f"Hey Alice, put the cube on the {table} table"]], result.output
+
+
+def test_evaluate_gives_the_answers_for_a_file_to_every_run(monkeypatch, tmp_path):
+    file, asked = tmp_path / "mission.yaml", []
+    file.write_text("name: tidy\nworld: flat\nsteps:\n  - say: put the cube on the table\n")
+    monkeypatch.setattr(main, "sweep", lambda arguments, *_, **__: asked.append(arguments) or ())
+    result = invoke("evaluate", str(file), "--answer", "the coffee table", "--out", str(tmp_path))
+    assert asked == [[str(file), "--answer", "the coffee table"]], result.output
+
+
+def test_evaluate_refuses_a_question_that_nobody_answers(tmp_path):
+    result = invoke("evaluate", "--say", AMBIGUOUS, "--questions", "refuse", "--out", str(tmp_path))
+    assert (result.exit_code, "Which table" in result.output) == (2, True)
+
+
 def test_evaluate_counts_claims_and_verdicts(monkeypatch, tmp_path):
     reports = (
         report(seed=1),

@@ -175,6 +175,19 @@ def test_a_question_waits_for_a_minute(talk):
     assert conversation.hear("yes", 66.0).kind is ReplyKind.REFUSED
 
 
+def test_who_listens_hears_which_question_waits(talk):
+    heard, conversation = [], talk("go to the hall")
+    conversation.listen(heard.append)
+    conversation.hear("bring me the cok", 1.0)
+    conversation.hear("where are you", 2.0)
+    conversation.hear("never mind", 3.0)
+    assert [waiting and (waiting.question.candidates, waiting.until_s) for waiting in heard] == [
+        (("coke",), 61.0),
+        (("coke",), 61.0),
+        None,
+    ]
+
+
 def test_a_question_of_the_mission_is_answered(talk, control):
     conversation, clock = talk(), VirtualClock()
     asked = control.ask(Question("q1", "Is the door open?", ("yes", "no"), "no", 60.0), clock)

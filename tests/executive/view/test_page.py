@@ -14,12 +14,14 @@ import pytest
 
 from executive.control import Control, Mode
 from executive.conversation import Conversation, Speech
+from executive.language import Status, Understanding
+from executive.language.questions import ClarifyingQuestion, Slot
 from executive.outcome import Glance
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
 from executive.record.surroundings import map_message
 from executive.runner import Progress
-from executive.view.actions import RefusedError, control_actions
+from executive.view.actions import RefusedError, asked_json, control_actions
 from executive.view.feed import Feed
 from executive.view.model import node_view
 from executive.view.replay import fed, to_html
@@ -261,6 +263,52 @@ def test_a_question_is_asked_and_answered(page, live, control, clock):
     page.get_by_role("button", name="yes").click()
     playwright_api.expect(page.locator(".question")).to_have_count(0)
     assert (asked.done(), asked.result()) == (True, "yes")
+
+
+@pytest.fixture
+def talking(compiled, make, control, knowledge):
+    """A page on which "the can" makes a question; the page's address and all that was said."""
+    tree, feed, heard = compiled(*make.FETCH), Feed(), []
+    question = ClarifyingQuestion("Which can: coke or beer?", Slot.THING, ("coke", "beer"), "coke", "can")
+
+    def understand(text, _):
+        heard.append(text)
+        if "can" in text:
+            return Understanding(text, Status.QUESTION, reason=question.text, question=question)
+        return Understanding(text, Status.OK, tree.commands)
+
+    control.begin({"Alice": tree})
+    watch = ControlWatch(control, feed)
+    talk = Conversation(Speech(knowledge, "Alice", understand, lambda *_: tree), control)
+    talk.listen(lambda waiting: feed.tell("asked", asked_json(waiting)))
+    feed("tree", 0.0, {"robot": "Alice", "root": node_view(tree.root).structure()})
+    actions = {**control_actions(control), "say": lambda values: talk.hear(values["text"]).text}
+    with PageServer(PageContent(feed, actions)) as server:
+        yield server.url, heard
+    control.end()
+    watch.close()
+
+
+def test_what_the_robot_asks_back_is_answered_by_buttons(page, talking):
+    url, heard = talking
+    page.goto(url)
+    page.fill("#sentence", "bring me the can")
+    page.press("#sentence", "Enter")
+    playwright_api.expect(page.locator(".question p")).to_have_text("Which can: coke or beer?")
+    playwright_api.expect(page.locator(".question button")).to_have_text(["coke", "beer", "never mind"])
+    page.get_by_role("button", name="beer").click()
+    playwright_api.expect(page.locator(".question")).to_have_count(0)
+    assert "bring me the beer" in heard
+
+
+def test_a_question_of_the_robot_can_be_dropped(page, talking):
+    url, _ = talking
+    page.goto(url)
+    page.fill("#sentence", "bring me the can")
+    page.press("#sentence", "Enter")
+    page.get_by_role("button", name="never mind").click()
+    playwright_api.expect(page.locator(".question")).to_have_count(0)
+    playwright_api.expect(page.locator("#said")).to_have_text("all right, never mind")
 
 
 def test_the_tree_is_walked_with_the_keyboard(page, live, control):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -119,8 +120,9 @@ def _state(file: Path) -> dict[str, Any]:
     mend = "begin anew without it"
     try:
         state = torch.load(file, map_location="cpu", weights_only=True)
-    except (OSError, RuntimeError, ValueError, EOFError) as error:
-        raise TrainingDataError(f"{file}: is no checkpoint that can be read ({error})", mend=mend) from error
+    except (OSError, RuntimeError, ValueError, EOFError, pickle.UnpicklingError) as error:
+        reason = (str(error).splitlines() or ["empty"])[0]
+        raise TrainingDataError(f"{file}: is no checkpoint that can be read ({reason})", mend=mend) from error
     if not isinstance(state, dict) or state.get("format") != FORMAT:
         raise TrainingDataError(f"{file}: is a checkpoint of another version", mend=mend)
     return state

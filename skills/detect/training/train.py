@@ -199,4 +199,4 @@ def _figures(found: Score) -> dict[str, float]:
         "recall": found.recall,
         "false": found.false_per_100_distractor_pictures,
     }
-    return {name: value for name, value in named.items() if value is not None}
+    return {name: float(value) for name, value in named.items() if value is not None}

@@ -25,9 +25,11 @@ _OPSET = 17
 class Exportable(nn.Module):
     """Pictures (N, 480, 640, 3) of bytes to boxes (N, A, 4) and scores (N, A, K)."""
 
-    def __init__(self, network: DetectorNetwork) -> None:
+    def __init__(self, network: DetectorNetwork, score_offsets: Sequence[float] | None = None) -> None:
         super().__init__()
         self.network = fused(network)
+        if score_offsets is not None:
+            _shift(self.network, score_offsets)
         first = next(module for module in self.network.modules() if isinstance(module, nn.Conv2d))
         with torch.no_grad():
             first.weight.mul_(1.0 / 255.0)
@@ -36,6 +38,12 @@ class Exportable(nn.Module):
         """Boxes and scores. The first convolution takes values from 0 to 255, its weights being so much smaller."""
         logits, boxes = self.network(images.permute(0, 3, 1, 2).float())
         return boxes, logits.sigmoid()
+
+
+@torch.no_grad()
+def _shift(network: DetectorNetwork, offsets: Sequence[float]) -> None:
+    for head in network.heads:
+        head.scores.bias.add_(torch.tensor(offsets))
 
 
 def fused(network: DetectorNetwork) -> DetectorNetwork:
@@ -50,9 +58,19 @@ def fused(network: DetectorNetwork) -> DetectorNetwork:
     return made
 
 
-def export(network: DetectorNetwork, file: Path, *, class_names: Sequence[str], facts: Mapping[str, str]) -> None:
-    """Write the ONNX file with its format, class names and other facts; whole or not at all."""
-    model = Exportable(network).eval()
+def export(
+    network: DetectorNetwork,
+    file: Path,
+    *,
+    class_names: Sequence[str],
+    facts: Mapping[str, str],
+    score_offsets: Sequence[float] | None = None,
+) -> None:
+    """Write the ONNX file with its format, class names and other facts; whole or not at all.
+
+    `score_offsets` are added to the logits of each class.
+    """
+    model = Exportable(network, score_offsets).eval()
     example = torch.zeros((1, HEIGHT_PX, WIDTH_PX, 3), dtype=torch.uint8)
     with torch.no_grad():
         shapes = [tuple(output.shape) for output in model(example)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import queue
 import tempfile
 import time
@@ -23,7 +24,7 @@ from skills.detect.training.peers import Peers, joined_peers
 from skills.detect.training.records import draw_curves
 from skills.detect.training.schedule import Budget, Schedule
 from skills.detect.training.store import open_store
-from skills.detect.training.validate import Examination, examination, examine
+from skills.detect.training.validate import Examination, examination, examine, offsets_by
 
 __all__ = ["CHECKPOINT", "MODEL", "Report", "TrainOptions", "train"]
 
@@ -32,6 +33,7 @@ MODEL: Final = "errand_detector.onnx"
 CURVES: Final = "curves.png"
 _NOTED_EVERY_STEPS: Final = 20
 _EXAMINED_EVERY: Final = 0.1
+_CALIBRATED_BY: Final = 900
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def train(options: TrainOptions, told: Told) -> Path:
     """Learn, and give the ONNX file. Raises TrainingDataError."""
     options.out.mkdir(parents=True, exist_ok=True)
     pictures = read_split(options.data, "train")
-    examination(options.data, category_names(options.data))
+    examination(options.data, "val", category_names(options.data))
     open_store(options.out / "pictures", pictures)
     if torch.cuda.is_available() or options.processes == 1:
         _learn(0, 1, options, Path(), told)
@@ -115,7 +117,7 @@ def _learn(rank: int, count: int, options: TrainOptions, meeting: Path, told: To
     pictures = read_split(options.data, "train")
     store = open_store(options.out / "pictures", pictures)
     feed = Feed(CanvasMaker(pictures, store), options.seed, rank, count)
-    exam = examination(options.data, names, options.examined)
+    exam = examination(options.data, "val", names, options.examined)
     _Course(options, learner, peers, feed, exam, told).run()
 
 
@@ -182,13 +184,24 @@ class _Course:
 
     def _written(self) -> dict[str, float]:
         out, learner = self.options.out, self.learner
-        facts = {"seed": str(self.options.seed), "data": digest_of(self.options.data)}
-        export(learner.average.network, out / MODEL, class_names=self.exam.class_names, facts=facts)
+        export_model(learner, self.options, calibrated=self._done() >= 1.0)
         figures = _figures(examine(out / MODEL, self.exam))
         learner.course.exams.append({"progress": self._done(), **figures})
         draw_curves(learner.course, out / CURVES)
         learner.save(out / CHECKPOINT)
         return figures
+
+
+def export_model(learner: Learner, options: TrainOptions, *, calibrated: bool) -> None:
+    """Write the averaged network's ONNX file; calibrated by pictures that were learnt from."""
+    file, names = options.out / MODEL, category_names(options.data)
+    network = learner.average.network
+    facts = {"seed": str(options.seed), "data": digest_of(options.data)}
+    export(network, file, class_names=names, facts=facts)
+    if calibrated:
+        offsets = offsets_by(file, examination(options.data, "train", names, _CALIBRATED_BY))
+        told = {**facts, "score_offsets": json.dumps([round(value, 4) for value in offsets])}
+        export(network, file, class_names=names, facts=told, score_offsets=offsets)
 
 
 def _figures(found: Score) -> dict[str, float]:

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from skills.detect.onnx_detector import DetectorOptions, load_detector
 from skills.detect.scoring import Score, score
 from skills.detect.scoring_labels import LabelledPicture, pictures_of_coco
+from skills.detect.training.calibrate import score_offsets
 from skills.detect.training.labels import TrainingDataError
+from skills.detection import Detection
 
-__all__ = ["Examination", "examination", "examine"]
+__all__ = ["Examination", "examination", "examine", "offsets_by"]
 
 LEAST_SCORE = 0.02
 
@@ -30,22 +32,30 @@ class Examination:
     class_names: Sequence[str]
 
 
-def examination(folder: Path, class_names: Sequence[str], most: int | None = None) -> Examination:
-    """The pictures of `val.json`, or about `most` of them, evenly chosen. Raises TrainingDataError."""
-    mend = "render the data set anew"
+def examination(folder: Path, split: str, class_names: Sequence[str], most: int | None = None) -> Examination:
+    """The pictures of `train` or `val`, or about `most` of them, evenly chosen. Raises TrainingDataError."""
+    file = folder / f"{split}.json"
     try:
-        pictures = pictures_of_coco(json.loads((folder / "val.json").read_text(encoding="utf-8")), class_names)
+        pictures = pictures_of_coco(json.loads(file.read_text(encoding="utf-8")), class_names)
     except (OSError, ValueError) as error:
-        raise TrainingDataError(f"{folder / 'val.json'}: cannot be used ({error})", mend=mend) from error
+        raise TrainingDataError(f"{file}: cannot be used ({error})", mend="render the data set anew") from error
     step = 1 if most is None else max(1, len(pictures) // most)
     return Examination(folder, pictures[::step], class_names)
 
 
 def examine(model: Path, exam: Examination) -> Score:
     """The figures of an ONNX file."""
+    return score(exam.pictures, _found(model, exam), exam.class_names)
+
+
+def offsets_by(model: Path, exam: Examination) -> tuple[float, ...]:
+    """What to add to the logits of each class, by the pictures of an examination."""
+    return score_offsets(exam.pictures, _found(model, exam), exam.class_names)
+
+
+def _found(model: Path, exam: Examination) -> list[tuple[Detection, ...]]:
     detector = load_detector(model, DetectorOptions(threshold=LEAST_SCORE))
-    found = [detector.detect([_read(exam.folder / picture.file)])[0] for picture in exam.pictures]
-    return score(exam.pictures, found, exam.class_names)
+    return [detector.detect([_read(exam.folder / picture.file)])[0] for picture in exam.pictures]
 
 
 def _read(file: Path) -> NDArray[np.uint8]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from executive.compiler import CompiledTree
 from executive.snapshot import Transition
 from skills.robot import Pose2D
 
@@ -29,3 +30,6 @@ class Journal(Protocol):
 
     def note(self, note: TickNote) -> None:
         """Keep what a tick brought."""
+
+    def replaced(self, tree: CompiledTree) -> Journal:
+        """Another mission has taken the place of this one, which is forgotten; the journal of the other."""

@@ -173,7 +173,8 @@ class Session:
         given_up.halt(self._attempt)
         self._stack = self._stack[:-1]
         self._control.mission_ended(self.name)
-        self._begin(tree, self._start_of(given_up))
+        journal = None if self._stack or given_up.journal is None else given_up.journal.replaced(tree)
+        self._begin(tree, self._start_of(given_up), journal)
         message = f"given up for '{tree.mission_name}'"
         self._note_result(given_up.judge(Ending(Outcome.CANCELLED, Cause.CANCELLED, message)))
 
@@ -206,12 +207,12 @@ class Session:
         start: Pose2D | None = run.context.board.get(key) if key in run.context.board else self._asked_at
         return start
 
-    def _begin(self, tree: CompiledTree, start: Pose2D | None = None) -> None:
+    def _begin(self, tree: CompiledTree, start: Pose2D | None = None, journal: Journal | None = None) -> None:
         self._held = False
         context = replace(self.context, board=Board(slug(tree.robot_name)))
         if start is not None:
             context.board.put(start_key(tree.robot_name, tree.mission_name), start)
-        self._stack = (*self._stack, TreeRun(tree, context))
+        self._stack = (*self._stack, TreeRun(tree, context, journal))
         self._control.mission_begun(self.name, tree)
 
     def _take_up_the_one_before(self) -> None:

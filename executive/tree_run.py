@@ -40,7 +40,7 @@ class TreeRun:
     def __init__(self, tree: CompiledTree, context: RunContext, journal: Journal | None = None) -> None:
         self.tree = tree
         self.context = context
-        self._journal = journal
+        self.journal = journal
         self.root = tree.build(context)
         self._observed = Observed(self.root)
         self.states: Snapshot = self._observed.snapshot()
@@ -70,8 +70,8 @@ class TreeRun:
             self._set_gates(breakpoints)
         self.root.tick_once()
         changes = self.log_changes()
-        if self._journal is not None:
-            self._journal.note(self._tick_note(changes))
+        if self.journal is not None:
+            self.journal.note(self._tick_note(changes))
         return bool(changes)
 
     def suspend(self) -> None:

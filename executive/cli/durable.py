@@ -12,7 +12,7 @@ from typing import Final
 from executive.cli.answers import NO_ANSWERS, Answers
 from executive.cli.assembly import take_up_plant
 from executive.cli.report import RunReport
-from executive.cli.requests import Request, filed, said
+from executive.cli.requests import Request, commanded, filed, said
 from executive.compiler import CompiledTree
 from executive.errors import InputError
 from executive.resuming import resumed_tree
@@ -26,9 +26,19 @@ STORE: Final = "missions.sqlite"
 
 
 @dataclass(frozen=True)
+class SpokenMission:
+    """A mission that was spoken of during a run, of which the name and the commands (as text) are known."""
+
+    name: str
+    robot: str
+    commands: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Asked:
     """What the user asked for: a file or a sentence, in a world (None: the file's own, or the usual one).
 
+    `spoken` stands for both where the mission came about in a conversation.
     `answers` are to the questions that it leaves open; what is kept of a sentence has them in their places.
     """
 
@@ -37,9 +47,12 @@ class Asked:
     world: str | None = None
     require_wake: bool = False
     answers: Answers = NO_ANSWERS
+    spoken: SpokenMission | None = None
 
     def request(self) -> Request:
         """What it means. Raises InputError."""
+        if self.spoken is not None:
+            return commanded(self.spoken.commands, name=self.spoken.name, robot=self.spoken.robot, world=self.world)
         if (self.file is None) == (self.say is None):
             raise InputError("a mission file or --say is needed, and not both", mend='try: --say "Hey Alice, ..."')
         if self.say is not None:
@@ -118,7 +131,25 @@ def plant_file(store: MissionStore) -> Path:
 
 def new_run(store: MissionStore, mission: StoredMission) -> Durable:
     """A mission that begins in a fresh world."""
-    return Durable(plant_file(store), store.journal(mission.id), str(mission.id))
+    return Durable(plant_file(store), _journal(store, mission), str(mission.id))
+
+
+def _journal(store: MissionStore, mission: StoredMission) -> StoreJournal:
+    """The journal of a mission; what takes its place by a correction is kept in its stead."""
+
+    def order_of(tree: CompiledTree) -> Order:
+        commands, nodes = tuple(map(str, tree.commands)), fingerprint(tree)
+        return replace(
+            mission.order,
+            name=tree.mission_name,
+            commands=commands,
+            fingerprint=nodes,
+            sentence=None,
+            file=None,
+            text=None,
+        )
+
+    return store.journal(mission.id).replaceable(order_of)
 
 
 def next_run(store: MissionStore, mission: StoredMission, before: StoredMission) -> Durable:
@@ -156,7 +187,7 @@ def take_up(store: MissionStore, mission: StoredMission) -> TakenUp:
         raise InputError(what, mend=mend, file=store.path)
     memory = store.memory(mission.id)
     resumed, recollection = resumed_tree(tree, memory)
-    journal = store.journal(mission.id).remembering(recollection)
+    journal = _journal(store, mission).remembering(recollection)
     log = f"log-{mission.starts + 1}.mcap"
     label = str(mission.id)
     durable = Durable(plant_file(store), journal, label, True, label, memory.pose, log)
@@ -170,6 +201,9 @@ def asked_again(mission: StoredMission, store: Path) -> Asked:
         InputError: the file has changed, and its old text cannot be laid beside it.
     """
     order = mission.order
+    if order.sentence is None and order.file is None:
+        spoken = SpokenMission(order.name, order.robot, order.commands)
+        return Asked(world=order.world or order.world_name, spoken=spoken)
     file = None if order.file is None else Path(order.file)
     if file is not None and order.text is not None and _text(file) != order.text:
         file = file.with_name(f".{file.stem}.mission-{mission.id}{file.suffix}")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from executive.cli.answers import NO_ANSWERS, Answers
 from executive.cli.assembly import knowledge_of, open_world
+from executive.command import parse_command
 from executive.compiler import CompiledTree, compile_mission
 from executive.errors import InputError
 from executive.knowledge import Knowledge
@@ -16,6 +18,7 @@ from executive.mission import (
     Mission,
     MissionFile,
     load_mission,
+    mission_from_commands,
     mission_from_file,
     mission_from_meaning,
     overridden,
@@ -52,6 +55,22 @@ def said(text: str, *, world: str | None, require_wake: bool, answers: Answers =
     )
     mission = mission_from_meaning(meant, world=opened.name, robot_name=knowledge.robot.name)
     return Request(mission, opened, knowledge, meant)
+
+
+def commanded(commands: Sequence[str], *, name: str, robot: str, world: str | None) -> Request:
+    """The request of a mission of which only the commands are known, as text.
+
+    Raises:
+        InputError: the world is unknown or its knowledge broken, or a command is none.
+    """
+    opened = open_world(world or DEFAULT_WORLD)
+    knowledge = knowledge_of(opened)
+    try:
+        read = [parse_command(command) for command in commands]
+    except ValueError as error:
+        raise InputError(f"the mission '{name}' cannot be read: {error}", mend="give it again") from error
+    mission = mission_from_commands(read, world=opened.name, robot_name=robot)
+    return Request(replace(mission, name=name), opened, knowledge)
 
 
 def filed(file: Path, *, world: str | None, answers: Answers = NO_ANSWERS) -> Request:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
+from executive.compiler import CompiledTree
 from executive.journal import TickNote
 from executive.snapshot import Transition
 from executive.store.database import transaction
 from executive.store.recollection import Recollection
+from executive.store.records import Order
 from executive.store.values import to_text
 from skills.robot import Pose2D
 
@@ -19,6 +21,9 @@ MOVED_M: Final = 0.02
 TURNED_RAD: Final = 0.02
 _PUT_STEP: Final = "INSERT OR REPLACE INTO step VALUES (?, ?, ?, ?, ?, ?, ?)"
 _PUT_VALUE: Final = "INSERT OR REPLACE INTO value VALUES (?, ?, ?)"
+_REPLACE: Final = (
+    "UPDATE mission SET name = ?, commands = ?, fingerprint = ?, sentence = ?, file = ?, text = ? WHERE id = ?"
+)
 
 
 class StoreJournal:
@@ -36,7 +41,30 @@ class StoreJournal:
         self._checkpoints: dict[str, str] = {}
         self._pose: Pose2D | None = None
         self._recollection: Recollection | None = None
+        self._order_of: Callable[[CompiledTree], Order] | None = None
         self.troubles: list[str] = []
+
+    def replaceable(self, order_of: Callable[[CompiledTree], Order]) -> StoreJournal:
+        """The journal of a mission whose place another may take; `order_of` gives that one's order."""
+        self._order_of = order_of
+        return self
+
+    def replaced(self, tree: CompiledTree) -> StoreJournal:
+        """Keep the mission that takes this one's place in its stead, with nothing done of it yet."""
+        journal = StoreJournal(self._connection, self._mission)
+        journal.troubles = self.troubles
+        if self._order_of is None:
+            return journal
+        order = self._order_of(tree)
+        journal.replaceable(self._order_of)
+        try:
+            with transaction(self._connection):
+                for table in ("step", "value"):
+                    self._connection.execute(f"DELETE FROM {table} WHERE mission = ?", (self._mission,))
+                self._connection.execute(_REPLACE, (*_told(order), self._mission))
+        except sqlite3.Error as error:
+            self._trouble(f"the mission that took this one's place could not be kept ({error})")
+        return journal
 
     def remembering(self, recollection: Recollection) -> StoreJournal:
         """The journal of a run that goes on from an earlier one: what that knew stays until it has been used."""
@@ -101,6 +129,10 @@ class StoreJournal:
     def _trouble(self, sentence: str) -> None:
         if sentence not in self.troubles:
             self.troubles.append(sentence)
+
+
+def _told(order: Order) -> tuple[str | None, ...]:
+    return (order.name, json.dumps(order.commands), order.fingerprint, order.sentence, order.file, order.text)
 
 
 def _apart(before: Pose2D | None, now: Pose2D) -> bool:

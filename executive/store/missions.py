@@ -18,10 +18,12 @@ from py_trees.common import Status
 from executive.errors import InputError, listing
 from executive.store.database import connect, told, transaction
 from executive.store.journal import StoreJournal
-from executive.store.records import Memory, StepRecord
+from executive.store.records import Memory, Order, StepRecord
 from executive.store.values import from_text
 from skills.api import Cause
 from skills.robot import Pose2D
+
+__all__ = ["MissionState", "MissionStore", "Order", "StoredMission"]
 
 
 class MissionState(enum.Enum):
@@ -33,29 +35,6 @@ class MissionState(enum.Enum):
     FAILURE = "failure"
     CANCELLED = "cancelled"
     ERROR = "error"
-
-
-@dataclass(frozen=True)
-class Order:
-    """What was asked for, complete enough to compile the same tree again.
-
-    Either `sentence`, or `file` with its `text`; `world` as it was said, if it was. `out` is the folder for logs;
-    `fingerprint` that of the tree.
-    """
-
-    name: str
-    world_name: str
-    robot: str
-    seed: int
-    out: str
-    commands: tuple[str, ...]
-    fingerprint: str
-    sentence: str | None = None
-    file: str | None = None
-    text: str | None = None
-    world: str | None = None
-    require_wake: bool = False
-    record: bool = True
 
 
 @dataclass(frozen=True)

@@ -35,3 +35,27 @@ class Memory:
     steps: Mapping[str, StepRecord]
     board: Mapping[str, Any]
     pose: Pose2D | None
+
+
+@dataclass(frozen=True)
+class Order:
+    """What was asked for, complete enough to compile the same tree again.
+
+    Either `sentence`, or `file` with its `text`, or neither, where only the commands are known;
+    `world` as it was said, if it was. `out` is the folder for logs;
+    `fingerprint` that of the tree.
+    """
+
+    name: str
+    world_name: str
+    robot: str
+    seed: int
+    out: str
+    commands: tuple[str, ...]
+    fingerprint: str
+    sentence: str | None = None
+    file: str | None = None
+    text: str | None = None
+    world: str | None = None
+    require_wake: bool = False
+    record: bool = True

@@ -222,6 +222,7 @@ class DetectInputs:
     classes: tuple[str, ...]
     attributes: tuple[str, ...]
     surfaces: tuple[Surface, ...]
+    floor: bool = False
 
 
 @dataclass(frozen=True)
@@ -381,7 +382,7 @@ def run_tree(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> 
     def runner(tree: CompiledTree, **options: Any) -> Any:
         settings = replace(RunSettings(seed=3), **options.pop("settings", {}))
         localiser = options.pop("localiser", None) or StillLocaliser()
-        entry = RunEntry(tree, robot, localiser, EmptyCostmap())  # type: ignore[arg-type]
+        entry = RunEntry(tree, robot, localiser, EmptyCostmap(), journal=options.pop("journal", None))  # type: ignore[arg-type]
         return run(
             [entry],
             clock=clock,

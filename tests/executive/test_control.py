@@ -459,6 +459,35 @@ def test_a_mission_can_take_the_place_of_the_one_under_way(compiled, run_tree, m
     assert control.state.missions == {"Alice": ("go to the bedroom",)}
 
 
+class Notebook:
+    """A journal that knows which mission it is kept of."""
+
+    def __init__(self, name, taken=None):
+        self.name, self.taken, self.notes = name, [] if taken is None else taken, 0
+
+    def note(self, note):
+        self.notes += 1
+
+    def replaced(self, tree):
+        self.taken.append(Notebook(tree.mission_name, self.taken))
+        return self.taken[-1]
+
+
+def test_the_journal_is_kept_of_the_mission_that_took_the_place(compiled, run_tree, make, control):
+    other, journal = compiled(GO, name="go to the bedroom"), Notebook("fetch drink")
+    actions = {4: lambda: control.replace(other)}
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), journal=journal)
+    assert ([each.name for each in journal.taken], journal.notes) == (["go to the bedroom"], 4)
+    assert journal.taken[0].notes > 0
+
+
+def test_of_a_mission_that_comes_in_between_no_journal_is_kept(compiled, run_tree, make, control):
+    between, other, journal = compiled(GO, name="between"), compiled(GO, name="other"), Notebook("fetch drink")
+    actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), journal=journal)
+    assert journal.taken == []
+
+
 def test_a_mission_that_came_in_between_is_replaced_and_the_first_taken_up(compiled, run_tree, make, control, script):
     between, other = compiled(GO, name="between"), compiled(GO, name="other")
     actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}

@@ -1,6 +1,7 @@
 """Queue and resume on the command line, without a plant: what is kept, in which order it is run, what is refused."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,10 @@ from typer.testing import CliRunner
 from executive.cli import main, queue_run, requests, resume_command
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
+from executive.command import Command
 from executive.errors import InputError
 from executive.journal import TickNote
+from executive.mission import mission_from_commands
 from executive.snapshot import NodeState, Transition
 from executive.store.missions import MissionStore
 from executive.view.model import node_view
@@ -135,6 +138,26 @@ def test_a_bad_mission_is_not_queued(errand, mission, states):
     result = errand("queue", "add", mission("bad", place="kitschen"))
     assert result.exit_code == 2
     assert "did you mean 'kitchen'" in result.output
+
+
+def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(errand, mission, plant, monkeypatch):
+    def corrected(request, tree, *, out, durable, **_):
+        out.mkdir(parents=True, exist_ok=True)
+        go = mission_from_commands([Command(goal="bathroom")], world="flat", robot_name="Alice")
+        other = replace(request, mission=replace(go, name="go bathroom 2")).compile()
+        leaf = next(
+            node.path_id for node in other.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id
+        )
+        change = Transition(leaf, NodeState(), NodeState(Status.RUNNING, None, "on the way"))
+        durable.journal.replaced(other).note(TickNote(2.0, (change,), {}, None, {}))
+        raise GoneError
+
+    with monkeypatch.context() as patch, pytest.raises(GoneError):
+        patch.setattr(main, "run_request", corrected)
+        errand("run", mission("first"), "--quiet")
+    result = errand("resume", "--quiet")
+    assert result.exit_code == 0, result.output
+    assert [run[0] for run in plant.runs] == ["go bathroom 2"]
 
 
 def test_resume_goes_on_with_what_was_killed_and_then_with_the_queue(errand, mission, plant, states):

@@ -3,6 +3,7 @@
 import sqlite3
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from py_trees.common import Status
@@ -41,6 +42,19 @@ def test_missions_keep_their_order_and_states(path):
         assert waiting == second
         assert store.missions(MissionState.QUEUED) == (second,)
         assert done.order == ORDER
+
+
+def test_what_takes_a_missions_place_is_kept_in_its_stead(path):
+    other = replace(ORDER, name="go hall", commands=("Go",), fingerprint="other", sentence=None)
+    with MissionStore(path) as store:
+        mission = store.add(ORDER, queued=False)
+        journal = store.journal(mission.id).replaceable(lambda tree: other)
+        journal.note(note(changed("a/b", Status.SUCCESS), board={"alice/x": Pose2D(1.0, 2.0, 0.5)}))
+        second = journal.replaced(None)
+        assert (store.mission(mission.id).order, store.has_steps(mission.id)) == (other, False)
+        assert store.memory(mission.id).board == {}
+        second.note(note(changed("a/c", Status.RUNNING)))
+        assert list(store.memory(mission.id).steps) == ["a/c"]
 
 
 def test_notes_are_there_for_another_process_after_each_tick(path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -10,7 +11,9 @@ from py_trees.common import Status
 from executive.behaviours.board import Board
 from executive.behaviours.decorators import ExplainedDecorator
 from executive.behaviours.explained import Explained
-from skills.api import Cause, Failed
+from skills.api import Cause, Failed, Publish
+
+ANSWER_TOPIC: Final = "answer"
 
 
 class Answer(ExplainedDecorator):
@@ -19,7 +22,7 @@ class Answer(ExplainedDecorator):
     Child RUNNING: RUNNING. Child SUCCESS: SUCCESS, answer True. Child FAILURE with every surface looked at: SUCCESS,
     answer False. Child FAILURE with a surface that could not be looked at: FAILURE with what kept the robot from it.
     `looks` names for each surface the leaves that look at it, one for each viewpoint: all of them must have looked,
-    which means that they failed with POSTCONDITION.
+    which means that they failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`.
     """
 
     def __init__(
@@ -32,10 +35,12 @@ class Answer(ExplainedDecorator):
         looks: Mapping[str, Sequence[str]],
         key: str,
         board: Board,
+        publish: Publish,
     ) -> None:
         super().__init__(path_id=path_id, name=name, child=child)
         self.answer: bool | None = None
         self._question, self._looks, self._key, self._board = question, looks, key, board
+        self._publish = publish
 
     def initialise(self) -> None:
         """Forget an earlier answer."""
@@ -57,6 +62,8 @@ class Answer(ExplainedDecorator):
         self.answer, self.cause = answer, None
         self.message = f"{'yes' if answer else 'no'}: {self._question}"
         self._board.put(self._key, answer)
+        told = {"node": self.path_id, "question": self._question, "answer": answer, "message": self.message}
+        self._publish(ANSWER_TOPIC, told)
         return Status.SUCCESS
 
 

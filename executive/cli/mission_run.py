@@ -16,7 +16,7 @@ from executive.cli.durable import Durable
 from executive.cli.page_view import PageView, log_map
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Request
-from executive.cli.souvenirs import Souvenirs, draw_souvenirs
+from executive.cli.souvenirs import Souvenirs, draw_answer, draw_souvenirs
 from executive.cli.warm_up import warm_up
 from executive.compiler import CompiledTree
 from executive.control import Control
@@ -90,6 +90,7 @@ def run_request(
     verdict = judge(simulation, tree, request.knowledge, result.worst)
     view = node_view(tree.root, result.worst.states)
     (out / "tree.svg").write_text(to_svg(folded_to(view, DRAWN_NODES), title=request.mission.name), encoding="utf-8")
+    draw_answer(souvenirs, out)
     if record:
         simulation.save_recording(out / "recording.html")
         draw_souvenirs(souvenirs, simulation, request.mission.robot_name, out)

@@ -1,4 +1,5 @@
-"""The pictures of a run: what the hand camera detected, the grasp, the hand-over, and the way walked from above."""
+"""The pictures of a run: what the hand camera detected, what a question is answered with, the grasp, the hand-over, and
+the way walked from above."""
 
 from __future__ import annotations
 
@@ -7,8 +8,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+import cv2
 import numpy as np
 
+from executive.behaviours.answer import ANSWER_TOPIC
 from executive.messages import DESTINATION_TOPIC
 from executive.record.schemas import TRANSITIONS
 from executive.resuming import told_before
@@ -18,6 +21,9 @@ from skills.api import Publish
 
 DETECTIONS: Final = "detections"
 _MARGIN_M: Final = 0.3
+_MOST_LOOKS: Final = 12
+_SMALL_PX: Final = (320, 240)
+_ROW: Final = 4
 _MOMENTS: Final[Mapping[str, str]] = MappingProxyType({"hand-over": "hand_over", "place": "place"})
 
 
@@ -27,18 +33,34 @@ class Souvenirs:
     def __init__(self, publish: Publish) -> None:
         self._publish = publish
         self._seen: Mapping[str, Any] | None = None
+        self._confirmed: Mapping[str, Any] | None = None
+        self._looked: list[Mapping[str, Any]] = []
         self.detection: Mapping[str, Any] | None = None
+        self.answer: Picture | None = None
         self.moments: dict[str, float] = {}
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
         """Take note of a message and pass it on."""
-        if topic == DETECTIONS and message["detections"]:
-            self._seen = message
-        if topic == DESTINATION_TOPIC and self.detection is None:
-            self.detection = self._seen
+        if topic == DETECTIONS:
+            self._looked.append(message)
+            self._seen = message if message["detections"] else self._seen
+        if topic == DESTINATION_TOPIC:
+            self._confirmed = self._seen
+            self.detection = self.detection or self._seen
+        if topic == ANSWER_TOPIC:
+            message = self._shown(message)
         if topic == TRANSITIONS and message["to"] == "SUCCESS" and not told_before(str(message["message"])):
             self._note(str(message["node"]), float(message["t"]))
         self._publish(topic, message)
+
+    def _shown(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The answer with a picture: of what was found, or of all that was looked at in vain."""
+        if message["answer"] and self._confirmed is not None:
+            self.answer = _detection(self._confirmed)
+        elif self._looked:
+            self.answer = _sheet([_detection(each) for each in self._looked[-_MOST_LOOKS:]])
+        self._looked = []
+        return message if self.answer is None else {**message, "image": self.answer}
 
     def _note(self, path_id: str, time_s: float) -> None:
         name = _MOMENTS.get(path_id.rsplit("/", 1)[-1])
@@ -65,8 +87,27 @@ def draw_souvenirs(souvenirs: Souvenirs, simulation: Simulation, robot_name: str
     return paths
 
 
+def draw_answer(souvenirs: Souvenirs, folder: Path) -> Path | None:
+    """Write the picture that goes with an answer as `answer.png`; its path, or None where nothing was asked."""
+    if souvenirs.answer is None:
+        return None
+    path = folder / "answer.png"
+    save_png(path, souvenirs.answer)
+    return path
+
+
+def _sheet(pictures: Sequence[Picture]) -> Picture:
+    """Pictures side by side, smaller, in rows."""
+    small = [np.asarray(cv2.resize(each, _SMALL_PX, interpolation=cv2.INTER_AREA), np.uint8) for each in pictures]
+    columns = min(len(small), _ROW)
+    small += [np.zeros_like(small[0])] * (-len(small) % columns)
+    return np.vstack([np.hstack(small[k : k + columns]) for k in range(0, len(small), columns)])
+
+
 def _detection(message: Mapping[str, Any]) -> Picture:
     picture: Picture = message["image"]
+    if picture.ndim == 2:
+        picture = np.repeat(picture[..., None], 3, axis=2)
     for each in message["detections"]:
         picture = draw_detection(picture, tuple(each["box"]), each["class_name"], each["score"])
     return picture

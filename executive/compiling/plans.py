@@ -236,4 +236,5 @@ class AnswerPlan(DecoratorPlan):
             looks=dict(self.looks),
             key=self.key,
             board=context.board,
+            publish=context.publish,
         )

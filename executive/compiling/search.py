@@ -45,27 +45,32 @@ def surfaces_elsewhere(
 
 
 def look_plans(
-    shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str
+    shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str, *, floor: bool = False
 ) -> tuple[tuple[str, SequencePlan], ...]:
-    """For each surface and viewpoint: drive there and look. The sighting goes to `key`."""
+    """For each surface and viewpoint: drive there and look. The sighting goes to `key`.
+
+    With `floor` a thing on the floor about there will do as well.
+    """
     views = [(name, n) for name in surfaces for n in range(1, len(shop.knowledge.surfaces[name].viewpoints) + 1)]
-    return tuple((name, _look_plan(shop.at(f"{name}-{n}"), thing, name, n, key)) for name, n in views)
+    return tuple((name, _look_plan(shop.at(f"{name}-{n}"), thing, name, n, key, floor)) for name, n in views)
 
 
-def _look_plan(shop: Workshop, thing: Thing, surface: str, number: int, key: str) -> SequencePlan:
+def _look_plan(shop: Workshop, thing: Thing, surface: str, number: int, key: str, floor: bool) -> SequencePlan:
     view = shop.knowledge.surfaces[surface].viewpoints[number - 1]
     return shop.sequence(
         f"look at {surface}" + (f" ({number})" if number > 1 else ""),
         shop.navigate(pose_2d(view)),
-        detect_plan(shop, thing, (surface,), key),
+        detect_plan(shop, thing, (surface,), key, floor=floor),
     )
 
 
-def detect_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...] | FromBoard, key: str) -> NodePlan:
+def detect_plan(
+    shop: Workshop, thing: Thing, surfaces: tuple[str, ...] | FromBoard, key: str, *, floor: bool = False
+) -> NodePlan:
     """Look for the thing on some surfaces, by name or from the blackboard, from where the robot stands."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(shop.surface, surfaces))
     ports = {"classes": shop.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
-    return shop.skill("detect", ports, {"observation": key})
+    return shop.skill("detect", {**ports, "floor": True} if floor else ports, {"observation": key})
 
 
 def find_again_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodePlan:

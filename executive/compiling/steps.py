@@ -58,7 +58,8 @@ def find_plan(shop: Workshop) -> NodePlan:
     place = None if shop.command.goal is None else shop.place(shop.command.goal)
     surfaces = required_surfaces(shop, thing, place)
     below = shop.at("search")
-    looks = look_plans(below, thing, surfaces, f"{shop.path_id}/sighting")
+    whole_room = place is None or place in shop.knowledge.places
+    looks = look_plans(below, thing, surfaces, f"{shop.path_id}/sighting", floor=whole_room)
     search = SelectorPlan(
         path_id=below.path_id, name=f"look for {thing}", source=shop.source, steps=tuple(look for _, look in looks)
     )

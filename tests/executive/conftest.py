@@ -201,7 +201,11 @@ def default_end(script: Script, name: str) -> Callable[[Any], SkillStep]:
 
     def detect(skill: Any) -> SkillStep:
         seen = any(surface.name in script.seen_on for surface in skill.inputs.surfaces)
-        return Succeeded("seen", {"observation": COKE}) if seen else Failed(Cause.POSTCONDITION, "not seen")
+        return (
+            Succeeded("seen", {"observation": COKE, "observations": (COKE,)})
+            if seen
+            else Failed(Cause.POSTCONDITION, "not seen")
+        )
 
     def grasp(skill: Any) -> SkillStep:
         skill.context.robot._robot.holding = True
@@ -259,7 +263,7 @@ class NoInputs:
 
 PORTS: dict[str, tuple[type, dict[str, type]]] = {
     "navigate": (NavigateInputs, {}),
-    "detect": (DetectInputs, {"observation": ObjectObservation}),
+    "detect": (DetectInputs, {"observation": ObjectObservation, "observations": tuple[ObjectObservation, ...]}),
     "approach": (ApproachInputs, {"observation": ObjectObservation}),
     "grasp": (GraspInputs, {"tried": tuple[int, ...]}),
     "place": (PlaceInputs, {}),

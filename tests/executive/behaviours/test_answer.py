@@ -31,6 +31,7 @@ def answer_of(context, *causes: Cause | None) -> Answer:
         looks={"bench": ["alice/q/0", "alice/q/1"], "trolley": [f"alice/q/{n}" for n in range(2, len(causes))]},
         key="alice/q/answer",
         board=context.board,
+        publish=context.publish,
     )
     root.tick_once()
     return root
@@ -40,6 +41,23 @@ def test_a_sighting_is_a_yes(context):
     root = answer_of(context, Cause.POSTCONDITION, None, Cause.POSTCONDITION)
     assert (root.status, root.answer, root.message) == (Status.SUCCESS, True, "yes: hammer in the workshop")
     assert context.board.get("alice/q/answer") is True
+
+
+def test_an_answer_is_published_and_a_missed_view_is_none(context, published):
+    answer_of(context, Cause.PLANNING)
+    assert published == []
+    answer_of(context, None)
+    assert published == [
+        (
+            "answer",
+            {
+                "node": "alice/q",
+                "question": "hammer in the workshop",
+                "answer": True,
+                "message": "yes: hammer in the workshop",
+            },
+        )
+    ]
 
 
 def test_no_after_every_view_was_looked_from_is_a_success(context):

@@ -22,7 +22,9 @@ from plant.worlds.world import World, WorldError, known_worlds, load_world
 from skills.api import Detector
 from skills.detect.attributes import known_attributes
 from skills.detect.interim_segmentation import SurfaceSegmentationDetector
+from skills.detect.detector_file import MODEL_FILE
 from skills.detect.onnx_detector import SharedDetector
+from skills.detection import Detector, NoDetector
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
 from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
@@ -90,9 +92,9 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
 
 
 @cache
-def shared_detector() -> SharedDetector:
-    """The one detector of this process, loaded when it is first used."""
-    return SharedDetector()
+def shared_detector() -> Detector:
+    """The one detector of this process, loaded when it is first used; none where there is no model."""
+    return SharedDetector() if MODEL_FILE.is_file() else NoDetector()
 
 
 @cache

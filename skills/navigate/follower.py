@@ -73,16 +73,27 @@ class PathFollower:
         """The whole way, turns included."""
         return float(self._progress[-1])
 
-    def command(self, pose: Pose2D, velocity: tuple[float, float, float], last: FloatArray, costmap: Costmap) -> Drive:
-        """The velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,)."""
+    def command(
+        self,
+        pose: Pose2D,
+        velocity: tuple[float, float, float],
+        last: FloatArray,
+        costmap: Costmap,
+        most_m_s: float = math.inf,
+    ) -> Drive:
+        """The velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,).
+
+        Along the path at most_m_s at most; at 0 the robot stands.
+        """
         here = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
         off_path_m = self._project(here)
         along = float(self._progress[self._index])
         now_m = float(footprint_clearance_m(costmap, self._footprint, here[None, :])[0])
         free_m, blocked_at = self._free_way(costmap, now_m)
         in_time = math.sqrt(2.0 * self._options.braking_m_s2 * free_m)
-        speed = min(float(self._limits[self._index]), in_time, float(speed_by_clearance(now_m, self._options)))
-        wanted = self._wanted(here, along, speed) if free_m > 0.0 else np.zeros(3)
+        by_clearance = float(speed_by_clearance(now_m, self._options))
+        speed = min(float(self._limits[self._index]), in_time, by_clearance, most_m_s)
+        wanted = self._wanted(here, along, speed) if free_m > 0.0 and most_m_s > 0.0 else np.zeros(3)
         limited = self._slew(self._clip(wanted), last)
         safe = self._brake(limited, here, costmap)
         remaining = self.length_m - along
@@ -168,6 +179,11 @@ class PathFollower:
         least = np.minimum(clearance[1 : len(tried) + 1], clearance[len(tried) + 1 :])
         safe = np.flatnonzero(least >= min(self._options.touch_m, float(clearance[0]) - 0.005))
         return tried[safe[0]] if len(safe) else np.zeros(3)
+
+    def ahead(self, way_m: float) -> FloatArray:
+        """The path's poses (N, 3) from where the robot was last, so far on."""
+        end = int(np.searchsorted(self._progress, self._progress[self._index] + way_m))
+        return self._path.poses[self._index : end + 1]
 
     def pose_after(self, way_m: float) -> Pose2D:
         """The path's pose so far on from where the robot was last."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from skills.api import Cause, Failed, Job, Running, Skill, SkillContext, Step, Succeeded
+from skills.api import Cause, Costmap, Failed, Job, Running, Skill, SkillContext, Step, Succeeded
 from skills.estimate.planar import relative
 from skills.navigate.base import Base
 from skills.navigate.follower import FollowerOptions, PathFollower
@@ -15,6 +15,8 @@ from skills.navigate.footprint import Footprint
 from skills.navigate.low_obstacles import LowObstacleWatch
 from skills.navigate.motion_cost import PlannerOptions
 from skills.navigate.path import Path
+from skills.navigate.people_space import Pace, PaceKeeper, SpaceOptions, spaced
+from skills.navigate.people_watch import PeopleWatch
 from skills.navigate.planner import PlanningError, problem_of, solve
 from skills.robot import Pose2D
 
@@ -33,7 +35,11 @@ class NavigateInputs:
 
 @dataclass(frozen=True)
 class NavigateOptions:
-    """Patience and bounds of the skill, times in seconds of the robot's clock."""
+    """Patience and bounds of the skill, times in seconds of the robot's clock.
+
+    While people are near, and for `after_person_s` (longer than a costmap remembers them), plans that fail are tried
+    again without being counted, up to person_patience_s.
+    """
 
     planning_latency_s: float = 0.3
     localising_patience_s: float = 3.0
@@ -44,6 +50,9 @@ class NavigateOptions:
     settle_s: float = 2.0
     still_m_s: float = 0.03
     still_rad_s: float = 0.05
+    after_person_s: float = 14.0
+    person_patience_s: float = 45.0
+    space: SpaceOptions = field(default_factory=SpaceOptions)
 
 
 class Navigate(Skill[NavigateInputs]):
@@ -73,6 +82,10 @@ class Navigate(Skill[NavigateInputs]):
         self._inputs = inputs
         self._footprint = Footprint.of(self.context.robot.capabilities())
         self._watch = LowObstacleWatch(self.context)
+        self._people = PeopleWatch(self.context)
+        self._pace = PaceKeeper(self._footprint, self._options.space)
+        self._room_m = self._options.space.room_m
+        self._person_s = self._person_since_s = -math.inf
         self._phase: Callable[[], Step] = self._localising
         self._follower: PathFollower | None = None
         self._job: Job[Path] | None = None
@@ -127,17 +140,29 @@ class Navigate(Skill[NavigateInputs]):
 
     def _ask_for_plan(self, start: Pose2D | None = None) -> None:
         """Sample the costmap now and plan in the Worker, from a pose or from here."""
+        if not self._people.people():
+            self._room_m = self._options.space.room_m
         speed = max(0.1, self._inputs.max_speed_m_s)
         options = PlannerOptions(forward_m_s=speed)
         begin, goal = start or self.context.pose(), self._inputs.goal
-        problem = problem_of(self.context.costmap, self._footprint, begin, goal, options, margin_m=8.0)
+        problem = problem_of(self._costmap(begin), self._footprint, begin, goal, options, margin_m=8.0)
         self._job = self.context.worker.submit(
             lambda: solve(problem), latency_s=self._options.planning_latency_s, name="plan a way"
         )
 
+    def _costmap(self, here: Pose2D) -> Costmap:
+        """What is in the way, with room about people as far as `here` and the goal leave it."""
+        fixed = (here, self._inputs.goal)
+        return spaced(self.context.costmap, self._footprint, fixed, self._people.people(), self._room_m)
+
+    def _look_out(self) -> None:
+        """Look for low things and for people; what was seen comes in later."""
+        self._watch.step()
+        self._people.step(self._base.last_velocity)
+
     def _planning(self) -> Step:
         """Stand and wait for a plan, or for the time of the next attempt."""
-        self._watch.step()
+        self._look_out()
         if self._job is None:
             if self._now() < self._wait_until_s:
                 return Running(self._waiting_sentence())
@@ -164,9 +189,13 @@ class Navigate(Skill[NavigateInputs]):
         return None
 
     def _plan_failed(self, why: str) -> Step | None:
-        """Wait and try again when something seen may go away; give up at the bound."""
+        """Go nearer to people, or wait and try again when something seen may go away; give up at the bound."""
         self._base.stop()
-        self._replans += 1
+        if self._people.people() and self._room_m > self._options.space.least_room_m:
+            self._room_m = self._options.space.least_room_m
+            self._phase = self._planning
+            return None
+        self._replans += not self._people_may_go()
         if self._obstacle is None or self._replans >= self._options.replans:
             seen = f" The way is blocked by something seen at {_xy(self._obstacle)}." if self._obstacle else ""
             return Failed(Cause.PLANNING, why + seen)
@@ -174,13 +203,22 @@ class Navigate(Skill[NavigateInputs]):
         self._phase = self._planning
         return None
 
+    def _people_may_go(self) -> bool:
+        """Whether a failure may be due to people who are near or were a moment ago, and patience lasts."""
+        now_s = self._now()
+        if self._people.people():
+            gap_s, self._person_s = now_s - self._person_s, now_s
+            self._person_since_s = now_s if gap_s > self._options.after_person_s else self._person_since_s
+        recently = now_s - self._person_s < self._options.after_person_s
+        return recently and now_s - self._person_since_s < self._options.person_patience_s
+
     def _waiting_sentence(self) -> str:
         place = _xy(self._obstacle) if self._obstacle else "ahead"
         return f"waiting for the way to become free at {place}"
 
     def _following(self) -> Step:
-        """Drive along the path; replan around what stays in the way."""
-        self._watch.step()
+        """Drive along the path, slowly near people; replan around what stays in the way."""
+        self._look_out()
         failure = self._take_plan()
         if failure is not None or self._phase != self._following or self._follower is None:
             return failure or Running(self._waiting_sentence())
@@ -188,8 +226,12 @@ class Navigate(Skill[NavigateInputs]):
             self._base.drive((0.0, 0.0, 0.0))
             return Running("standing until scans agree with the map again")
         pose, velocity = self.context.pose(), self.context.robot.odometry().velocity
-        answer = self._follower.command(pose, velocity, self._base.last_velocity, self.context.costmap)
+        pace = self._paced(self._follower, pose)
+        costmap = self._costmap(pose)
+        answer = self._follower.command(pose, velocity, self._base.last_velocity, costmap, pace.most_m_s)
         self._base.drive(answer.velocity)
+        if pace.waiting and pace.person is not None:
+            return self._wait_for_person(pace, pace.person.place_W)
         if self._arrived(pose, 0.4):
             self._wait_until_s = self._now() + self._options.settle_s
             self._phase = self._settling
@@ -199,6 +241,18 @@ class Navigate(Skill[NavigateInputs]):
         if trouble is not None and self._job is None:
             return self._replan(trouble)
         return self._progress(answer.remaining_m)
+
+    def _paced(self, follower: PathFollower, pose: Pose2D) -> Pace:
+        """How fast people near the way let the robot go."""
+        ahead = follower.ahead(self._options.space.look_ahead_m)
+        return self._pace.pace(self._now(), pose, ahead, self._people.people(), self._inputs.max_speed_m_s)
+
+    def _wait_for_person(self, pace: Pace, place_W: tuple[float, float]) -> Step:
+        """Stand; once that has taken long, plan around whoever stands there."""
+        self._best_s, self._obstacle, self._blocked_since_s = self._now(), place_W, None
+        if pace.overdue and self._job is None:
+            return self._replan(f"Somebody stays in the way at {_xy(place_W)}.")
+        return Running(f"waiting for a person at {_xy(place_W)}")
 
     def _progress(self, remaining_m: float) -> Running:
         done = 1.0 - remaining_m / max(self._whole_m or remaining_m, remaining_m, 1e-3)

@@ -1,0 +1,157 @@
+"""Keeping distance to people: how fast the robot may go near them, and how much room they get."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.api import Costmap, LocalisationEstimate
+from skills.navigate.footprint import Footprint, disc_centres, pose_array
+from skills.navigate.people_watch import SeenPerson
+from skills.robot import Pose2D, Robot
+
+__all__ = ["Pace", "PaceKeeper", "SpaceOptions", "WithPeople", "outline_distance_m", "spaced"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SpaceOptions:
+    """Distances are from the robot's outline to a person's upright axis.
+
+    From `far_m` to `near_m` the speed falls from full to near_m_s, less so where the way leads away by `away_m`. A way
+    that leads nearer than `stop_m` is waited on for `patience_s`, then gone at `pass_m_s`; the patience begins anew
+    after `forget_s` without anybody near.
+    Plans keep `room_m` where start and goal leave so much, and `least_room_m` where there is no other way.
+    """
+
+    far_m: float = 2.5
+    near_m: float = 1.0
+    near_m_s: float = 0.3
+    stop_m: float = 0.7
+    look_ahead_m: float = 1.2
+    patience_s: float = 3.0
+    pass_m_s: float = 0.15
+    forget_s: float = 3.0
+    room_m: float = 0.65
+    least_room_m: float = 0.2
+    slack_m: float = 0.05
+    away_m: float = 0.3
+
+
+@dataclass(frozen=True)
+class WithPeople:
+    """A costmap in which each person (x, y, radius in m) takes up a disc beyond what sensors see of them."""
+
+    costmap: Costmap
+    discs: FloatArray
+
+    def clearance_m(self, points_W: FloatArray) -> FloatArray:
+        """Distance from each (x, y) row to the nearest obstacle or disc."""
+        points = np.asarray(points_W, dtype=np.float64)
+        offsets = points[:, None, :2] - self.discs[None, :, :2]
+        nearest = np.min(np.linalg.norm(offsets, axis=2) - self.discs[None, :, 2], axis=1)
+        return np.asarray(np.minimum(self.costmap.clearance_m(points), nearest))
+
+    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
+        """As the costmap does."""
+        self.costmap.update(robot, localisation)
+
+    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
+        """As the costmap does."""
+        self.costmap.add_points(points_W, stamp_s)
+
+
+def outline_distance_m(footprint: Footprint, poses: FloatArray, people: Sequence[SeenPerson]) -> FloatArray:
+    """Distances (N, people) from the outline at poses (N, 3) to people's axes."""
+    places = np.array([one.place_W for one in people], dtype=np.float64).reshape(-1, 2)
+    centres = disc_centres(footprint, poses)
+    offsets = np.linalg.norm(centres[:, :, None, :] - places[None, None, :, :], axis=3)
+    return np.asarray(np.min(offsets - footprint.discs[None, :, 2:3], axis=1))
+
+
+def spaced(
+    costmap: Costmap,
+    footprint: Footprint,
+    fixed: Sequence[Pose2D],
+    people: Sequence[SeenPerson],
+    room_m: float,
+    slack_m: float = 0.05,
+) -> Costmap:
+    """The costmap with room_m about people, less where the robot must be nearer: at the `fixed` poses."""
+    if not people:
+        return costmap
+    least = np.min(outline_distance_m(footprint, pose_array(fixed), people), axis=0) - slack_m
+    radii = np.clip(least, 0.0, room_m)
+    return WithPeople(costmap, np.column_stack([[one.place_W for one in people], radii]))
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast the robot may go (m/s) because of a person, and who it is.
+
+    `waiting` while it stands for them; `overdue` once that has taken so long that another way should be looked for.
+    """
+
+    most_m_s: float = math.inf
+    person: SeenPerson | None = None
+    waiting: bool = False
+    overdue: bool = False
+
+
+class PaceKeeper:
+    """Tells the pace from tick to tick; remembers how long it was waited."""
+
+    def __init__(self, footprint: Footprint, options: SpaceOptions | None = None) -> None:
+        self._footprint = footprint
+        self._options = options or SpaceOptions()
+        self._waiting_since_s: float | None = None
+        self._passing = False
+        self._near_s = -math.inf
+
+    def pace(
+        self, now_s: float, here: Pose2D, ahead: FloatArray, people: Sequence[SeenPerson], most_m_s: float
+    ) -> Pace:
+        """The pace for a robot `here` whose way leads over poses `ahead` (N, 3), at most_m_s when nobody is near."""
+        if not people:
+            return self._nobody(now_s)
+        now_m = outline_distance_m(self._footprint, pose_array([here]), people)[0]
+        on_the_way_m = outline_distance_m(self._footprint, ahead, people)
+        then_m = np.min(on_the_way_m, axis=0)
+        leads_away = on_the_way_m[-1] > now_m + self._options.away_m
+        least_m = np.where(leads_away, on_the_way_m[-1], np.minimum(now_m, then_m))
+        nearest = int(np.argmin(least_m))
+        if least_m[nearest] >= self._options.far_m:
+            return self._nobody(now_s)
+        self._near_s = now_s
+        leads_nearer = then_m < np.minimum(self._options.stop_m, now_m - self._options.slack_m)
+        if np.any(leads_nearer):
+            return self._close(now_s, people[int(np.argmin(np.where(leads_nearer, then_m, np.inf)))])
+        self._waiting_since_s = None
+        return Pace(self._by_distance(float(least_m[nearest]), most_m_s), people[nearest])
+
+    def _close(self, now_s: float, person: SeenPerson) -> Pace:
+        """Somebody is too near to the way: wait, then go past slowly."""
+        if self._passing:
+            return Pace(self._options.pass_m_s, person)
+        self._waiting_since_s = now_s if self._waiting_since_s is None else self._waiting_since_s
+        if now_s - self._waiting_since_s < self._options.patience_s:
+            return Pace(0.0, person, waiting=True)
+        self._passing = True
+        return Pace(0.0, person, waiting=True, overdue=True)
+
+    def _nobody(self, now_s: float) -> Pace:
+        self._waiting_since_s = None
+        if now_s - self._near_s > self._options.forget_s:
+            self._passing = False
+        return Pace()
+
+    def _by_distance(self, distance_m: float, most_m_s: float) -> float:
+        options = self._options
+        share = (distance_m - options.near_m) / (options.far_m - options.near_m)
+        slow = min(options.near_m_s, most_m_s)
+        return slow + min(1.0, max(0.0, share)) * (most_m_s - slow)

@@ -1,0 +1,153 @@
+"""Driving where people are: slower near them, waiting, around them, on again when they have gone."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planar_people import PeopleDetector, person_at
+from planar_robot import OUTLINE, TWO_ROOMS, Bench
+
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.navigate.footprint import Footprint, disc_centres, pose_array
+from skills.navigate.skill import Navigate, NavigateInputs, NavigateOptions
+from skills.robot import Pose2D
+
+FOOTPRINT = Footprint.rectangle(OUTLINE)
+START, GOAL = Pose2D(1.2, 5.4, 0.0), Pose2D(8.5, 5.4, 0.0)
+
+
+class Drive:
+    """One run along the corridor, with the speeds at each place, the distances to people, and what was told."""
+
+    def __init__(
+        self,
+        people=(),
+        *,
+        goal=GOAL,
+        unmapped=(),
+        surveyed=(),
+        until=None,
+        detector=True,
+        there_at_first=True,
+        options=None,
+    ):
+        first = people if there_at_first else ()
+        self.bench = Bench(START, surveyed=[*TWO_ROOMS, *surveyed], unmapped=[*first, *unmapped])
+        self.people = list(people)
+        found = PeopleDetector(self.bench, self.people)
+        context = replace(self.bench.context(), detector=found) if detector else self.bench.context()
+        skill = Navigate(context, options)
+        skill.begin(NavigateInputs(goal))
+        self.speeds, self.told, self.nearest_m = [], [], math.inf
+        step = skill.step()
+        while isinstance(step, Running) and self.bench.clock.now() < 90.0:
+            self.told.append(step.message)
+            self.bench.tick()
+            if until is not None:
+                until(self)
+            self.speeds.append((self.bench.robot.pose.x_m, float(np.hypot(*self.bench.robot.velocity[:2]))))
+            self.nearest_m = min(self.nearest_m, self.from_people_m())
+            step = skill.step()
+        skill.end()
+        self.step = step
+
+    def from_people_m(self):
+        """From the outline to the axis of the nearest person or thing that was not surveyed."""
+        there = [box for box in self.bench.robot.boxes if box.z1 == person_at(0.0, 0.0).z1]
+        centres = np.array([(0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)) for box in there]).reshape(-1, 2)
+        discs = disc_centres(FOOTPRINT, pose_array([self.bench.robot.pose]))[0]
+        offsets = np.linalg.norm(discs[:, None] - centres[None], axis=2) - FOOTPRINT.discs[:, 2:3]
+        return float(np.min(offsets, initial=math.inf))
+
+    @property
+    def seconds(self):
+        return self.bench.clock.now()
+
+    def fastest(self, low_m, high_m):
+        return max(speed for x_m, speed in self.speeds if low_m <= x_m <= high_m)
+
+    def waited(self):
+        return sum("waiting for a person" in one for one in self.told) * 0.05
+
+
+@pytest.fixture(scope="module")
+def alone():
+    return Drive()
+
+
+def test_without_people_it_drives_as_without_a_detector(alone):
+    blind = Drive(detector=False)
+    assert isinstance(alone.step, Succeeded)
+    assert alone.seconds == pytest.approx(blind.seconds, abs=0.1)
+    assert alone.fastest(4.0, 5.0) == pytest.approx(0.8, abs=0.05)
+
+
+def test_it_goes_slower_past_somebody_and_faster_again_after(alone):
+    drive = Drive([person_at(4.5, 6.5)])
+    assert isinstance(drive.step, Succeeded), drive.step.message
+    assert drive.fastest(3.5, 4.3) < 0.5
+    assert drive.fastest(6.5, 7.8) > 0.7
+    assert drive.nearest_m > 0.7
+    assert drive.seconds > alone.seconds + 2.0
+
+
+def test_it_goes_around_somebody_with_more_room_than_around_a_thing():
+    person = person_at(6.4, 5.2)
+    around_a_thing = Drive(unmapped=[person])
+    around_a_person = Drive([person])
+    assert isinstance(around_a_person.step, Succeeded), around_a_person.step.message
+    assert isinstance(around_a_thing.step, Succeeded)
+    assert around_a_person.nearest_m > max(0.6, around_a_thing.nearest_m + 0.05)
+
+
+def test_it_waits_for_who_stands_in_a_door_and_goes_on_when_they_have_gone():
+    def leaves(drive):
+        if drive.bench.clock.now() > 15.0 and drive.people[0] in drive.bench.robot.boxes:
+            drive.bench.robot.boxes.remove(drive.people[0])
+
+    drive = Drive([person_at(7.45, 4.0)], goal=Pose2D(7.5, 2.0, -math.pi / 2), until=leaves)
+    assert isinstance(drive.step, Succeeded), drive.step.message
+    assert drive.seconds > 15.0
+    assert drive.bench.robot.least_clearance_m > 0.1
+
+
+def test_a_door_that_somebody_keeps_closed_is_a_planning_failure_after_long_patience():
+    drive = Drive(
+        [person_at(7.45, 4.0)], goal=Pose2D(7.5, 2.0, -math.pi / 2), options=NavigateOptions(person_patience_s=5.0)
+    )
+    assert isinstance(drive.step, Failed)
+    assert drive.step.cause is Cause.PLANNING
+    assert "blocked by something seen at (" in drive.step.message
+    assert 20.0 < drive.seconds < 45.0
+    assert drive.bench.robot.least_clearance_m > 0.1
+
+
+def test_it_stops_before_who_steps_into_the_way():
+    person = person_at(6.9, 5.4)
+
+    def steps_in(drive):
+        if drive.bench.robot.pose.x_m > 4.6 and person not in drive.bench.robot.boxes:
+            drive.bench.robot.boxes.append(person)
+
+    drive = Drive([person], until=steps_in, there_at_first=False)
+    assert isinstance(drive.step, Succeeded), drive.step.message
+    assert drive.waited() > 1.0
+    assert drive.nearest_m > 0.55
+
+
+def test_it_comes_before_a_person_who_is_the_goal():
+    """A hand-over stands 1.5 m before somebody: reached slowly, not refused."""
+    drive = Drive([person_at(GOAL.x_m + 1.5 - 0.6, GOAL.y_m)], goal=Pose2D(GOAL.x_m - 0.6, GOAL.y_m, 0.0))
+    assert isinstance(drive.step, Succeeded), drive.step.message
+    assert drive.waited() == 0.0
+    assert drive.fastest(7.3, 7.9) < 0.5
+
+
+def test_a_narrow_way_past_somebody_is_gone_slowly_and_not_given_up():
+    """In the corridor narrowed to 1.1 m beside them a disc of full room would close the way."""
+    shelf = replace(TWO_ROOMS[-1], x0=4.0, x1=6.0, y0=6.05, y1=7.0)
+    drive = Drive([person_at(5.0, 4.4)], surveyed=[shelf])
+    assert isinstance(drive.step, Succeeded), drive.step.message
+    assert drive.bench.robot.least_clearance_m > 0.03
+    assert drive.fastest(4.3, 5.2) < 0.35

@@ -1,0 +1,113 @@
+"""How fast near people, and how much room they get."""
+
+import math
+
+import numpy as np
+import pytest
+
+from skills.navigate.footprint import Footprint
+from skills.navigate.people_space import PaceKeeper, SpaceOptions, WithPeople, outline_distance_m, spaced
+from skills.navigate.people_watch import SeenPerson
+from skills.robot import Pose2D
+
+FOOTPRINT = Footprint.rectangle([(0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25)])
+HERE = Pose2D(0.0, 0.0, 0.0)
+FULL_M_S = 0.8
+
+
+class Open:
+    """Nothing nearer than five metres."""
+
+    def clearance_m(self, points_W):
+        return np.full(len(points_W), 5.0)
+
+
+def person(x, y=0.0):
+    return SeenPerson((x, y), np.eye(2) * 0.01, 0.9, 0.0, HERE, 2)
+
+
+def way(length_m=1.2):
+    """Straight ahead."""
+    x = np.arange(0.0, length_m + 1e-9, 0.05)
+    return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
+
+
+def pace(*people, keeper=None, now_s=0.0, ahead=None):
+    keeper = keeper or PaceKeeper(FOOTPRINT)
+    return keeper.pace(now_s, HERE, way() if ahead is None else ahead, people, FULL_M_S)
+
+
+def test_distances_are_from_the_outline():
+    found = outline_distance_m(FOOTPRINT, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, math.pi / 2]]), [person(2.0)])
+    assert found[:, 0] == pytest.approx([1.45, 1.75], abs=0.02)
+
+
+@pytest.mark.parametrize(
+    # a person aside of the way: outline to axis (m) -> speed (m/s)
+    ("aside_m", "expected"),
+    [(3.0, math.inf), (2.5, math.inf), (1.75, 0.55), (1.0, 0.3), (0.85, 0.3)],
+)
+def test_speed_falls_with_the_distance(aside_m, expected):
+    told = pace(person(0.6, 0.25 + aside_m))
+    assert told.most_m_s == pytest.approx(expected, abs=0.02)
+    assert not told.waiting
+
+
+def test_a_person_ahead_is_heeded_before_the_robot_is_near():
+    # 3.4 m ahead of the body: 2.85 m from the outline now, 1.65 m in 1.2 m
+    told = pace(person(3.4))
+    assert told.most_m_s == pytest.approx(0.3 + (1.65 - 1.0) / 1.5 * 0.5, abs=0.02)
+
+
+def test_it_waits_for_who_is_too_near_to_the_way_and_then_goes_past_slowly():
+    keeper, options = PaceKeeper(FOOTPRINT), SpaceOptions()
+    told = [pace(person(2.0), keeper=keeper, now_s=0.1 * k) for k in range(60)]
+    stood = [one for one in told if one.waiting]
+    assert len(stood) == pytest.approx(10 * options.patience_s, abs=2)
+    assert {one.most_m_s for one in stood} == {0.0}
+    assert [one.overdue for one in stood].count(True) == 1
+    assert stood[-1].overdue
+    assert told[-1].most_m_s == options.pass_m_s
+
+
+def test_patience_begins_anew_when_nobody_was_near_for_a_while():
+    keeper = PaceKeeper(FOOTPRINT)
+    for k in range(60):
+        pace(person(2.0), keeper=keeper, now_s=0.1 * k)
+    pace(keeper=keeper, now_s=7.0)
+    assert not pace(person(2.0), keeper=keeper, now_s=7.1).waiting
+    pace(keeper=keeper, now_s=12.0)
+    assert pace(person(2.0), keeper=keeper, now_s=12.1).waiting
+
+
+def test_a_way_that_leads_away_from_somebody_near_is_not_waited_on():
+    backwards = way() * [-1.0, 1.0, 1.0]
+    told = pace(person(1.2), ahead=backwards)
+    assert not told.waiting
+    assert 0.5 < told.most_m_s < 0.7
+
+
+def test_who_is_behind_a_wall_of_distance_is_nobody():
+    told = pace(person(8.0), person(0.0, 6.0))
+    assert (told.most_m_s, told.person) == (math.inf, None)
+
+
+def test_a_slow_errand_is_not_made_faster():
+    keeper = PaceKeeper(FOOTPRINT)
+    assert keeper.pace(0.0, HERE, way(), [person(0.6, 2.0)], 0.2).most_m_s <= 0.2
+
+
+def test_people_take_up_room_in_the_costmap():
+    costmap = WithPeople(Open(), np.array([[1.0, 0.0, 0.5], [9.0, 0.0, 0.5]]))
+    assert costmap.clearance_m(np.array([[3.0, 0.0], [1.0, 0.3], [50.0, 0.0]])) == pytest.approx([1.5, -0.2, 5.0])
+
+
+def test_room_is_left_for_where_the_robot_is_and_goes():
+    # the outline is 0.45 m from the first person's axis and far from the second's
+    costmap = spaced(Open(), FOOTPRINT, (HERE, Pose2D(5.0, 0.0, 0.0)), [person(1.0), person(2.5, 3.0)], 0.5)
+    assert costmap.discs[:, 2] == pytest.approx([0.4, 0.5], abs=0.02)
+
+
+def test_without_people_the_costmap_is_as_it_was():
+    costmap = Open()
+    assert spaced(costmap, FOOTPRINT, (HERE,), [], 0.5) is costmap

@@ -19,10 +19,9 @@ from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
-from skills.api import Detector
 from skills.detect.attributes import known_attributes
-from skills.detect.interim_segmentation import SurfaceSegmentationDetector
 from skills.detect.detector_file import MODEL_FILE
+from skills.detect.interim_segmentation import SurfaceSegmentationDetector
 from skills.detect.onnx_detector import SharedDetector
 from skills.detection import Detector, NoDetector
 from skills.estimate.costmap import LayeredCostmap

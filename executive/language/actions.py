@@ -72,7 +72,7 @@ def _with_elided(actions: Sequence[Action]) -> Iterator[Action]:
     things = False
     for action in actions:
         lacks = action.unknown == (action.verb,) and not action.objects and action.kind in _ELIDING
-        goes_on = action.goal is not None or (action.kind is VerbKind.FIND and action.source is None)
+        goes_on = action.goal is not None or action.kind is VerbKind.FIND
         if things and lacks and goes_on:
             action = replace(action, unknown=(), objects=(_IT,))
         things = things or any(not phrase.speaker for phrase in action.objects)
@@ -267,8 +267,12 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
         bare = [replace(bare[0], within=roles.ats.pop())]
     if bare and blank.verb.endswith((" down", " up", " along")):
         bare = [] if roles.goals else bare
-    elif bare and blank.verb not in words.bare_goal:
+    elif bare and (blank.verb not in words.bare_goal or (blank.verb in words.enters and _things(roles.objects))):
         blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
+    if _goes_for(roles):
+        fetched = tuple(phrase for phrase in (roles.searched,) if phrase is not None)
+        yield replace(blank, kind=VerbKind.ROUND_TRIP, objects=fetched, source=roles.goals[0], goal=HERE)
+        return
     headed = roles.searched if roles.searched is not None and roles.searched.kind is NounKind.PLACE else None
     places = [*roles.goals, *roles.ats, *bare, *([] if headed is None else [Location(headed)]), *roles.joined_goals]
     places = places or roles.paths
@@ -280,6 +284,18 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
     blank = replace(blank, unknown=(*blank.unknown, *extra))
     yield from (replace(blank, goal=place) for place in places) if places else (blank,)
+
+
+def _things(phrases: Sequence[Phrase]) -> bool:
+    """Whether any of them is a thing and no place."""
+    return any(phrase.kind is NounKind.THING and not phrase.known for phrase in phrases)
+
+
+def _goes_for(roles: Roles) -> bool:
+    """Whether somebody is to go somewhere for a thing ("run to the cellar for some wine")."""
+    thing, place = roles.searched, roles.goals[0] if len(roles.goals) == 1 else None
+    fetched = thing is not None and thing.kind is NounKind.THING and not thing.pronoun
+    return fetched and place is not None and place.phrase is not None and not (roles.sources or roles.objects)
 
 
 def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
@@ -306,6 +322,7 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
         rest = [] if to_place and roles.favour else [roles.recipient]
         goals = [*goals, *rest] if to_place else [roles.recipient, *goals]
     at_is_goal = blank.kind is VerbKind.PLACE or blank.verb in words.at_is_goal or len(ats) > 1
+    at_is_goal = at_is_goal or any(_lies_in(place, words) for place in sources)
     if ats and not goals and at_is_goal:
         goals.append(ats.pop())
     sources += ats
@@ -320,6 +337,11 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     carried = _with_object(replace(blank, objects=tuple(roles.objects), source=source, goal=goal), extra)
     yield carried
     yield from (replace(carried, goal=place) for place in shared)
+
+
+def _lies_in(place: Location, words: Lexicon) -> bool:
+    """Whether it was said that a thing is in a place ("the cup that is on the desk"), not only from where."""
+    return words.prepositions.get(tuple(place.preposition.split())) is not PrepositionRole.SOURCE
 
 
 def _for_each(roles: Roles) -> bool:

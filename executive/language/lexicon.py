@@ -67,6 +67,7 @@ class Lexicon:
     levels: frozenset[str]
     bare_goal: frozenset[str]
     leaves: frozenset[str]
+    enters: frozenset[str]
     needs: frozenset[Phrase]
     here: frozenset[str]
     there: frozenset[str]
@@ -101,6 +102,7 @@ def lexicon() -> Lexicon:
         goal_wanted=frozenset(verbs["goal_wanted"]),
         source_wanted=frozenset(verbs["source_wanted"]),
         goes_back=frozenset(verbs["goes_back"]),
+        enters=frozenset(verbs["enters"]),
         leaves=frozenset(verbs["leaves"]),
         bare_goal=frozenset(verbs["bare_goal"]),
         needs=_phrases(words["needs"]),

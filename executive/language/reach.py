@@ -8,7 +8,7 @@ from typing import Final
 from executive.knowledge import Knowledge
 from executive.language.grounding import known_line
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
-from executive.language.nouns import NounKind
+from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
 from executive.language.reference import Deed
 from executive.language.refusal import RefusalError
@@ -147,7 +147,8 @@ def _outside_place(place: Location | None, deed: Deed) -> Iterator[str]:
 def _idle(phrase: Phrase, place: Location, verb: str) -> bool:
     """Whether going there is something else than a way: "go to bed", "reach my wife"."""
     bare = len(phrase.tokens) == 1 and not phrase.known
-    called = verb in lexicon().calls and phrase.person and not phrase.named_person and place.within is None
+    out = place.preposition.startswith("out")
+    called = phrase.person and (out or not phrase.named_person) and place.within is None and verb in lexicon().calls
     return called or (bare and phrase.head.lemma in lexicon().light_nouns.get(verb.split()[0], frozenset()))
 
 
@@ -157,4 +158,5 @@ def _reachable(phrase: Phrase, place: Location) -> bool:
     if phrase.known or named or phrase.person:
         return True
     called = place.preposition == "to" and phrase.proper and phrase.kind is NounKind.ABSTRACT
+    called = called and phrase.head.lemma not in noun_examples()
     return called or (phrase.nominal and (phrase.kind is None or phrase.kind.within_reach))

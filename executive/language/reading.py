@@ -151,7 +151,7 @@ class _Reader(Row):
             return None
         self.at += 1
         ahead = self.tokens[self.at : self.at + 1]
-        if ahead and (ahead[0].pos == "ADP" or ahead[0].tag in ("TO", "IN")):
+        if ahead and ahead[0].word != "for" and (ahead[0].pos == "ADP" or ahead[0].tag in ("TO", "IN")):
             return Separator("")
         if items and isinstance(items[-1], Chunk) and items[-1].role is not None:
             return Separator("")

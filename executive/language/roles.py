@@ -49,7 +49,12 @@ class Location:
         return f"{self.name} {self.within.preposition} {self.within.text}"
 
 
+_RELATIVE: Final = frozenset(
+    """that is|which is|that are|which are|that 's|which 's|who is|who are|who 's|which it is|that it is|lying|laying
+    |standing|sitting|hanging|located|situated|resting|stored""".replace("\n    ", "").split("|")
+)
 _JOINTS: Final = frozenset({",", ";", "and", "or", "then", "also", "plus", "second", "but"})
+_CLOSER: Final = (PrepositionRole.AT, PrepositionRole.BESIDE)
 _LISTING: Final = frozenset({",", ""})
 _HERE_NAME: Final = "start"
 HERE: Final = Location(None)
@@ -114,14 +119,19 @@ def read_roles(items: Sequence[Item], words: Lexicon, *, describes: bool, puts: 
 
 def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Spoken]:
     """The chunks; what is neither chunk nor small word is left over."""
-    joint = ""
+    joint, relative = "", False
+    before: Chunk | None = None
     for item in items:
         if isinstance(item, Chunk):
+            lies = relative and before is not None and before.role is None and not before.phrase.person
+            item = replace(item, role=PrepositionRole.SOURCE) if lies and item.role in _CLOSER else item
+            before = item
             yield _Spoken(item, joint)
         elif isinstance(item, Unknown):
             roles.unknown.append(item.word)
         elif isinstance(item, Whether):
             roles.unknown.append("if")
+        relative = isinstance(item, Separator) and (item.word in _RELATIVE or (relative and item.word == ""))
         joint = "" if not isinstance(item, Separator) else item.word if item.word in _JOINTS else joint
 
 
@@ -157,7 +167,6 @@ class _Placed:
         return Location(self.chunk.phrase, self.chunk.preposition, self.within)
 
 
-_CLOSER: Final = (PrepositionRole.AT, PrepositionRole.BESIDE)
 _PLACE_ROLES: Final = (PrepositionRole.SOURCE, PrepositionRole.GOAL, *_CLOSER)
 
 

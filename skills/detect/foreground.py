@@ -68,6 +68,14 @@ class Window:
             for u, v in pixels
         ]
 
+    def border_px(self, p_O: FloatArray) -> float:
+        """How far from the nearest edge of the picture a point is seen, negative outside of it."""
+        x, y, z = self.R_OC.T @ (p_O - self.p_OC)
+        if z < MIN_DEPTH_M:
+            return -math.inf
+        u, v = x / z * self.lens.fx + self.lens.cx, y / z * self.lens.fy + self.lens.cy
+        return float(min(u, v, self.lens.width - 1 - u, self.lens.height - 1 - v))
+
 
 @dataclass(frozen=True)
 class LevelPlane:

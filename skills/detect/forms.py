@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 
 class ClassForm(BaseModel):
-    """One class: id in messages, form, lengths (from, to) in m of its longest and second longest side."""
+    """One class: id in messages, form, lengths (from, to) in m of its longest and second longest side, usual length."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -21,6 +21,7 @@ class ClassForm(BaseModel):
     form: Literal["round", "tank", "long", "box", "person"]
     length_m: tuple[float, float]
     width_m: tuple[float, float]
+    usual_m: float
 
 
 @lru_cache(maxsize=1)

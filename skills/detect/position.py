@@ -10,7 +10,7 @@ The foreground of the box gives the side that is seen. The form of the class tel
 | long | the outline from above; where too little of it rises above the plane, the ray of the box's middle meets it |
 | person | behind the nearest points by half a body's depth; from the floor to the top that is seen, or a usual height |
 
-Heights are halfway from the plane below to the top.
+Heights are halfway from the plane below to the top. What the picture's edge cuts off is taken to be of usual length.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ _GRAZING = 0.08
 _PERSON_DEPTH_M, _PERSON_BEHIND_M = 0.30, 0.10
 _PERSON_HEIGHT_M, _PERSON_HALF_M = 1.70, 0.4
 _BORDER_PX = 2.0
+_END_AT_BORDER_PX = 30.0
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def _doubted(extents: Extents, fore: Foreground, cut: _Cut) -> tuple[float, floa
     """The sigmas of the extents, larger where the thing reaches beyond the picture or its base is not seen."""
     along, across, up = extents.sure_m
     longest = max(extents.length_m, extents.height_m)
-    if cut.top or cut.bottom or cut.side:
+    if cut.anywhere:
         along, across, up = along + 0.12 * longest, across + 0.15 * longest, up + 0.1 * extents.height_m
     if fore.plane is None:
         up += 0.02 + 0.1 * extents.height_m
@@ -97,6 +98,11 @@ class _Cut:
     top: bool
     bottom: bool
     side: bool
+
+    @property
+    def anywhere(self) -> bool:
+        """Whether any does."""
+        return self.top or self.bottom or self.side
 
 
 def _cut(image: Image, detection: Detection) -> _Cut:
@@ -118,11 +124,24 @@ def _extents(fore: Foreground, form: ClassForm, cut: _Cut) -> Extents | None:
     if few:
         return None
     base_m = _base(fore, points)
-    height_m = float(np.clip(np.percentile(points[:, 2], 98) - base_m, 0.005, form.length_m[1]))
+    height_m = float(
+        np.clip(np.percentile(points[:, 2], 99.7 if form.form == "tank" else 98) - base_m, 0.005, form.length_m[1])
+    )
     across_m = _across(points, fore.window.p_OC)
     if form.form in ("round", "tank") and height_m > _UPRIGHT * across_m:
+        base_m, height_m = _uncut(base_m, height_m, form, fore, cut)
         return _upright(points, fore, form, base_m, height_m)
-    return _lying(points, fore, form, base_m, height_m)
+    return _lying(points, fore, form, base_m, height_m, cut)
+
+
+def _uncut(base_m: float, height_m: float, form: ClassForm, fore: Foreground, cut: _Cut) -> tuple[float, float]:
+    """Base and height of a standing thing, of usual height where the picture ends above or below it."""
+    missing_m = max(0.0, form.usual_m - height_m)
+    if cut.top:
+        return base_m, height_m + missing_m
+    if cut.bottom and fore.plane is None:
+        return base_m - missing_m, height_m + missing_m
+    return base_m, height_m
 
 
 def _base(fore: Foreground, points: FloatArray) -> float:
@@ -190,9 +209,11 @@ def _with_appendages(
     return Extents((float(cx), float(cy), base_m + 0.5 * height_m), length, width, height_m, yaw, False, sure_m)
 
 
-def _lying(points: FloatArray, fore: Foreground, form: ClassForm, base_m: float, height_m: float) -> Extents:
-    """The outline from above, completed on the far side."""
+def _lying(points: FloatArray, fore: Foreground, form: ClassForm, base_m: float, height_m: float, cut: _Cut) -> Extents:
+    """The outline from above, completed on the far side and beyond the picture's edge."""
     centre, length, width, yaw = _outline(points, base_m, height_m, form)
+    if cut.anywhere and form.form in ("long", "round"):
+        centre, length = _continued(centre, length, yaw, base_m, fore.window, form)
     wanted = (length, width)
     if form.form == "round":
         wanted = (length, max(width, height_m))
@@ -202,6 +223,19 @@ def _lying(points: FloatArray, fore: Foreground, form: ClassForm, base_m: float,
     sure = (0.005 + 0.06 * length, 0.004 + 0.05 * length, 0.004 + 0.05 * height_m)
     middle = (float(centre[0]), float(centre[1]), base_m + 0.5 * height_m)
     return Extents(middle, *wanted, height_m, yaw, False, sure)
+
+
+def _continued(
+    centre: FloatArray, length_m: float, yaw_rad: float, height_m: float, window: Window, form: ClassForm
+) -> tuple[FloatArray, float]:
+    """Middle and length of what the picture's edge cuts off, as long as is usual beyond the end that is cut."""
+    missing_m = max(0.0, form.usual_m - length_m)
+    along = np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
+    ends = [window.border_px(np.array([*(centre + side * 0.5 * length_m * along), height_m])) for side in (1.0, -1.0)]
+    if min(ends) > _END_AT_BORDER_PX:
+        return centre, length_m
+    towards = 1.0 if ends[0] < ends[1] else -1.0
+    return centre + towards * 0.5 * missing_m * along, length_m + missing_m
 
 
 def _towards(seen_m: float, side_m: float) -> float:

@@ -132,7 +132,7 @@ def _cluster(points: PointCloud, surface: Surface, plane: Plane, p_WC: FloatArra
 def cluster_of(clusters: tuple[Cluster, ...], sighting: Sighting) -> Cluster | None:
     """The cluster that a detected thing is: the one near it whose box overlaps the detection's most; None if none."""
     near = [one for one in clusters if _apart(one, sighting) < _SAME_THING_M + 0.5 * one.shape.length_m]
-    overlaps = {id(one): _overlap(one.box, sighting.detection.box) for one in near}
+    overlaps = {id(one): box_overlap(one.box, sighting.detection.box) for one in near}
     best = max(near, key=lambda one: overlaps[id(one)], default=None)
     return best if best is not None and overlaps[id(best)] > _LEAST_OVERLAP else None
 
@@ -141,7 +141,7 @@ def _apart(cluster: Cluster, sighting: Sighting) -> float:
     return float(np.linalg.norm(np.array(cluster.shape.centre) - sighting.position_W[:2]))
 
 
-def _overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> float:
+def box_overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> float:
     """Intersection over union of two boxes."""
     width, height = (min(a[k + 2], b[k + 2]) - max(a[k], b[k]) for k in (0, 1))
     if width <= 0 or height <= 0:

@@ -149,6 +149,7 @@ def counts(truth: Truth) -> bool:
 def save(shot: Shot, path: Path) -> None:
     """Keep a shot in a file, for another measurement."""
     rows = [(t.detection.class_name, t.instance, t.visibility, t.truncation, *t.size_C) for t in shot.truths]
+    assert shot.image.colour is not None
     lens, X_WC = shot.image.intrinsics, shot.image.frames.pose("hand_camera")
     np.savez_compressed(
         path,

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import onnxruntime
 
 from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX
@@ -55,6 +56,7 @@ def load_model(file: Path = MODEL_FILE) -> DetectorModel:
     _check_format(file, metadata)
     names = _class_names(file, metadata)
     _check_ports(file, session, len(names))
+    _try_out(file, session)
     return DetectorModel(session, names)
 
 
@@ -95,6 +97,7 @@ def _session_options() -> onnxruntime.SessionOptions:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads, options.inter_op_num_threads = THREADS, 1
     options.use_deterministic_compute = True
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idle threads leave the cores to others
     options.log_severity_level = QUIET
     return options
 
@@ -126,6 +129,15 @@ def _check_ports(file: Path, session: onnxruntime.InferenceSession, classes: int
     )
     if (inputs, outputs) != expected:
         raise ModelFileError(file, f"the model has other inputs or outputs: {_told(inputs)} -> {_told(outputs)}")
+
+
+def _try_out(file: Path, session: onnxruntime.InferenceSession) -> None:
+    """Look at one black picture: the first time takes longer, and shows what loading does not."""
+    black = np.zeros((1, HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
+    try:
+        session.run(["boxes", "scores"], {"images": black})
+    except Exception as error:  # the library has no common class of its own for them
+        raise ModelFileError(file, "the model of the detector is damaged (it does not run)") from error
 
 
 def _told(ports: Mapping[str, tuple[str, Sequence[Any]]]) -> str:

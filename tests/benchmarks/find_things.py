@@ -37,7 +37,7 @@ from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrade
 from plant.simulation import Engine
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.lights import render_parameters
-from skills.api import Surface
+from skills.api import Detection, Detector, Surface
 from skills.detect.points import inside_polygon
 from skills.detect.skill import Detect, DetectInputs
 from skills.estimate.costmap import LayeredCostmap
@@ -47,7 +47,7 @@ from skills.robot import FrameTree, Image, Pose2D
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot, Start
-from tests.benchmarks.position_scenes import DepthStage
+from tests.benchmarks.position_scenes import DepthStage, truths, well_seen
 
 LYING_ABOUT = tuple(name for name in CLASSES if name not in ("person", "extinguisher"))
 SURFACES = ("coffee table", "sideboard", "dresser", "bathroom cabinet", "desk", "workbench", "kitchen counter")
@@ -165,12 +165,26 @@ def _scattered(
                 break
 
 
-class RoomRobot(ScriptedRobot):
-    """A robot whose arm moves as it is told, in a rendered room."""
+class TrueBoxes:
+    """A perfect detector, to judge all that comes after it: the boxes of what the last picture shows."""
 
-    def __init__(self, clock: VirtualClock, stage: DepthStage, pose: Pose2D, seed: int) -> None:
+    class_names = CLASSES
+
+    def __init__(self) -> None:
+        self.latest: tuple[Detection, ...] = ()
+
+    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
+        """The same boxes for each picture."""
+        return [self.latest for _ in pictures]
+
+
+class RoomRobot(ScriptedRobot):
+    """A robot whose arm moves as it is told, in a rendered room. `boxes` is told what its pictures show."""
+
+    def __init__(self, clock: VirtualClock, stage: DepthStage, pose: Pose2D, seed: int, boxes: TrueBoxes) -> None:
         super().__init__(clock, capabilities=spot_capabilities(), start=Start(pose))
         self._stage, self._spec, self._X_WO = stage, camera_specs()["hand"], pose.transform()
+        self._boxes = boxes
         rng, lens = np.random.default_rng([seed, 5]), self._spec.intrinsics()
         self._degrade = PictureDegrader(rng, lens.height, lens.width, PictureNoise())
         self._degrade_depth = DepthDegrader(rng, lens, self._spec.depth_range_m, DepthNoise())
@@ -181,14 +195,15 @@ class RoomRobot(ScriptedRobot):
         frames = FrameTree({**edges, "hand_camera": ("hand", self._spec.X_link_camera())})
         lens = self._spec.intrinsics()
         view = View("hand", self._X_WO @ frames.pose("hand_camera"), lens, False, False)
-        clean, _, depth = self._stage.seen(view, self._spec.depth_range_m)
+        clean, labels, depth = self._stage.seen(view, self._spec.depth_range_m)
+        self._boxes.latest = tuple(truth.detection for truth in truths(self._stage, labels, view) if well_seen(truth))
         colour = self._degrade.colour(clean)
         grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
         stamp_s, noisy = self._clock.now(), self._degrade_depth.depth(depth, grey)
         return Image(stamp_s, source, "hand_camera", lens, lens, colour, grey, noisy, frames)
 
 
-def in_room(seed: int, index: int, number: int) -> Iterator[Asked]:
+def in_room(seed: int, index: int, number: int, detector: Detector) -> Iterator[Asked]:
     """One placement in a generated room: what the room's maker laid on one of its supports; nothing where none fits."""
     rng = np.random.default_rng([seed, index, 13])
     scene = compose(rng, index, for_training=False)
@@ -199,9 +214,10 @@ def in_room(seed: int, index: int, number: int) -> Iterator[Asked]:
     with tempfile.TemporaryDirectory(prefix="errand-scene-") as folder:
         stage = DepthStage(replace(scene, held=None), random_lighting(rng, scene.room), Path(folder), 1.0)
         clock = VirtualClock()
-        robot = RoomRobot(clock, stage, pose, seed)
+        boxes = detector if isinstance(detector, TrueBoxes) else TrueBoxes()
+        robot = RoomRobot(clock, stage, pose, seed, boxes)
         bench = SkillBench(
-            robot, clock, localiser=KnownPlace(pose), costmap=BlockCostmap(), detector=thing_detector(), seed=number
+            robot, clock, localiser=KnownPlace(pose), costmap=BlockCostmap(), detector=detector, seed=number
         )
         families = list(dict.fromkeys(thing.model.family for thing in things))
         absent = [name for name in LYING_ABOUT if name not in {thing.model.family for thing in scene.things}]
@@ -283,7 +299,7 @@ def _found_of(there: Sequence[Asked], name: str) -> str:
     return f"{sum(each.right for each in asked_for)}/{len(asked_for)}"
 
 
-def results(seed: int, flat: int, rooms: int) -> Iterator[Asked]:
+def results(seed: int, flat: int, rooms: int, detector: Detector) -> Iterator[Asked]:
     """All placements, one after the other."""
     for number in range(flat):
         yield from in_flat(seed, number)
@@ -291,7 +307,7 @@ def results(seed: int, flat: int, rooms: int) -> Iterator[Asked]:
     while number < rooms and index < 40 * rooms:
         index += 1
         if is_validation(index):
-            here = list(in_room(seed, index, number))
+            here = list(in_room(seed, index, number, detector))
             yield from here
             number += bool(here)
 
@@ -302,9 +318,10 @@ def main() -> None:
     parser.add_argument("--flat", type=int, default=5)
     parser.add_argument("--rooms", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--true-boxes", action="store_true", help="in the rooms, boxes of a perfect detector")
     args = parser.parse_args()
     every = []
-    for each in results(args.seed, args.flat, args.rooms):
+    for each in results(args.seed, args.flat, args.rooms, TrueBoxes() if args.true_boxes else thing_detector()):
         every.append(each)
         told = "there" if each.there else "absent"
         sys.stderr.write(

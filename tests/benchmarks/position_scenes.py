@@ -113,8 +113,13 @@ def _shot(rng: np.random.Generator, stage: DepthStage, view: View) -> Shot:
     depth = DepthDegrader(rng, view.intrinsics, range_m, DepthNoise()).depth(clean, grey)
     frames = FrameTree({"hand_camera": ("odom", view.X_WC)})
     image = Image(0.0, "hand", "hand_camera", view.intrinsics, view.intrinsics, colour, grey, depth, frames)
+    return Shot(image, truths(stage, labels, view))
+
+
+def truths(stage: DepthStage, labels: NDArray[np.int16], view: View) -> tuple[Truth, ...]:
+    """What a picture shows, from its labels."""
     found = (_truth(stage, int(label), labels == label, view) for label in np.unique(labels) if label in stage.labelled)
-    return Shot(image, tuple(truth for truth in found if truth is not None))
+    return tuple(truth for truth in found if truth is not None)
 
 
 def _truth(stage: DepthStage, label: int, mask: NDArray[np.bool_], view: View) -> Truth | None:
@@ -138,12 +143,16 @@ def _truth(stage: DepthStage, label: int, mask: NDArray[np.bool_], view: View) -
 
 
 def counts(truth: Truth) -> bool:
-    """Whether the floors of issue 5 speak of it: near, large and well seen."""
+    """Whether the floor of position errors speaks of it: near, large and well seen."""
+    return float(np.linalg.norm(truth.p_CT)) < FARTHEST_M and well_seen(truth)
+
+
+def well_seen(truth: Truth) -> bool:
+    """Whether it is large in the picture, and little of it hidden or cut off."""
     u0, v0, u1, v1 = truth.detection.box
     long, short = max(u1 - u0, v1 - v0), min(u1 - u0, v1 - v0)
     seen = truth.visibility * (1.0 - truth.truncation)
-    near = float(np.linalg.norm(truth.p_CT)) < FARTHEST_M
-    return near and long >= LEAST_LONG_PX and short >= LEAST_SHORT_PX and seen >= LEAST_VISIBLE
+    return long >= LEAST_LONG_PX and short >= LEAST_SHORT_PX and seen >= LEAST_VISIBLE
 
 
 def save(shot: Shot, path: Path) -> None:

@@ -24,8 +24,8 @@ class SpaceOptions:
     """Distances are from the robot's outline to a person's upright axis.
 
     From `far_m` to `near_m` the speed falls from full to near_m_s, less so where the way leads away by `away_m`. A way
-    that leads nearer than `stop_m` is waited on for `patience_s`, then gone at `pass_m_s`; the patience begins anew
-    after `forget_s` without anybody near.
+    that leads nearer than `stop_m`, and not to a goal so near, is waited on for `patience_s`, then gone at `pass_m_s`;
+    the patience begins anew after `forget_s` without anybody near.
     Plans keep `room_m` where start and goal leave so much, and `least_room_m` where there is no other way.
     """
 
@@ -114,9 +114,12 @@ class PaceKeeper:
         self._near_s = -math.inf
 
     def pace(
-        self, now_s: float, here: Pose2D, ahead: FloatArray, people: Sequence[SeenPerson], most_m_s: float
+        self, now_s: float, here: Pose2D, ahead: FloatArray, people: Sequence[SeenPerson], most_m_s: float, goal: Pose2D
     ) -> Pace:
-        """The pace for a robot `here` whose way leads over poses `ahead` (N, 3), at most_m_s when nobody is near."""
+        """The pace for a robot `here` whose way leads over poses `ahead` (N, 3), at most_m_s when nobody is near.
+
+        Near the `goal` people are come as near to as that asks for, without waiting.
+        """
         if not people:
             return self._nobody(now_s)
         now_m = outline_distance_m(self._footprint, pose_array([here]), people)[0]
@@ -128,7 +131,8 @@ class PaceKeeper:
         if least_m[nearest] >= self._options.far_m:
             return self._nobody(now_s)
         self._near_s = now_s
-        leads_nearer = then_m < np.minimum(self._options.stop_m, now_m - self._options.slack_m)
+        at_goal_m = outline_distance_m(self._footprint, pose_array([goal]), people)[0]
+        leads_nearer = then_m < np.minimum(self._options.stop_m, np.minimum(now_m, at_goal_m) - self._options.slack_m)
         if np.any(leads_nearer):
             return self._close(now_s, people[int(np.argmin(np.where(leads_nearer, then_m, np.inf)))])
         self._waiting_since_s = None

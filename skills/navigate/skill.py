@@ -245,7 +245,8 @@ class Navigate(Skill[NavigateInputs]):
     def _paced(self, follower: PathFollower, pose: Pose2D) -> Pace:
         """How fast people near the way let the robot go."""
         ahead = follower.ahead(self._options.space.look_ahead_m)
-        return self._pace.pace(self._now(), pose, ahead, self._people.people(), self._inputs.max_speed_m_s)
+        people, most_m_s = self._people.people(), self._inputs.max_speed_m_s
+        return self._pace.pace(self._now(), pose, ahead, people, most_m_s, self._inputs.goal)
 
     def _wait_for_person(self, pace: Pace, place_W: tuple[float, float]) -> Step:
         """Stand; once that has taken long, plan around whoever stands there."""

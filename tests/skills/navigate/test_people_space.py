@@ -12,6 +12,7 @@ from skills.robot import Pose2D
 
 FOOTPRINT = Footprint.rectangle([(0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25)])
 HERE = Pose2D(0.0, 0.0, 0.0)
+FAR_GOAL = Pose2D(20.0, 0.0, 0.0)
 FULL_M_S = 0.8
 
 
@@ -32,9 +33,9 @@ def way(length_m=1.2):
     return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
 
 
-def pace(*people, keeper=None, now_s=0.0, ahead=None):
+def pace(*people, keeper=None, now_s=0.0, ahead=None, goal=FAR_GOAL):
     keeper = keeper or PaceKeeper(FOOTPRINT)
-    return keeper.pace(now_s, HERE, way() if ahead is None else ahead, people, FULL_M_S)
+    return keeper.pace(now_s, HERE, way() if ahead is None else ahead, people, FULL_M_S, goal)
 
 
 def test_distances_are_from_the_outline():
@@ -87,6 +88,13 @@ def test_a_way_that_leads_away_from_somebody_near_is_not_waited_on():
     assert 0.5 < told.most_m_s < 0.7
 
 
+def test_a_goal_right_before_somebody_is_come_to_slowly_without_waiting():
+    # at the goal 0.6 m from the outline to the axis
+    told = pace(person(1.95), goal=Pose2D(0.8, 0.0, 0.0), ahead=way(0.8))
+    assert not told.waiting
+    assert told.most_m_s == pytest.approx(0.3)
+
+
 def test_who_is_behind_a_wall_of_distance_is_nobody():
     told = pace(person(8.0), person(0.0, 6.0))
     assert (told.most_m_s, told.person) == (math.inf, None)
@@ -94,7 +102,7 @@ def test_who_is_behind_a_wall_of_distance_is_nobody():
 
 def test_a_slow_errand_is_not_made_faster():
     keeper = PaceKeeper(FOOTPRINT)
-    assert keeper.pace(0.0, HERE, way(), [person(0.6, 2.0)], 0.2).most_m_s <= 0.2
+    assert keeper.pace(0.0, HERE, way(), [person(0.6, 2.0)], 0.2, FAR_GOAL).most_m_s <= 0.2
 
 
 def test_people_take_up_room_in_the_costmap():

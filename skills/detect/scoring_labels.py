@@ -82,11 +82,11 @@ def pictures_of_coco(document: Mapping[str, Any], class_names: Sequence[str]) ->
     out. `visibility`, `distance_m`, `iscrowd` and `ignore` need not be there. Raises ValueError, naming the entry.
     """
     names = _category_names(document, class_names)
-    files = {_value(image, "id", "images", k): image for k, image in enumerate(_entries(document, "images"))}
+    files = {_number_of(image, "id", "images", k): image for k, image in enumerate(_entries(document, "images"))}
     labels: dict[Any, list[Label]] = {number: [] for number in files}
     for k, entry in enumerate(_entries(document, "annotations")):
-        picture = _value(entry, "image_id", "annotations", k)
-        category = _value(entry, "category_id", "annotations", k)
+        picture = _number_of(entry, "image_id", "annotations", k)
+        category = _number_of(entry, "category_id", "annotations", k)
         if picture not in labels or category not in names:
             raise ValueError(f"annotations[{k}]: it names image {picture!r} of category {category!r}, one is not there")
         name = names[category]
@@ -108,7 +108,8 @@ def _category_names(document: Mapping[str, Any], class_names: Sequence[str]) -> 
     ours = {name.casefold(): name for name in class_names}
     entries = list(_entries(document, "categories"))
     told = {
-        _value(one, "id", "categories", k): str(_value(one, "name", "categories", k)) for k, one in enumerate(entries)
+        _number_of(one, "id", "categories", k): str(_value(one, "name", "categories", k))
+        for k, one in enumerate(entries)
     }
     names = {number: ours.get(name.strip().casefold()) for number, name in told.items()}
     if not any(names.values()):
@@ -130,7 +131,8 @@ def _label(entry: Mapping[str, Any], name: str, k: int) -> Label:
             distance_m=_number(entry.get("distance_m")),
         )
     except (TypeError, ValueError) as error:
-        raise ValueError(f"annotations[{k}]: bbox is four numbers (x, y, width, height), not {box!r}") from error
+        told = f"bbox is four numbers (x, y, width, height), not {box!r}, or another of its fields is none"
+        raise ValueError(f"annotations[{k}]: {told}") from error
 
 
 def _size(image: Mapping[str, Any]) -> tuple[int, int] | None:
@@ -147,6 +149,14 @@ def _entries(document: Mapping[str, Any], key: str) -> Iterable[Mapping[str, Any
     if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
         raise ValueError(f"it has no list '{key}' of objects, as a COCO file does")
     return entries
+
+
+def _number_of(entry: Mapping[str, Any], key: str, group: str, k: int) -> int | str:
+    """An entry's number, which some files give as text."""
+    value = _value(entry, key, group, k)
+    if not isinstance(value, int | str):
+        raise ValueError(f"{group}[{k}]: '{key}' is a number, not {value!r}")
+    return value
 
 
 def _value(entry: Mapping[str, Any], key: str, group: str, k: int) -> Any:

@@ -56,6 +56,11 @@ def test_what_counts(width, height, visibility, crowd, ignore, counts):
         ({"categories": [{"id": 1, "name": "cat"}]}, "none of cat is a class that is known"),
         ({"categories": []}, "none of them is a class"),
         ({"images": [{"file_name": "a.jpg"}]}, r"images\[0\]: it has no 'id'"),
+        ({"images": [{"id": [7], "file_name": "a.jpg"}]}, r"images\[0\]: 'id' is a number, not \[7\]"),
+        (
+            {"annotations": [{"image_id": None, "category_id": 90}]},
+            r"annotations\[0\]: 'image_id' is a number, not None",
+        ),
         ({"images": [{"id": 7}], "annotations": []}, r"images\[0\]: it has no 'file_name'"),
         ({"annotations": [{"image_id": 8, "category_id": 90}]}, r"annotations\[0\]: it names image 8"),
         ({"annotations": [{"image_id": 7, "category_id": 90}]}, r"annotations\[0\]: it has no 'bbox'"),

@@ -13,8 +13,9 @@ from pydrake.math import RigidTransform
 from skills.api import Cause, Detection, LocalisationEstimate, ObjectObservation, Running, Succeeded, Surface
 from skills.arm.arm_skill import ArmSkill, hand_camera_in_hand
 from skills.arm.collision import ArmScene
-from skills.arm.poses import look_configuration, overview_stations
+from skills.arm.poses import close_stations, look_configuration, overview_stations
 from skills.arm.routine import Routine, SkillFailure
+from skills.detect.attention import unnamed
 from skills.detect.attributes import known_attributes, shows
 from skills.detect.coverage import Coverage
 from skills.detect.forms import class_forms
@@ -28,6 +29,7 @@ from skills.detect.messages import (
 )
 from skills.detect.seeing import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.detect.sighting import FLOOR, Sighting, observation, sightings
+from skills.detect.surface_view import Cluster, view_surface
 from skills.detect.tracks import Track, TrackBook
 from skills.detect.words import counted, describe, surface_names, wanted
 from skills.robot import FloatArray, Image
@@ -37,6 +39,8 @@ _CANDIDATES = 3
 _EXPECTED_WITHIN_M = 0.35
 _FLOOR_WITHIN_M = 2.2
 _LEAST_SEEN = 0.02
+_CLOSER_LOOKS = 3
+_LOOKED_AT_M = 0.08
 
 
 @dataclass(frozen=True)
@@ -58,12 +62,13 @@ class DetectInputs:
 
 @dataclass(frozen=True)
 class Look:
-    """One picture, where the robot was, and what was found in it, with and without a place."""
+    """One picture, where the robot was, what was found in it, with and without a place, and what stands there."""
 
     image: Image
     localisation: LocalisationEstimate
     detections: tuple[Detection, ...]
     sightings: tuple[Sighting, ...]
+    clusters: tuple[Cluster, ...]
 
 
 class Detect(ArmSkill[DetectInputs]):
@@ -95,13 +100,15 @@ class Detect(ArmSkill[DetectInputs]):
             raise SkillFailure(Cause.PRECONDITION, f"{surface_names(inputs.surfaces)} is out of sight from here")
         self._book, self._coverage = TrackBook(self.context.detector.class_names), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
+        self._clusters: list[Cluster] = []
         X_HC = hand_camera_in_hand((yield from self.picture("looking")))
         blocked: list[SkillFailure] = []
         for k, target in enumerate(targets):
             yield from self._look_and_confirm(inputs, X_HC, target, blocked)
-            if 0 < inputs.count <= len(self._found(inputs)):
+            if self._has_enough(inputs):
                 break
             yield Running(f"looking for {wanted(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
+        yield from self._look_closer(inputs, X_HC)
         self.context.publish("surfaces_seen", coverage_message(self.context, self._coverage.shares()))
         return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
 
@@ -122,12 +129,39 @@ class Detect(ArmSkill[DetectInputs]):
             return [X_WB.inverse() @ np.array(inputs.expected_W)]
         return [t for s in _by_distance(inputs.surfaces, X_WB) for t in look_targets(s, X_WB, self.model.p_BS)]
 
+    def _has_enough(self, inputs: DetectInputs) -> bool:
+        return 0 < inputs.count <= len(self._found(inputs))
+
+    def _look_closer(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
+        """Look from near where the thing is expected, or at what was not named and may be what is wanted."""
+        if inputs.expected_W is not None:
+            if not self._has_enough(inputs):
+                p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
+                yield from self._look_and_confirm(inputs, X_HC, p_BT, [], close=True)
+            return
+        for _ in range(_CLOSER_LOOKS):
+            left = unnamed(self._clusters, self._book.snapshot(), inputs.classes)
+            if self._has_enough(inputs) or not left:
+                return
+            shape, base_m = left[0].shape, left[0].base_m
+            self._clusters = [c for c in self._clusters if _apart(c.shape.centre, shape.centre) > _LOOKED_AT_M]
+            p_BT = self.X_WB().inverse() @ np.array([*shape.centre, base_m + 0.5 * shape.height_m])
+            kept, self._clusters = self._clusters, []
+            yield from self._look_and_confirm(inputs, X_HC, p_BT, [], close=True)
+            self._clusters = kept
+
     def _look_and_confirm(
-        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, blocked: list[SkillFailure]
+        self,
+        inputs: DetectInputs,
+        X_HC: RigidTransform,
+        p_BT: FloatArray,
+        blocked: list[SkillFailure],
+        *,
+        close: bool = False,
     ) -> Routine[None]:
         """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
         try:
-            yield from self.look(inputs, X_HC, p_BT, 0.0)
+            yield from self.look(inputs, X_HC, p_BT, 0.0, close=close)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -137,7 +171,7 @@ class Detect(ArmSkill[DetectInputs]):
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
             p_BO, shifts_rad = self._from_elsewhere(track)
             try:
-                yield from self.look(inputs, X_HC, p_BO, shifts_rad[tries - 1])
+                yield from self.look(inputs, X_HC, p_BO, shifts_rad[tries - 1], close=close)
             except SkillFailure as failure:
                 if failure.cause is not Cause.PLANNING:
                     raise
@@ -152,7 +186,7 @@ class Detect(ArmSkill[DetectInputs]):
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
         """The likeliest track that may be what is looked for and is to be looked at again."""
-        if 0 < inputs.count <= len(self._found(inputs)) or len(self._tried) > _CANDIDATES + inputs.count:
+        if self._has_enough(inputs) or len(self._tried) > _CANDIDATES + inputs.count:
             return None
         open_ones = (t for t in self._matching(inputs) if not t.confirmed)
         return next((t for t in open_ones if self._tried.get(t.number, 0) < len(_CONFIRM_SHIFTS_RAD)), None)
@@ -175,12 +209,15 @@ class Detect(ArmSkill[DetectInputs]):
         near = _apart(track.position_W, self.X_WB().translation()) < _FLOOR_WITHIN_M
         return inputs.floor and track.latest.surface == FLOOR and near
 
-    def look(self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, shift_rad: float) -> Routine[Look]:
+    def look(
+        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, shift_rad: float, *, close: bool = False
+    ) -> Routine[Look]:
         """Point the camera at p_BT, from a little aside when shift_rad is not 0, and take in what is seen."""
         message = f"looking for {wanted(inputs.classes, inputs.attributes)}"
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return look_configuration(scene, X_HC, overview_stations(self.model, p_BT, shift_rad), p_BT, q)
+            near = close_stations(self.model.p_BS, p_BT, shift_rad) if close else []
+            return look_configuration(scene, X_HC, [*near, *overview_stations(self.model, p_BT, shift_rad)], p_BT, q)
 
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)
@@ -189,7 +226,9 @@ class Detect(ArmSkill[DetectInputs]):
 
         def examine() -> Look:
             found = detections_in(detector, image, place.X_WO, inputs.surfaces)
-            return Look(image, place, found, sightings(image, place, found, inputs.surfaces))
+            views = (view_surface(image, place.X_WO, surface) for surface in inputs.surfaces)
+            clusters = tuple(cluster for view in views if view is not None for cluster in view.clusters)
+            return Look(image, place, found, sightings(image, place, found, inputs.surfaces), clusters)
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
         self._take_in(look)
@@ -202,6 +241,7 @@ class Detect(ArmSkill[DetectInputs]):
         tracks = self._book.update(look.sightings, lambda t: in_plain_view(look.image, X_WO, t.position_W))
         self.context.publish("detections", detections_message(look.image, look.detections, look.sightings))
         self.context.publish("tracks", tracks_message(self.context, tracks))
+        self._clusters += look.clusters
         self._last = look
 
     def _ended(self, inputs: DetectInputs, blocked: Sequence[SkillFailure]) -> Routine[Succeeded]:
@@ -242,7 +282,7 @@ def _bearing(p_B: FloatArray) -> float:
     return math.atan2(p_B[1], p_B[0])
 
 
-def _apart(p_W: FloatArray, q_W: Sequence[float] | FloatArray) -> float:
+def _apart(p_W: Sequence[float] | FloatArray, q_W: Sequence[float] | FloatArray) -> float:
     """Level distance of two points."""
     return float(np.linalg.norm(np.asarray(p_W)[:2] - np.asarray(q_W)[:2]))
 

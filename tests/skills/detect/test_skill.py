@@ -153,6 +153,19 @@ def test_with_an_expected_place_only_what_is_there_counts():
     failed(skill, replace(near, expected_W=(1.2, 0.5, 0.8)), Cause.POSTCONDITION, "no coke seen")
 
 
+def test_what_is_not_named_from_afar_is_looked_at_from_near():
+    class ShortSighted(Colours):
+        def detect(self, pictures):
+            large = [[d for d in found if d.box[3] - d.box[1] > 75.0] for found in super().detect(pictures)]
+            return [tuple(found) for found in large]
+
+    step, log = found([COKE], DetectInputs(("coke",), (TABLE,)), detector=ShortSighted())
+    assert step.outputs["observation"].position_W == pytest.approx((COKE.x, COKE.y, 0.8075), abs=0.01)
+    seen_in = [bool(m["detections"]) for topic, m in log if topic == "detections"]
+    assert not seen_in[0]
+    assert seen_in[-1]
+
+
 def test_the_jaw_is_opened_to_look_and_closed_again():
     robot = ScriptedRobot(things=[])
     failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "no coke")

@@ -1,0 +1,44 @@
+"""What is worth a closer look."""
+
+from dataclasses import replace
+
+import numpy as np
+from pydrake.math import RigidTransform
+from sighted import sighting
+from table_scene import BLUE, COKE, GREY, TABLE, Can, scene
+
+from skills.detect.attention import unnamed
+from skills.detect.surface_view import view_surface
+from skills.detect.tracks import TrackBook
+
+BOX = Can(1.1, 0.25, 0.06, 0.10, GREY)
+
+
+def clusters(*things):
+    view = view_surface(scene(things), RigidTransform(), TABLE)
+    assert view is not None
+    return view.clusters
+
+
+def track_at(x, y):
+    book = TrackBook(("coke",))
+    return book.update([replace(sighting(), position_W=np.array([x, y, 0.8]))], lambda track: True)
+
+
+def test_what_has_a_track_is_named():
+    left = unnamed(clusters(COKE, BOX), track_at(COKE.x, COKE.y), ("coke",))
+    assert [round(one.shape.centre[1], 1) for one in left] == [0.2]
+
+
+def test_what_is_too_large_or_small_for_the_class_is_passed_over():
+    tall = Can(1.1, 0.25, 0.06, 0.39, BLUE)
+    assert len(unnamed(clusters(COKE, tall), (), ("person",))) == 1
+    assert len(unnamed(clusters(COKE, tall), (), ("person", "coke"))) == 2
+
+
+def test_a_place_that_was_seen_twice_counts_once():
+    assert len(unnamed([*clusters(COKE), *clusters(COKE)], (), ("coke",))) == 1
+
+
+def test_an_empty_table_has_nothing_to_look_at():
+    assert unnamed(clusters(), (), ("coke",)) == []

@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from executive.check import Abilities, PlannedWays
+from executive.cli.detector_choice import detector_of
 from executive.cli.promises import promises_of
 from executive.compiler import CompiledTree
 from executive.errors import InputError, did_you_mean
@@ -22,7 +23,7 @@ from plant.worlds.world import World, WorldError, known_worlds, load_world
 from skills.detect.attributes import known_attributes
 from skills.detect.detector_file import MODEL_FILE
 from skills.detect.interim_segmentation import SurfaceSegmentationDetector
-from skills.detect.onnx_detector import SharedDetector
+from skills.detect.onnx_detector import DetectorOptions
 from skills.detection import Detector, NoDetector
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
@@ -72,7 +73,7 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
     `believed` is where the robot believed to be before a restart; it looks for its place in a wide circle then.
 
     Raises:
-        InputError: there is no such robot, or the world's maps cannot be read.
+        InputError: there is no such robot, or the world's maps or the detector's model cannot be read.
     """
     if tree.robot_name not in simulation.robots:
         known = ", ".join(simulation.robots)
@@ -92,8 +93,11 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
 
 @cache
 def shared_detector() -> Detector:
-    """The one detector of this process, loaded when it is first used; none where there is no model."""
-    return SharedDetector() if MODEL_FILE.is_file() else NoDetector()
+    """The one detector of this process, loaded at the first call. Raises InputError when its model cannot be used.
+
+    INTERIM: until a trained model is there, with its folder, nothing is seen in pictures.
+    """
+    return detector_of(MODEL_FILE, DetectorOptions()) if MODEL_FILE.parent.is_dir() else NoDetector()
 
 
 @cache

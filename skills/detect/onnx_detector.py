@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX, Letterbox, fill_letterb
 from skills.detect.suppression import SuppressionOptions, candidates_of, suppress
 from skills.detection import Detection
 
-__all__ = ["DetectorOptions", "OnnxDetector", "SharedDetector", "load_detector"]
+__all__ = ["DetectorOptions", "OnnxDetector", "load_detector"]
 
 Picture = NDArray[np.uint8]
 Floats = NDArray[np.float32]
@@ -76,23 +75,3 @@ class OnnxDetector:
 def load_detector(file: Path = MODEL_FILE, options: DetectorOptions | None = None) -> OnnxDetector:
     """The detector of a file. Raises `skills.detect.detector_file.ModelFileError`."""
     return OnnxDetector(load_model(file), options or DetectorOptions())
-
-
-@dataclass(frozen=True)
-class SharedDetector:
-    """A detector that is loaded when it is first used, and then kept; errors of its file come then."""
-
-    file: Path = MODEL_FILE
-
-    @cached_property
-    def _loaded(self) -> OnnxDetector:
-        return load_detector(self.file)
-
-    @property
-    def class_names(self) -> tuple[str, ...]:
-        """The classes that it knows. Raises ModelFileError."""
-        return self._loaded.class_names
-
-    def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
-        """As `OnnxDetector.detect`. Raises ModelFileError too."""
-        return self._loaded.detect(pictures)

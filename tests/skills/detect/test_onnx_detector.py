@@ -7,7 +7,7 @@ import pytest
 from tiny_detector import CLASSES, picture_of, write_model
 
 from skills.detect.detector_file import ModelFileError
-from skills.detect.onnx_detector import DetectorOptions, SharedDetector, load_detector
+from skills.detect.onnx_detector import DetectorOptions, load_detector
 from skills.detection import Detection
 
 HAMMER = ("hammer", 0.9, (100, 50, 200, 80))
@@ -82,20 +82,17 @@ def test_what_is_no_picture_is_refused(detector, picture):
         detector.detect([picture])
 
 
-def test_the_shared_detector_is_loaded_once_when_it_is_used(file, tmp_path):
-    shared = SharedDetector(file)
+def test_threads_that_share_it_find_the_same(detector):
     found = []
-    threads = [threading.Thread(target=lambda: found.append(shared.detect([picture_of(HAMMER)]))) for _ in range(4)]
+    threads = [threading.Thread(target=lambda: found.append(detector.detect([picture_of(HAMMER)]))) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
     assert len(found) == 4
     assert all(one == found[0] for one in found)
-    assert shared.class_names == CLASSES
 
 
-def test_the_shared_detector_of_a_missing_file_says_so_when_it_is_used(tmp_path):
-    shared = SharedDetector(tmp_path / "missing.onnx")
+def test_the_detector_of_a_missing_file_says_so(tmp_path):
     with pytest.raises(ModelFileError, match=r"missing\.onnx: there is no such model"):
-        shared.detect([picture_of(HAMMER)])
+        load_detector(tmp_path / "missing.onnx")

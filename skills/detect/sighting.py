@@ -26,8 +26,9 @@ class Sighting:
     """One detection with its place in the world.
 
     `covariance` (3, 3) is that of position_W from the camera at capture; `place_covariance` adds the localisation's.
-    `size_m` and `yaw_rad` are as in `ObjectObservation`; `eye_W` is where the camera was; `colours` (N, 3) are those
-    of the thing's own pixels; `surface` is what it rests on, "floor" for the floor, None for what is not known.
+    `size_m` and `yaw_rad` are as in `ObjectObservation`; `eye_W` is where the camera was; `pixels` (N, 2) as (u, v) are
+    the thing's own, as far as depth tells, and `colours` (N, 3) theirs, none in a grey picture; `surface` is what it
+    rests on, "floor" for the floor, None for what is not known.
     """
 
     stamp_s: float
@@ -38,6 +39,7 @@ class Sighting:
     size_m: tuple[float, float, float]
     yaw_rad: float
     eye_W: FloatArray
+    pixels: NDArray[np.int64]
     colours: NDArray[np.uint8]
     surface: str | None
 
@@ -72,6 +74,7 @@ def _sighting(
     p_W = np.asarray(X_WO @ position.p_OT)
     covariance = R_WO @ position.covariance_O @ R_WO.T
     p_WB = X_WO @ image.frames.pose("body").translation() if "body" in image.frames.edges else X_WO.translation()
+    pixels = _pixels(image, position)
     return Sighting(
         stamp_s=image.stamp_s,
         detection=detection,
@@ -81,7 +84,8 @@ def _sighting(
         size_m=(extents.length_m, extents.width_m, extents.height_m),
         yaw_rad=extents.yaw_rad + float(RollPitchYaw(X_WO.rotation()).yaw_angle()),
         eye_W=camera_pose_W(image, X_WO).translation(),
-        colours=_colours(image, position),
+        pixels=pixels,
+        colours=np.empty((0, 3), np.uint8) if image.colour is None else image.colour[pixels[:, 1], pixels[:, 0]],
         surface=surface_below(p_W, p_W[2] - 0.5 * extents.height_m, surfaces),
     )
 
@@ -104,15 +108,12 @@ def _above(surface: Surface, p_W: FloatArray) -> bool:
     return bool(inside_polygon(p_W[None, :2], surface.polygon_W, _SURFACE_MARGIN_M)[0])
 
 
-def _colours(image: Image, position: Position) -> NDArray[np.uint8]:
-    """The colours of the thing's own pixels; none in a grey picture."""
+def _pixels(image: Image, position: Position) -> NDArray[np.int64]:
+    """The thing's own pixels (N, 2)."""
     window, mask = position.fore.window, position.fore.mask
-    if image.colour is None or not np.any(mask):
-        return np.empty((0, 3), dtype=np.uint8)
-    height, width = image.colour.shape[:2]
-    u = np.clip(np.rint(window.u[mask]), 0, width - 1).astype(int)
-    v = np.clip(np.rint(window.v[mask]), 0, height - 1).astype(int)
-    return np.asarray(image.colour[v, u])
+    u = np.clip(np.rint(window.u[mask]), 0, image.intrinsics.width - 1)
+    v = np.clip(np.rint(window.v[mask]), 0, image.intrinsics.height - 1)
+    return np.stack([u, v], axis=1).astype(np.int64)
 
 
 def observation(sighting: Sighting, attributes: tuple[str, ...] = ()) -> ObjectObservation:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Surface
@@ -21,6 +22,8 @@ _FEWEST_POINTS = 40
 _PLANE_BAND_M = 0.05
 _SAME_THING_M = 0.06
 _LEAST_OVERLAP = 0.2
+_LEAST_PART = 0.15
+_GAP_PX = 11
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ def view_surface(image: Image, X_WO: RigidTransform, surface: Surface, margin_m:
     height = cloud.p_W[:, 2] - plane.z(cloud.p_W[:, :2])
     standing = cloud.where(height > max(_LOWEST_M, 3.0 * plane.noise_m))
     p_WC = camera_pose_W(image, X_WO).translation()
-    clusters = tuple(_cluster(points, surface, plane, p_WC) for points in _groups(standing))
+    clusters = tuple(_cluster(points, surface.name, plane, p_WC) for points in _groups(standing))
     return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
 
 
@@ -123,10 +126,33 @@ def _groups(points: PointCloud) -> list[PointCloud]:
     return [group for group in groups if len(group) >= _FEWEST_POINTS]
 
 
-def _cluster(points: PointCloud, surface: Surface, plane: Plane, p_WC: FloatArray) -> Cluster:
+def _cluster(points: PointCloud, surface: str, plane: Plane, p_WC: FloatArray) -> Cluster:
     (u0, v0), (u1, v1) = points.pixels.min(axis=0), points.pixels.max(axis=0)
     shape = measure(points.p_W, plane.z(points.p_W[:, :2]), p_WC)
-    return Cluster(points, surface.name, plane, shape, (int(u0), int(v0), int(u1), int(v1)))
+    return Cluster(points, surface, plane, shape, (int(u0), int(v0), int(u1), int(v1)))
+
+
+def parted(view: SurfaceView, sighting: Sighting) -> SurfaceView:
+    """The view with a detected thing cut out of a cluster that holds others as well, such as two things that touch."""
+    whole = cluster_of(view.clusters, sighting)
+    if whole is None or len(sighting.pixels) == 0:
+        return view
+    own = _own(whole.points.pixels, sighting.pixels)
+    if min(np.count_nonzero(own), np.count_nonzero(~own)) < max(_FEWEST_POINTS, _LEAST_PART * len(own)):
+        return view
+    halves = (whole.points.where(own), whole.points.where(~own))
+    parts = tuple(_cluster(points, whole.surface, whole.plane, sighting.eye_W) for points in halves)
+    others = tuple(each for each in view.clusters if each is not whole)
+    return SurfaceView(view.plane, view.plane_points, (*parts, *others))
+
+
+def _own(pixels: NDArray[np.int64], of_thing: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which pixels (N, 2) lie among those of a thing, which may be only every few of them."""
+    width, height = np.maximum(pixels.max(axis=0), of_thing.max(axis=0)) + 1
+    mask = np.zeros((height, width), dtype=np.uint8)
+    mask[of_thing[:, 1], of_thing[:, 0]] = 1
+    closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((_GAP_PX, _GAP_PX), np.uint8))
+    return np.asarray(closed[pixels[:, 1], pixels[:, 0]] > 0)
 
 
 def cluster_of(clusters: tuple[Cluster, ...], sighting: Sighting) -> Cluster | None:

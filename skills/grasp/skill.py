@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import ClassVar
 
 import numpy as np
@@ -17,7 +18,7 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.looking import cluster_box, cluster_boxes, surface_boxes
 from skills.detect.seeing import DETECTION_LATENCY_S, detections_in
 from skills.detect.sighting import Sighting, sightings
-from skills.detect.surface_view import Cluster, SurfaceView, cluster_of, view_surface
+from skills.detect.surface_view import Cluster, SurfaceView, cluster_of, parted, view_surface
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, plan_grasp
@@ -298,8 +299,11 @@ def _examine(
     found: tuple[Sighting, ...],
 ) -> CloseView | None:
     view = view_surface(image, place.X_WO, surface, margin_m=0.0)
-    cluster = _same_thing(view, seen, found) if view is not None else None
-    if view is None or cluster is None:
+    if view is None:
+        return None
+    view = reduce(parted, found, view)
+    cluster = _same_thing(view, seen, found)
+    if cluster is None:
         return None
     others = [each for each in view.clusters if each is not cluster]
     target_box = cluster_box(cluster, X_WB)

@@ -17,6 +17,7 @@ def sighting(x=1.0, y=0.0, name="coke", score=0.9, eye=(0.0, 0.0, 1.0), sigma=0.
         size_m=(0.07, 0.07, 0.12),
         yaw_rad=0.0,
         eye_W=np.array(eye),
+        pixels=np.empty((0, 2), np.int64),
         colours=np.empty((0, 3), np.uint8),
         surface="table",
     )

@@ -7,7 +7,7 @@ from table_scene import BLUE, CAMERA, COKE, RED, TABLE, Can, scene, seen_as
 
 from skills.api import LocalisationEstimate, Surface
 from skills.detect.sighting import sightings
-from skills.detect.surface_view import cluster_of, view_surface
+from skills.detect.surface_view import cluster_of, parted, view_surface
 from skills.robot import Image
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
@@ -84,6 +84,24 @@ def test_a_detection_beside_all_clusters_has_none():
     (sighting,) = sightings(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
     only_red = tuple(c for c in viewed(image).clusters if c.shape.centre[1] < 0.0)
     assert cluster_of(only_red, sighting) is None
+
+
+def test_a_thing_that_touches_another_is_cut_out_of_their_cluster():
+    beside = Can(COKE.x, COKE.y + 0.068, 0.033, 0.115, BLUE)
+    image = scene([COKE, beside])
+    view = viewed(image)
+    assert len(view.clusters) == 1
+    (sighting,) = sightings(image, PLACE, [seen_as("coke", image)], [TABLE])
+    alone = parted(view, sighting)
+    assert len(alone.clusters) == 2
+    assert cluster_of(alone.clusters, sighting).shape.centre == pytest.approx((COKE.x, COKE.y), abs=0.012)
+
+
+def test_a_thing_for_itself_stays_whole():
+    image = scene([COKE])
+    (sighting,) = sightings(image, PLACE, [seen_as("coke", image)], [TABLE])
+    view = viewed(image)
+    assert parted(view, sighting) is view
 
 
 def test_the_camera_is_where_the_scene_has_it():

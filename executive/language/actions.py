@@ -53,6 +53,7 @@ class Action:
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
 _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
 _FRONTED: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
+_AROUND: Final = frozenset({"around", "by"})
 _IF: Final = "if"
 _OUT_OF: Final = "out of"
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
@@ -112,14 +113,25 @@ def _named_first(fronted: Sequence[Item], clause: Clause) -> bool:
 
 
 def _without_reasons(clauses: Sequence[Clause]) -> Sequence[Clause]:
-    """Leave out what the speakers say that they are about to do themselves, before they say what is to be done."""
+    """Leave out what the speakers say that they are about to do themselves, before or after what is to be done."""
+    if len(clauses) > 1 and _own_affair(clauses[-1].verb) and isinstance(clauses[-2].verb, Verb):
+        items = clauses[-2].items
+        at = next((n for n in range(len(items) - 1, -1, -1) if isinstance(items[n], Chunk)), None)
+        last = None if at is None else items[at]
+        wants = [item.word for item in items[(at or 0) + 1 :] if isinstance(item, Unknown)]
+        if at is not None and isinstance(last, Chunk) and last.phrase.speaker and at > 0 and wants[-1:] == ["to"]:
+            return (*clauses[:-2], replace(clauses[-2], items=items[:at]))
     if len(clauses) < 3 or clauses[0].verb is not None or not isinstance(clauses[2].verb, Verb):
         return clauses
     first, act = clauses[0].items, clauses[1].verb
     wants = [item.word for item in first if isinstance(item, Unknown)]
     speaker = bool(first) and isinstance(first[0], Chunk) and first[0].phrase.speaker
-    own = isinstance(act, Outside) and act.word.lower() not in lexicon().asks
-    return clauses[2:] if speaker and own and wants[-1:] == ["to"] else clauses
+    return clauses[2:] if speaker and _own_affair(act) and wants[-1:] == ["to"] else clauses
+
+
+def _own_affair(verb: Verb | Being | Outside | None) -> bool:
+    """Whether it is nothing that a robot does, and nothing that it is asked for, either."""
+    return isinstance(verb, Outside) and verb.word.lower() not in lexicon().asks
 
 
 def _without_checks(clauses: Sequence[Clause]) -> Iterator[Clause]:
@@ -263,6 +275,8 @@ def _kind(verb: Verb, roles: Roles) -> VerbKind:
 def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     """One action for each place to go to."""
     bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
+    ats = [place for place in roles.ats if not (roles.goals and place.preposition in _AROUND)]
+    roles = replace(roles, ats=ats)
     if len(bare) == 1 and bare[0] is not HERE and len(roles.ats) == 1 and not roles.goals:
         bare = [replace(bare[0], within=roles.ats.pop())]
     if bare and blank.verb.endswith((" down", " up", " along")):
@@ -305,10 +319,14 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
         within, places = (places[0], places[1:]) if objects and places else (None, places)
         places = [*(Location(phrase, within=within) for phrase in objects), *places]
         objects = [roles.searched]
-    extra = [place.text for place in (*places[1:], *_others([HERE, *roles.goals]), *roles.paths)]
+    there = [place for place in roles.goals if place == THERE]
+    places = places or there
+    elsewhere = [] if roles.searched is None else places[1 : len(roles.objects)]
+    unfit = [place for place in roles.goals if place != THERE]
+    extra = [place.text for place in (*places[1 + len(elsewhere) :], *_others([HERE, *unfit]), *roles.paths)]
     found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
     yield found
-    yield from (replace(found, source=place) for place in roles.joined_goals)
+    yield from (replace(found, source=place) for place in (*elsewhere, *roles.joined_goals))
 
 
 def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
@@ -317,7 +335,7 @@ def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     One thing of a kind for each of several places: "a beer to Robin and Charlie".
     """
     goals, sources, ats = list(roles.goals), list(roles.sources), list(roles.ats)
-    if roles.recipient is not None:
+    if roles.recipient is not None and not (roles.favour and ats and blank.kind is VerbKind.PLACE):
         to_place = bool(goals) and not goals[0].person
         rest = [] if to_place and roles.favour else [roles.recipient]
         goals = [*goals, *rest] if to_place else [roles.recipient, *goals]

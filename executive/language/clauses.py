@@ -97,6 +97,7 @@ def without_name(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
     first, *rest = clauses or [Clause(None)]
     content = [item for item in first.items if not isinstance(item, Separator)]
     name = content[0] if len(content) == 1 and isinstance(content[0], Chunk) and content[0].role is None else None
+    joined = any(isinstance(item, Separator) and item.word in ("and", "or") for item in first.items)
     comma = isinstance(first.items[-1], Separator) and first.items[-1].word == "," if first.items else False
-    called = name is not None and (name.phrase.named_person or (comma and name.phrase.proper))
+    called = name is not None and not joined and (name.phrase.named_person or (comma and name.phrase.proper))
     return tuple(rest if first.verb is None and called and rest else clauses)

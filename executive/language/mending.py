@@ -39,7 +39,9 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
     """Leave out the clause or the chunks behind "not"."""
     ahead = _without_separators(rest)
     if ahead and isinstance(ahead[0], Verb) and not (done and isinstance(done[-1], Being)):
-        return done, _behind_clause(ahead)
+        first = next((item.phrase for item in ahead if isinstance(item, Chunk) and item.role is None), None)
+        rest = _behind_clause(ahead)
+        return done, rest if first is None or first.pronoun or first.speaker else _one_of_them(rest, first)
     if ahead and isinstance(ahead[0], Chunk) and not (done and isinstance(done[-1], Being)):
         return done, _told_apart(_behind_chunks(ahead), ahead[0].phrase)
     return [*done, Unknown(mark.word)], rest
@@ -53,6 +55,15 @@ def _behind_clause(ahead: list[Item]) -> list[Item]:
     turn = next(turns, None)
     kept = [] if turn is None or turn + 1 == end else [verb, *clause[turn + 1 : end]]
     return [Separator(","), *kept, *clause[end:]]
+
+
+def _one_of_them(rest: list[Item], negated: Phrase) -> list[Item]:
+    """What follows, with the first "one" for what was negated ("don't take the red cup, take the blue one")."""
+    at = next((n for n, item in enumerate(rest) if isinstance(item, Chunk) and item.role is None), None)
+    new = None if at is None else rest[at]
+    if at is None or not isinstance(new, Chunk) or not new.phrase.stands_for_one:
+        return rest
+    return [*rest[:at], replace(new, phrase=new.phrase.instead_of_one(negated)), *rest[at + 1 :]]
 
 
 def _told_apart(rest: list[Item], negated: Phrase) -> list[Item]:

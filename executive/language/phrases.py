@@ -177,7 +177,8 @@ class Phrase:
     @property
     def kind(self) -> NounKind | None:
         """What kind of thing it is: of "a piece of advice", what the advice is."""
-        return self.of_kind if self.head.lemma in lexicon().quantities and self.of_kind else self.head.kind
+        meant = self.head.lemma in lexicon().quantities or self.head.lemma in _ENDS
+        return self.of_kind if meant and self.of_kind else self.head.kind
 
     @property
     def spoken(self) -> str:
@@ -237,6 +238,8 @@ class Phrase:
         return at + 2 < len(self.tokens) and _number(self.tokens[at]) is not None and self.tokens[at + 1].word in _UNITS
 
 
+_ENDS: Final = frozenset({"end", "start", "beginning", "middle"})
+_POINTING: Final = frozenset({"that", "this", "these", "those"})
 _ALL: Final = "all"
 _UNITS: Final = frozenset(
     """millimetre millimeter centimetre centimeter metre meter inch foot mm cm litre liter ounce pound gram kilo
@@ -278,6 +281,7 @@ def _joined_text(words: Sequence[Token | str]) -> str:
 
 def _is_determiner(token: Token) -> bool:
     said_number = _number(token) is not None or token.word in _VAGUE_NUMBERS
+    said_number = said_number or token.word in _POINTING
     return said_number or token.pos == "DET" or token.tag in ("PRP$", "DT", "PDT", "POS", "WP$") or token.text == "-"
 
 

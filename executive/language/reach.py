@@ -93,7 +93,10 @@ def _moved(deed: Deed) -> bool:
 def _outside(deed: Deed, moved: bool) -> Iterator[str]:
     """The parts of a deed that are out of reach; `moved` says that its thing lies in a place of the house."""
     if deed.target is not None and (
-        deed.target.universal or deed.target.addressed or not (moved or _holdable(deed.target, deed))
+        deed.target.universal
+        or deed.target.addressed
+        or deed.target.counts
+        or not (moved or _holdable(deed.target, deed))
     ):
         yield f"{deed.verb} {deed.target.spoken}"
     for place in (deed.source, deed.goal):

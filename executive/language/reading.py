@@ -25,7 +25,7 @@ from executive.language.nouns import NounKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.row import LONGEST, Row, command_position
-from executive.language.statements import belongs, narrated, needed, told
+from executive.language.statements import belongs, goes_on, narrated, needed, told
 from executive.language.wondering import how_many, where_is
 
 __all__ = ["split_items"]
@@ -35,6 +35,8 @@ _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
 _TIMES: Final = frozenset({"early", "hourly", "daily", "nightly", "weekly", "monthly", "yearly", "annually"})
 _HAVING: Final = frozenset({"with", "containing", "holding"})
 _WITHIN: Final = frozenset({"in", "on"})
+_INSIDE: Final = "inside"
+_FROM: Final = frozenset({"of", "from"})
 _AFTER: Final = frozenset({"after", "upon", "by"})
 _LIKE: Final = "like"
 _SIDES: Final = frozenset({"left", "right"})
@@ -49,7 +51,7 @@ class _Reader(Row):
     def read(self) -> Iterable[Item]:
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
-            *(partial(step, self) for step in (where_is, how_many, told, narrated, needed, belongs)),
+            *(partial(step, self) for step in (where_is, how_many, told, narrated, needed, belongs, goes_on)),
             self._verb,
             self._being,
             self._chunk,
@@ -263,9 +265,12 @@ class _Reader(Row):
         if token.tag == "RB" and token.word.endswith("ly") and token.word not in _TIMES:
             self.at += 1
             return Separator(token.word)
-        if token.pos in ("ADP", "ADV") and behind and behind[0].word in ("here", "there"):
+        if token.pos in ("ADP", "ADV") and token.word not in _FROM and behind and behind[0].word in ("here", "there"):
             self.at += 1
             return Separator("")
+        if token.word == _INSIDE and self._first_told(items):
+            self.at += 1
+            return Chunk(Phrase((replace(token, pos="NOUN", tag="NN", kind=NounKind.PLACE),)), "", PrepositionRole.GOAL)
         if token.word in self.words.here or token.word in self.words.there:
             self.at += 1
             return Adverb(here=token.word in self.words.here)
@@ -278,9 +283,16 @@ class _Reader(Row):
         self.at += len(filler)
         return Separator(" ".join(filler))
 
+    def _first_told(self, items: Sequence[Item]) -> bool:
+        """Whether "inside" is the house itself: no place was spoken of, and the thing was said by its name."""
+        chunks = [item for item in items if isinstance(item, Chunk)]
+        named = bool(chunks) and not chunks[-1].phrase.pronoun
+        return named and all(chunk.role is None for chunk in chunks) and not any(isinstance(i, Being) for i in items)
+
     def _purpose(self, items: Sequence[Item]) -> bool:
         """Whether "to" stands between going and what is gone for ("go to take the broom")."""
-        going = bool(items) and isinstance(items[-1], Verb) and VerbKind.GO in items[-1].kinds
+        last = next((item for item in reversed(items) if isinstance(item, Verb | Being | Outside)), None)
+        going = isinstance(last, Verb) and VerbKind.GO in last.kinds
         behind = self.ahead()
         verb = bool(behind) and behind[0].tag == "VB" and (behind[0].word,) in self.words.verbs
         return going and verb and self.tokens[self.at].tag == "TO"

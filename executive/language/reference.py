@@ -8,6 +8,7 @@ from typing import Final
 
 from executive.language.actions import Action
 from executive.language.lexicon import VerbKind
+from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.refusal import RefusalError
 from executive.language.roles import THERE, Location
@@ -78,6 +79,7 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
     meant = _all_meant(action.objects, memory)
     things = tuple(_named_before(thing, action, kind, before.deeds) or thing for thing in meant)
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
+    _check_back(action, goal, before)
     told = again or any(phrase.stands_for_one for phrase in action.objects)
     source = source or (memory.where if told else None)
     person = next((place for place in (goal, source) if place is not None and place.living), memory.person)
@@ -96,6 +98,15 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
         for same in [again or (thing is not None and thing not in meant)]
     )
     return Resolved((*before.deeds, *deeds), after, (*before.meanings, *_meanings(action, memory)))
+
+
+def _check_back(action: Action, goal: Location | None, before: Resolved) -> None:
+    """Ask what "it" means in "put it next to it" when that would be where the thing was taken from."""
+    phrase = None if action.goal is None else action.goal.phrase
+    taken = before.deeds[-1].source if before.deeds else None
+    again = any(thing.pronoun for thing in action.objects)
+    if again and phrase is not None and phrase.pronoun and goal is not None and goal == taken:
+        raise RefusalError(f"which place is {phrase.text!r}?", [phrase.text], question=True)
 
 
 def _named_before(thing: Phrase, action: Action, kind: VerbKind, deeds: Sequence[Deed]) -> Phrase | None:
@@ -124,9 +135,11 @@ def _stated(action: Action, before: Resolved) -> Resolved:
     at = where if not action.objects else None
     person = before.memory.person if action.teller is None else Location(action.teller, within=at)
     memory = replace(before.memory, where=where, place=where or before.memory.place, person=person)
-    if where is not None and any(phrase.stands_for_somebody for phrase in action.objects) and before.memory.person:
+    somebody = any(phrase.stands_for_somebody for phrase in action.objects)
+    if where is not None and somebody and before.memory.person:
         return _met(replace(before.memory.person, within=where), before)
-    if not any(phrase.pronoun for phrase in action.objects):
+    animal = somebody and any(thing.kind is NounKind.PERSON for thing in before.memory.things)
+    if not animal and not any(phrase.pronoun for phrase in action.objects):
         return replace(before, memory=_told(action, where, memory))
     told = tuple(
         replace(deed, source=where) if deed.target in memory.things and deed.source is None else deed

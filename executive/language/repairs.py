@@ -39,6 +39,8 @@ def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
             found[at] = replace(found[at], relation="compound", head=at + 1)
         elif _named_thing(found, at) or _container(found, at) or _noun(found, at):
             _join_noun(found, at)
+        elif _paired(found, at):
+            found[at] = replace(found[at], pos="NOUN", tag="NN", relation="conj", head=at - 2)
         elif _name(found, at):
             found[at] = replace(found[at], pos="PROPN", tag="NNP", relation="obl", head=at - 1)
         elif _goal(found, at) or _department(found, at):
@@ -97,6 +99,14 @@ def _noun(tokens: Sequence[Token], at: int) -> bool:
     verb = verb or (token.pos == "PROPN" and token.text.islower() and _pos(tokens, at - 1) == "NOUN")
     alone = _pos(tokens, at + 1) in _AFTER_NOUN and not _begins_command(tokens, at)
     return verb and alone and token.kind in (NounKind.PLACE, NounKind.THING)
+
+
+def _paired(tokens: Sequence[Token], at: int) -> bool:
+    """Whether a verb behind a noun and "and" is the second noun of a pair ("a knife and fork")."""
+    token = tokens[at]
+    verb = token.tag in ("VB", "VBP") and token.pos == "VERB" and (token.word,) not in lexicon().verbs
+    pair = at > 1 and tokens[at - 1].word == "and" and tokens[at - 2].kind is NounKind.THING
+    return verb and pair and token.kind is NounKind.THING and _pos(tokens, at + 1) in _AFTER_NOUN
 
 
 def _name(tokens: Sequence[Token], at: int) -> bool:

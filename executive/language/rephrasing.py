@@ -39,7 +39,15 @@ def _smoothed() -> _Written:
     full = lexicon().short_forms
     yield rf"(?<![\w'])(?:{_any(full)})(?![\w'])", lambda match: full[match[0].lower()]
     yield r"\b((?:i|we|you) \w+) to (?=\1\b)", ""
-    yield r"\b(\w+) (?:the|a|an|my|this|that) (?=\1 (?:the|a|an|my|this|that|it)\b)", ""
+    small = "the|a|an|my|this|that|it|them|in|on|to|into|from|at"
+    yield rf"\b(\w+)(?: (?:{small})){{1,3}} (?=\1 (?:{small})\b)", ""
+    yield (
+        (
+            r"\b(?:when|once|whenever|as soon as) you(?:'re| are)(?: not)? "
+            r"(?:free|ready|done|finished|available|busy|back|at it)\b,?"
+        ),
+        "",
+    )
     yield (
         (
             r"\b(?:if|when|whenever|once|as soon as) you(?:'ve)? (?:have|get|got|find|can spare)? ?"
@@ -66,6 +74,8 @@ def _plain() -> _Written:
     """Without praise, titles of tasks and names of endearment; what is told of a place in short."""
     praise = rf"(?:(?:almost|nearly|all|very|so|really)\s+)?(?:{_any(lexicon().praises)})"
     behind = r"(?=\s*[,.!;]|\s+(?:now|then|next|so|please)\b)\W*"
+    yield r"^\W*(?:(?:right|okay|ok|alright|so|well|now|yeah|yes)\b[\s,]+)+(?=\w)", ""
+    yield rf",\s*(?:wait|hold on),?\s+(?=(?:{_any(_verbs())})\b)", ", no, "
     yield rf"(?:^|(?<=[,.!?;])\s*)\W*{praise}(?:[\s,]+{praise})*{behind}", ""
     yield (
         (
@@ -74,6 +84,7 @@ def _plain() -> _Written:
         ),
         "",
     )
+    yield r"^\W*(?:and |now |so )*(?:the )?(?:last|next|first|final) (?:thing|one|step|task),", ""
     yield r"(?:,|\bplease\b)\s*(?:mate|buddy|pal|dude|love|dear|darling|sweetie|honey|bro)\W*$", ""
     yield r"^\W*(?:mate|buddy|pal|dude|bro),", ""
     yield rf"\b(?:which|that)\s+you(?:'ll| will| can| should)?\s+find\s+{_AT}", "that is "

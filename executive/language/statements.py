@@ -10,12 +10,13 @@ from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
 from executive.language.row import Row, command_position
 
-__all__ = ["belongs", "narrated", "needed", "told"]
+__all__ = ["belongs", "goes_on", "narrated", "needed", "told"]
 
 _RELATIVE: Final = frozenset({"that", "which", "what"})
 _PUT: Final = "put"
 _BELONGS: Final = frozenset({"go", "goes", "belong", "belongs"})
 _WHERE: Final = frozenset({"in", "on", "into", "onto", "inside", "under", "next"})
+_WANTS: Final = frozenset({"need", "want", "have", "like", "love", "say", "mean"})
 _NOT: Final = frozenset({"not", "n't", "nt"})
 _BRING: Final = "bring"
 
@@ -73,6 +74,20 @@ def belongs(row: Row, items: list[Item]) -> Item | None:
     ]
     items.insert(first, Verb(_PUT, row.words.verbs[(_PUT,)]))
     return Separator("")
+
+
+def goes_on(row: Row, items: list[Item]) -> Item | None:
+    """ "My back hurts", which is no request by itself."""
+    token = row.tokens[row.at]
+    if token.tag != "VBZ" or token.pos != "VERB" or token.lemma in _WANTS or not items:
+        return None
+    subject = items[-1]
+    if not isinstance(subject, Chunk) or subject.role is not None or not command_position(items[:-1]):
+        return None
+    if any(word.tag.startswith("W") for word in subject.phrase.tokens) or token.lemma in row.words.asks:
+        return None
+    items.pop()
+    return Being(row.take(1), existential=True, asked=False, narrated=True, topic=subject.phrase)
 
 
 def narrated(row: Row, items: list[Item]) -> Item | None:

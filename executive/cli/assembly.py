@@ -24,7 +24,7 @@ from skills.detect.attributes import known_attributes
 from skills.detect.detector_file import MODEL_FILE
 from skills.detect.interim_segmentation import SurfaceSegmentationDetector
 from skills.detect.onnx_detector import DetectorOptions
-from skills.detection import Detector, NoDetector
+from skills.detection import Detector
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
 from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
@@ -93,11 +93,8 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
 
 @cache
 def shared_detector() -> Detector:
-    """The one detector of this process, loaded at the first call. Raises InputError when its model cannot be used.
-
-    INTERIM: until a trained model is there, with its folder, nothing is seen in pictures.
-    """
-    return detector_of(MODEL_FILE, DetectorOptions()) if MODEL_FILE.parent.is_dir() else NoDetector()
+    """The one detector of this process, loaded at the first call. Raises InputError when its model cannot be used."""
+    return detector_of(MODEL_FILE, DetectorOptions())
 
 
 @cache

@@ -13,6 +13,7 @@ from executive.language.phrases import Phrase
 
 __all__ = ["mended"]
 
+_IT: Final = frozenset({"it", "them"})
 _CONTRAST: Final = "but"
 _WHERE_FROM: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.AT, PrepositionRole.BESIDE})
 _WHERE_TO: Final = frozenset({PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE, PrepositionRole.FOR})
@@ -58,12 +59,13 @@ def _behind_clause(ahead: list[Item]) -> list[Item]:
 
 
 def _one_of_them(rest: list[Item], negated: Phrase) -> list[Item]:
-    """What follows, with the first "one" for what was negated ("don't take the red cup, take the blue one")."""
+    """What follows, with "one" or "it" for what was negated ("don't take the red cup, take the blue one")."""
     at = next((n for n, item in enumerate(rest) if isinstance(item, Chunk) and item.role is None), None)
     new = None if at is None else rest[at]
-    if at is None or not isinstance(new, Chunk) or not new.phrase.stands_for_one:
+    if at is None or not isinstance(new, Chunk) or not (new.phrase.stands_for_one or new.phrase.head.word in _IT):
         return rest
-    return [*rest[:at], replace(new, phrase=new.phrase.instead_of_one(negated)), *rest[at + 1 :]]
+    phrase = new.phrase.instead_of_one(negated) if new.phrase.stands_for_one else negated
+    return [*rest[:at], replace(new, phrase=phrase), *rest[at + 1 :]]
 
 
 def _told_apart(rest: list[Item], negated: Phrase) -> list[Item]:

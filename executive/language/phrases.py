@@ -152,7 +152,8 @@ class Phrase:
         """Whether it is who is spoken to, or a thing of theirs ("your phone"): a robot has none."""
         if len(self.tokens) == 1 and self.head.word in ("you", "yourself"):
             return True
-        return self.kind is NounKind.THING and any(t.word == "your" and t.index < self.head.index for t in self.tokens)
+        held = self.kind is NounKind.THING or self.head.lemma in lexicon().fixtures
+        return held and any(t.word == "your" and t.index < self.head.index for t in self.tokens)
 
     @property
     def negative(self) -> bool:

@@ -119,7 +119,7 @@ def _wished() -> _Written:
     yield r"^\W*(?:a|an|one|two|three|four|five|six|some|another|\d{1,2})\s+\w+.*\bplease\W*$", _bring
     said = r"please|alright|ok|okay|hey|hi|hello|so|now|well|yes|right"
     yield rf"^\W*((?:(?:{said})\b[\s,]*)*)robot\b[\s,]*", r"\1"
-    behind = r"\s+(?!(?:you|to|that you|if|whether|what|who|how|where)\b)"
+    behind = r"\s+(?!(?:you|to|that (?:you|the|a|my|this)|if|whether|what|who|how|where)\b)"
     yield rf"\b(?:{_any(lexicon().refusals)}){behind}", ", do not bring "
     yield rf"\b(?:{_any(lexicon().searches)}){behind}", ", find "
     yield rf"\b(?:{_any(lexicon().requests)}){behind}", ", bring me "

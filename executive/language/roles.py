@@ -55,6 +55,7 @@ _RELATIVE: Final = frozenset(
 )
 _JOINTS: Final = frozenset({",", ";", "and", "or", "then", "also", "plus", "second", "but"})
 _CLOSER: Final = (PrepositionRole.AT, PrepositionRole.BESIDE)
+_EVERYONE: Final = frozenset({"everyone", "everybody", "anyone", "anybody"})
 _LISTING: Final = frozenset({",", ""})
 _HERE_NAME: Final = "start"
 HERE: Final = Location(None)
@@ -207,7 +208,9 @@ def _alike(before: Chunk, chunk: Chunk) -> bool:
 
 def _add_bare(roles: Roles, one: _Placed) -> None:
     roles.listed = roles.listed or (bool(one.joint) and bool(roles.objects))
-    if one.chunk.phrase.stands_for_one and roles.objects and one.joint in _LISTING and one.within is None:
+    last = roles.objects[-1] if roles.objects else None
+    told_apart = last is not None and not (last.speaker or last.person) and one.chunk.phrase.stands_for_one
+    if told_apart and one.joint in _LISTING and one.within is None:
         roles.objects[-1] = one.chunk.phrase.instead_of_one(roles.objects[-1])
     elif one.joint and (roles.goals or roles.ats) and not roles.sources and not _another_thing(roles, one.chunk.phrase):
         roles.joined_goals.append(one.location)
@@ -264,7 +267,7 @@ _ADD: Final = {
 
 def _receives(first: Phrase, roles: Roles) -> bool:
     """Whether the first of several bare phrases is given the others: somebody, or an animal."""
-    them = first.stands_for_somebody and not roles.listed
+    them = (first.stands_for_somebody or first.head.word in _EVERYONE) and not roles.listed
     return first.person or them or (first.kind is NounKind.PERSON and not roles.listed)
 
 

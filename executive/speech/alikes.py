@@ -33,7 +33,6 @@ class SoundAlikes:
         kinds = {**dict.fromkeys(others, False), **dict.fromkeys(names, True)}
         self._phrases = tuple((phrase, name) for phrase, name in kinds.items() if sounds_of(phrase))
         self._words = frozenset(word for phrase, _ in self._phrases for word in phrase.lower().split())
-        self._names = frozenset(phrase.lower() for phrase, name in self._phrases if name)
         sounds = [sounds_of(phrase) for phrase, _ in self._phrases]
         letters = sorted(set("".join(sounds)))
         self._code = {letter: number for number, letter in enumerate(letters)}
@@ -48,10 +47,6 @@ class SoundAlikes:
     def knows(self, word: str) -> bool:
         """Whether the word is one of the phrases or stands in one."""
         return word.lower() in self._words
-
-    def is_name(self, words: str) -> bool:
-        """Whether the words, in lower case, are a known name."""
-        return words in self._names
 
     def _of(self, words: str) -> tuple[Alike, ...]:
         """The phrases that sound like `words`, the nearest first; not the very same words."""

@@ -9,7 +9,7 @@ from typing import Final, Generic, TypeVar
 
 from executive.speech.alikes import SoundAlikes
 from executive.speech.recogniser import Recognition, Transcript
-from executive.speech.repair import Reading, Repair, repairs, variants
+from executive.speech.repair import Reading, Repair, repairs
 
 __all__ = ["Interpretation", "interpret"]
 
@@ -46,10 +46,10 @@ def interpret(
     first = transcripts[0]
     text = smoothed(first.text)
     heard = [Repair(text, 0.0, read(text))]
-    if not heard[0].reading.mendable or (heard[0].reading.fits and not recognition.noisy):
+    if not heard[0].reading.mendable or heard[0].reading.fits:
         return Interpretation(text, heard[0].reading.meaning, first.text)
     fitting = _fitting(recognition, heard, read, alikes)
-    best = _likeliest(recognition, heard[0], fitting, read, alikes) or heard[0]
+    best = _likeliest(recognition, heard[0], fitting) or heard[0]
     return Interpretation(best.text, best.reading.meaning, first.text)
 
 
@@ -59,17 +59,12 @@ def _fitting(
     read: Callable[[str], Reading[Meaning]],
     alikes: SoundAlikes,
 ) -> list[Repair[Meaning]]:
-    """The readings that fit: of the first search, or else of those after it, or else what is mended by sound.
-
-    In noise there is always a second search.
-    """
+    """The readings that fit: of the first search, or else of those after it, or else what is mended by sound."""
     likeliest = recognition.transcripts[0].likelihood
     heard = _read(recognition.transcripts, likeliest, heard, read)
     searches = recognition.more()
-    enough = not recognition.noisy
-    while not (enough and any(one.reading.fits for one in heard)) and (readings := next(searches, None)) is not None:
+    while not any(one.reading.fits for one in heard) and (readings := next(searches, None)) is not None:
         heard = _read(readings, likeliest, heard, read)
-        enough = True
     fitting = [one for one in heard if one.reading.fits]
     return fitting or repairs([one for one in heard if one.reading.mendable], read, alikes, most=_MOST_MENDED)
 
@@ -78,17 +73,13 @@ def _likeliest(
     recognition: Recognition,
     first: Repair[Meaning],
     fitting: list[Repair[Meaning]],
-    read: Callable[[str], Reading[Meaning]],
-    alikes: SoundAlikes,
 ) -> Repair[Meaning] | None:
     """The one that is likeliest given the sound, if it is not much less likely than the first reading.
 
-    The readings of a clear sound stand in their order. In noise, names of like sound are tried for those in the first.
+    The recogniser's own readings stand in their order.
     """
-    if not fitting or not (fitting[0].changes or recognition.noisy):
+    if not fitting or not fitting[0].changes:
         return fitting[0] if fitting else None
-    if recognition.noisy:
-        fitting = [*fitting[:_MOST_MENDED], *variants(fitting[0], read, alikes)]
     unmended, *likelihoods = recognition.likelihoods([first.text, *(one.text for one in fitting)])
     weighed = zip(likelihoods, fitting, strict=True)
     best, found = max(weighed, key=lambda pair: pair[0] - _PER_SOUND * pair[1].cost)

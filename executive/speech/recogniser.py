@@ -28,11 +28,6 @@ class Recognition(Protocol):
         """The readings, likeliest first; none when nothing was said."""
         ...
 
-    @property
-    def noisy(self) -> bool:
-        """Whether so much noise is in the sound that the likeliest reading is none too sure."""
-        ...
-
     def more(self) -> Iterator[Sequence[Transcript]]:
         """The readings of further searches, each slower than the one before; each set has its likeliest first."""
         ...

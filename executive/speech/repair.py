@@ -11,13 +11,13 @@ import heapq
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import count, islice
+from itertools import count
 from typing import Final, Generic, TypeVar
 
 from executive.command import is_attribute
 from executive.speech.alikes import Alike, SoundAlikes
 
-__all__ = ["Reading", "Repair", "repairs", "variants"]
+__all__ = ["Reading", "Repair", "repairs"]
 
 Meaning = TypeVar("Meaning")
 
@@ -73,22 +73,6 @@ def repairs(
     return found
 
 
-def variants(
-    heard: Repair[Meaning], read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes, *, most: int = 4
-) -> list[Repair[Meaning]]:
-    """At most so many sentences that fit and have another known name, of like sound, in the place of one of theirs."""
-    words = tuple(heard.text.split())
-    changed = sorted(
-        (alike.cost + _PER_CHANGE, other)
-        for start, end in _named_spans(words, alikes)
-        for alike, other in _replaced(words, start, end, alikes)
-        if alike.name
-    )
-    texts = ((heard.cost + cost, " ".join(other)) for cost, other in changed[: 2 * most])
-    found = (Repair(text, cost, read(text), heard.changes + 1) for cost, text in texts)
-    return list(islice((one for one in found if one.reading.fits), most))
-
-
 def _changed(
     words: tuple[str, ...], suspects: Sequence[str], alikes: SoundAlikes
 ) -> Iterator[tuple[float, tuple[str, ...]]]:
@@ -113,19 +97,6 @@ def _before(words: tuple[str, ...], alike: Alike) -> tuple[str, ...]:
     """The words before a phrase; no comma parts a preposition from them."""
     joins = bool(words) and alike.phrase.split()[0] in _PREPOSITIONS
     return (*words[:-1], words[-1].rstrip(",")) if joins else words
-
-
-def _named_spans(words: Sequence[str], alikes: SoundAlikes) -> list[tuple[int, int]]:
-    """Where known names stand, the longest first."""
-    bare = [_bare(word).lower() for word in words]
-    taken, kept = set[int](), list[tuple[int, int]]()
-    for length in range(_MOST_WORDS, 0, -1):
-        for start in range(len(words) - length + 1):
-            span = set(range(start, start + length))
-            if not taken & span and alikes.is_name(" ".join(bare[start : start + length])):
-                taken |= span
-                kept.append((start, start + length))
-    return kept
 
 
 def _stands(before: Sequence[str], alike: Alike) -> bool:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["RATE_HZ", "Loudness", "Samples", "joined", "level_db", "range_db"]
+__all__ = ["RATE_HZ", "Loudness", "Samples", "joined", "level_db"]
 
 Samples = npt.NDArray[np.float32]
 """Sound of one channel at RATE_HZ; full scale is -1 to 1."""
@@ -56,20 +56,6 @@ def level_db(block: Samples) -> float:
     """The mean power of a block in decibels below full scale (0 is a full square wave), -100 at the least."""
     power = float(np.mean(np.square(block))) if block.size else 0.0
     return max(10.0 * float(np.log10(max(power, 1e-10))), -100.0)
-
-
-def range_db(sound: Samples) -> float:
-    """How far loud moments stand out from quiet ones (dB): a voice in a quiet room by 30 and more, in noise by less.
-
-    Compared are the loudest and the quietest tenth of the pieces of 20 ms.
-    """
-    size = RATE_HZ // 50
-    pieces = sound[: len(sound) - len(sound) % size].reshape(-1, size)
-    if not len(pieces):
-        return 0.0
-    levels_db = 10.0 * np.log10(np.maximum(np.mean(np.square(pieces), axis=1), 1e-10))
-    quiet, loud = np.percentile(levels_db, (10.0, 90.0))
-    return float(loud - quiet)
 
 
 def joined(blocks: Iterable[Samples]) -> Samples:

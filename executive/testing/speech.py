@@ -35,7 +35,6 @@ class ScriptedRecognition:
     wider: Sequence[Transcript] = ()
     likely: Mapping[str, float] = field(default_factory=dict)
     otherwise: float = 0.0
-    noisy: bool = False
 
     def more(self) -> Iterator[Sequence[Transcript]]:
         """The readings of one further search."""

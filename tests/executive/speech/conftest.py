@@ -1,8 +1,10 @@
 """The flat, the parser, and a synthetic voice where one is installed."""
 
 import shutil
+import struct
 import subprocess
 
+import numpy as np
 import pytest
 
 from executive.knowledge import load_knowledge
@@ -39,3 +41,25 @@ def say(tmp_path):
         return wav
 
     return spoken
+
+
+TYPES = {np.dtype("<f4"): 0, np.dtype("<i1"): 1, np.dtype("<i2"): 2, np.dtype("<i4"): 3, np.dtype("<f2"): 4}
+
+
+@pytest.fixture(scope="session")
+def model_bin():
+    """Makes a `model.bin` of variables by name, as CTranslate2's converter writes it."""
+
+    def text(words):
+        return struct.pack("<H", len(words) + 1) + words.encode() + b"\0"
+
+    def variable(name, value):
+        sizes = b"".join(struct.pack("<I", size) for size in value.shape)
+        kind = struct.pack("<BI", TYPES[value.dtype], value.nbytes)
+        return text(name) + struct.pack("<B", value.ndim) + sizes + kind + value.tobytes()
+
+    def made(variables, version=6):
+        head = struct.pack("<I", version) + text("WhisperSpec") + struct.pack("<II", 3, len(variables))
+        return head + b"".join(variable(*one) for one in variables.items()) + struct.pack("<I", 0)
+
+    return made

@@ -62,22 +62,6 @@ def test_what_is_said_to_others_is_left_as_it_was_heard():
     assert meant("Robin get the ranch", "get the wrench") == "Robin get the ranch"
 
 
-def test_in_noise_the_sound_is_asked_about_names_of_like_sound():
-    readings = (Transcript("get the bench", -1.0),)
-    sound = ScriptedRecognition(readings, likely={"get the wrench": 9.0}, noisy=True)
-    assert interpret(sound, read, ALIKES).text == "get the wrench"
-    clear = ScriptedRecognition(readings, likely={"get the wrench": 9.0})
-    assert interpret(clear, read, ALIKES).text == "get the bench"
-
-
-def test_in_noise_a_second_search_is_always_weighed():
-    sound = ScriptedRecognition((Transcript("get the coke", -1.0),), (Transcript("get the bench", -1.0),), noisy=True)
-    assert interpret(sound, read, ALIKES).text == "get the coke"
-    likely = {"get the bench": 5.0}
-    heard = ScriptedRecognition(sound.transcripts, sound.wider, likely, noisy=True)
-    assert interpret(heard, read, ALIKES).text == "get the bench"
-
-
 def test_nothing_said_means_nothing():
     assert interpret(ScriptedRecognition(), read, ALIKES) is None
 

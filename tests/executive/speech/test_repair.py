@@ -3,7 +3,7 @@
 import pytest
 
 from executive.speech.alikes import SoundAlikes
-from executive.speech.repair import Reading, Repair, repairs, variants
+from executive.speech.repair import Reading, Repair, repairs
 
 NAMES = ("wrench", "bench", "desk", "kitchen", "beer", "coke")
 WORDS = ("could you", "would you", "drive to", "bring", "from", "take")
@@ -65,14 +65,3 @@ def test_the_search_ends_however_long_the_sentence():
     heard = Repair("could you bring me the ranch from the nest " * 6, 0.0, Reading("", fits=False))
     assert repairs([heard], never, ALIKES) == []
     assert len(reads) < 50
-
-
-def test_names_of_like_sound_stand_in_for_those_in_a_sentence():
-    sentence = "bring me the wrench from the desk"
-    found = [one.text for one in variants(Repair(sentence, 0.0, read(sentence)), read, ALIKES)]
-    assert "bring me the bench from the desk" in found
-    assert all(text.endswith("desk") or text.startswith("bring me the wrench") for text in found)
-
-
-def test_without_names_there_are_no_variants():
-    assert variants(Repair("bring me", 0.0, read("bring me")), read, ALIKES) == []

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from executive.speech.sound import Loudness, joined, level_db, range_db
+from executive.speech.sound import Loudness, joined, level_db
 from executive.testing.speech import silence, tone
 
 
@@ -33,11 +33,3 @@ def test_levels_are_in_decibels_below_full_scale():
     assert level_db(tone(1.0, height=0.1)) == pytest.approx(-23.01, abs=0.01)
     assert level_db(silence(1.0)) == -100.0
     assert level_db(silence(0.0)) == -100.0
-
-
-def test_noise_narrows_the_range_of_a_sound():
-    clear = np.concatenate([tone(1.0), silence(0.5), tone(1.0)])
-    noise = np.random.default_rng(1).standard_normal(len(clear)).astype(np.float32) * 0.1
-    assert range_db(clear) > 40.0
-    assert range_db(clear + noise) < 22.0
-    assert range_db(silence(0.0)) == range_db(silence(1.0)) == 0.0

@@ -92,6 +92,6 @@ def test_without_the_extra_the_mend_is_told(monkeypatch):
 
 
 def test_damaged_weights_are_told(monkeypatch):
-    monkeypatch.setattr("executive.speech.whisper._SHA256", "0")
+    monkeypatch.setattr("executive.speech.whisper.BASE_SHA256", "0")
     with pytest.raises(InputError, match="damaged"):
         load_whisper()

@@ -1,0 +1,44 @@
+"""`python -m executive.speech.training`: teaches the recogniser to hear in noise, and writes what it learned."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from executive.errors import InputError
+from executive.speech.training.extra import needs_torch
+
+_BAD_INPUT = 2
+
+
+def main() -> int:
+    """Train as the arguments say; 2 when something is missing."""
+    args = _arguments()
+    try:
+        needs_torch()
+        from executive.speech.training.course import Course, train
+        from executive.speech.training.learning import Lessons
+
+        lessons = Lessons(steps=args.steps)
+        train(Course(args.out, args.folder, lessons, args.sentences, args.seed, args.batch, args.jobs))
+    except InputError as error:
+        sys.stderr.write(f"{error}\n")
+        return _BAD_INPUT
+    return 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m executive.speech.training", description=__doc__)
+    parser.add_argument("--out", type=Path, required=True, help="the adapter's file (npz)")
+    parser.add_argument("--folder", type=Path, default=Path("out/speech-training"), help="keeps what was spoken")
+    parser.add_argument("--sentences", type=int, default=4500)
+    parser.add_argument("--steps", type=int, default=300)
+    parser.add_argument("--batch", type=int, default=6, help="sentences of each process in each step")
+    parser.add_argument("--jobs", type=int, default=2, help="processes, each on one core")
+    parser.add_argument("--seed", type=int, default=1)
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,92 @@
+"""Synthetic voices of this machine that speak the training sentences: Debian's flite, espeak-ng and festival.
+
+The voices with which figures are taken (`tests/benchmarks/speech/voices.py`) are none of them.
+"""
+
+from __future__ import annotations
+
+import random
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from executive.errors import InputError
+from executive.speech.sound import Samples, joined
+from executive.speech.wav import read_wav
+
+__all__ = ["Speaker", "drawn_speaker", "speakers", "speech"]
+
+_ACCENTS: Final = ("en-us", "en-us", "en-gb", "en-gb", "en-us-nyc", "en-gb-x-gbclan", "en-gb-x-gbcwmd")
+_VARIANTS: Final = (
+    *("", "", "+m1", "+m2", "+m3", "+m4", "+m5", "+m6", "+m7", "+f1", "+f2", "+f4", "+f5"),
+    *("+klatt", "+klatt2", "+klatt3", "+klatt4", "+adam", "+steph", "+linda", "+belinda", "+john", "+rob", "+michel"),
+)
+
+
+@dataclass(frozen=True)
+class Speaker:
+    """A kind of voice: its program, how often it is drawn, and the arguments of one such voice (with {wav})."""
+
+    name: str
+    program: str
+    weight: float
+    arguments: Callable[[random.Random], tuple[str, ...]]
+
+
+def speakers(left_out: tuple[str, ...] = ()) -> tuple[Speaker, ...]:
+    """The kinds of voices of this machine, without those named.
+
+    Raises:
+        InputError: none of the programs is installed.
+    """
+    found = tuple(one for one in _SPEAKERS if shutil.which(one.program) and one.name not in left_out)
+    if not found:
+        mend = "install them: apt-get install flite festival espeak-ng"
+        raise InputError("no synthetic voice to train with is installed", mend=mend)
+    return found
+
+
+def drawn_speaker(found: tuple[Speaker, ...], draw: random.Random) -> Speaker:
+    """One of them, by their weights."""
+    return draw.choices(found, [one.weight for one in found])[0]
+
+
+def speech(speaker: Speaker, text: str, draw: random.Random) -> Samples:
+    """The text as spoken by a voice of that kind, at RATE_HZ."""
+    with tempfile.TemporaryDirectory() as folder:
+        wav = Path(folder) / "spoken.wav"
+        command = [speaker.program, *(part.format(wav=wav) for part in speaker.arguments(draw))]
+        subprocess.run(command, input=text.encode(), check=True, capture_output=True)
+        return joined(read_wav(wav))
+
+
+def _espeak(draw: random.Random) -> tuple[str, ...]:
+    voice = draw.choice(_ACCENTS) + draw.choice(_VARIANTS)
+    pitch, speed = str(draw.randint(25, 80)), str(draw.randint(120, 190))
+    return ("-v", voice, "-p", pitch, "-s", speed, "-w", "{wav}", "--stdin")
+
+
+def _flite(voice: str) -> Callable[[random.Random], tuple[str, ...]]:
+    def arguments(draw: random.Random) -> tuple[str, ...]:
+        stretch = f"duration_stretch={draw.uniform(0.8, 1.3):.2f}"
+        pitch = f"int_f0_target_mean={draw.uniform(80.0, 190.0):.0f}"
+        return ("-voice", voice, "--setf", stretch, "--setf", pitch, "-f", "/dev/stdin", "-o", "{wav}")
+
+    return arguments
+
+
+def _festival(draw: random.Random) -> tuple[str, ...]:
+    stretch = f"(Parameter.set 'Duration_Stretch {draw.uniform(0.8, 1.3):.2f})"
+    return ("-o", "{wav}", "-eval", "(voice_kal_diphone)", "-eval", stretch)
+
+
+_SPEAKERS: Final = (
+    Speaker("flite-rms", "flite", 0.36, _flite("rms")),
+    Speaker("flite-kal16", "flite", 0.2, _flite("kal16")),
+    Speaker("espeak", "espeak-ng", 0.3, _espeak),
+    Speaker("festival-kal", "text2wave", 0.14, _festival),
+)

@@ -1,0 +1,79 @@
+"""What was learned about noise, added to weights."""
+
+import numpy as np
+import pytest
+
+from executive.errors import InputError
+from executive.speech.adapter import Adapter, LowRank, read_adapter
+from executive.speech.model_file import read_model_file
+
+BASE = "0123"
+DRAW = np.random.default_rng(1)
+WEIGHT = DRAW.normal(size=(6, 4)).astype("<f2")
+CONVOLUTION = DRAW.normal(size=(5, 2, 3)).astype("<f2")
+
+
+def _low_rank(outputs, inputs, rank=2):
+    return LowRank(DRAW.normal(size=(outputs, rank)).astype("<f2"), DRAW.normal(size=(rank, inputs)).astype("<f2"))
+
+
+@pytest.fixture
+def weights(model_bin):
+    return read_model_file(bytearray(model_bin({"a/weight": WEIGHT, "c/weight": CONVOLUTION, "b": WEIGHT[0]})))
+
+
+def test_the_product_is_added_to_its_matrix_only(weights):
+    low_rank = _low_rank(6, 4)
+    Adapter({"a/weight": low_rank}).add_to(weights)
+    wanted = WEIGHT + low_rank.up.astype(float) @ low_rank.down.astype(float)
+    np.testing.assert_allclose(weights["a/weight"], wanted, atol=0.01)
+    np.testing.assert_array_equal(weights["c/weight"], CONVOLUTION)
+
+
+def test_a_convolution_is_a_matrix_of_inputs_times_width(weights):
+    low_rank = _low_rank(5, 6)
+    Adapter({"c/weight": low_rank}).add_to(weights)
+    wanted = CONVOLUTION.reshape(5, 6) + low_rank.up.astype(float) @ low_rank.down.astype(float)
+    np.testing.assert_allclose(weights["c/weight"].reshape(5, 6), wanted, atol=0.01)
+
+
+def test_it_is_the_same_when_it_is_read_again(tmp_path):
+    written = Adapter({"a/weight": _low_rank(6, 4), "c/weight": _low_rank(5, 6)})
+    written.save(tmp_path / "adapter.npz", base=BASE)
+    read = read_adapter((tmp_path / "adapter.npz").read_bytes(), base=BASE)
+    assert read.changes.keys() == written.changes.keys()
+    for name, low_rank in written.changes.items():
+        np.testing.assert_array_equal(read.changes[name].change(), low_rank.change())
+
+
+@pytest.mark.parametrize(
+    ("name", "low_rank"),
+    [
+        ("z/weight", _low_rank(6, 4)),
+        ("a/weight", _low_rank(6, 5)),
+        ("a/weight", LowRank(_low_rank(6, 4, rank=2).up, _low_rank(6, 4, rank=3).down)),
+    ],
+)
+def test_one_that_does_not_fit_is_refused_and_changes_nothing(weights, name, low_rank):
+    with pytest.raises(InputError, match=name) as refused:
+        Adapter({"c/weight": _low_rank(5, 6), name: low_rank}).add_to(weights)
+    assert "python -m executive.speech.training" in refused.value.mend
+    np.testing.assert_array_equal(weights["c/weight"], CONVOLUTION)
+
+
+def _damaged(content):
+    return {"cut off": content[: len(content) // 2], "empty": b"", "another kind": b"no file of numpy's"}
+
+
+@pytest.mark.parametrize("how", ["cut off", "empty", "another kind"])
+def test_a_damaged_file_is_told_with_the_mend(tmp_path, how):
+    Adapter({"a/weight": _low_rank(6, 4)}).save(tmp_path / "a.npz", base=BASE)
+    with pytest.raises(InputError, match="damaged") as refused:
+        read_adapter(_damaged((tmp_path / "a.npz").read_bytes())[how], base=BASE)
+    assert "python -m executive.speech.training" in refused.value.mend
+
+
+def test_one_of_other_weights_is_refused(tmp_path):
+    Adapter({"a/weight": _low_rank(6, 4)}).save(tmp_path / "a.npz", base=BASE)
+    with pytest.raises(InputError, match="other weights"):
+        read_adapter((tmp_path / "a.npz").read_bytes(), base="4567")

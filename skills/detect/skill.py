@@ -41,6 +41,7 @@ _FLOOR_WITHIN_M = 2.2
 _LEAST_SEEN = 0.02
 _CLOSER_LOOKS = 3
 _LOOKED_AT_M = 0.08
+_FRESH_S = 1.5
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,7 @@ class Detect(ArmSkill[DetectInputs]):
                 break
             yield Running(f"looking for {wanted(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
         yield from self._look_closer(inputs, X_HC)
+        yield from self._refresh(inputs, X_HC)
         self.context.publish("surfaces_seen", coverage_message(self.context, self._coverage.shares()))
         return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
 
@@ -149,6 +151,12 @@ class Detect(ArmSkill[DetectInputs]):
             kept, self._clusters = self._clusters, []
             yield from self._look_and_confirm(inputs, X_HC, p_BT, [], close=True)
             self._clusters = kept
+
+    def _refresh(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
+        """Look once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""
+        newest = next(iter(self._found(inputs)), None)
+        if newest is not None and self.context.clock.now() - newest.last_seen_s > _FRESH_S:
+            yield from self._look_and_confirm(inputs, X_HC, self.X_WB().inverse() @ newest.position_W, [])
 
     def _look_and_confirm(
         self,
@@ -192,7 +200,9 @@ class Detect(ArmSkill[DetectInputs]):
         return next((t for t in open_ones if self._tried.get(t.number, 0) < len(_CONFIRM_SHIFTS_RAD)), None)
 
     def _found(self, inputs: DetectInputs) -> list[Track]:
-        return [track for track in self._matching(inputs) if track.confirmed]
+        """The confirmed ones, those seen last first."""
+        confirmed = [track for track in self._matching(inputs) if track.confirmed]
+        return sorted(confirmed, key=lambda track: -track.last_seen_s) if inputs.expected_W is None else confirmed
 
     def _matching(self, inputs: DetectInputs) -> list[Track]:
         """The tracks that are of the classes, show the attributes and lie in the right place; the likeliest first."""

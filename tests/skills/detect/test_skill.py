@@ -98,6 +98,13 @@ def test_all_things_are_counted_when_asked_for():
     assert sum(topic == "object_destination" for topic, _ in log) == 2
 
 
+def test_an_answer_rests_on_a_fresh_picture():
+    robot = ScriptedRobot(things=[COKE, SECOND, BEER, Can(1.3, -0.5, 0.05, 0.1, GREY)])
+    step = outcome(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,), count=0))
+    assert isinstance(step, Succeeded), step
+    assert robot.now() - step.outputs["observation"].stamp_s < 2.0
+
+
 def test_the_look_ends_with_as_many_as_were_asked_for():
     step, _ = found([COKE, SECOND], DetectInputs(("coke",), (TABLE,), count=2))
     assert step.message == "there are two cokes on the table"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
@@ -21,10 +23,13 @@ from skills.detection import Detection, Detector
 
 __all__ = ["detect"]
 
+MOST_TOGETHER: Final = 8
+MOST_PIXELS_TOGETHER: Final = 8_000_000
+
 
 @dataclass(frozen=True)
 class Looked:
-    """What came of one file: what was found and in how many ms, or why it could not be looked at."""
+    """What came of one file: what was found, its share of the time (ms), or why it could not be looked at."""
 
     file: Path
     found: tuple[Detection, ...] = ()
@@ -53,8 +58,8 @@ def detect(
     """
     with refusals():
         detector = detector_of(model, DetectorOptions(threshold=threshold))
-        names = _drawing_names(images, draw)
-        looked = [_look(detector, image, name) for image, name in zip(images, names, strict=True)]
+        names = _drawing_names(images, draw) if draw is not None else {}
+        looked = [one for group in _groups(images) for one in _look(detector, group, names)]
     for one in looked:
         if one.error is not None:
             typer.echo(f"errand: {one.error}", err=True)
@@ -66,29 +71,59 @@ def detect(
         raise typer.Exit(BAD_INPUT)
 
 
-def _look(detector: Detector, file: Path, drawing: Path | None) -> Looked:
-    """What is seen in a file, drawn where wished. Raises InputError when the drawing cannot be written."""
+@dataclass(frozen=True)
+class _Read:
+    """A file, which is the k-th, and its picture, or why there is none."""
+
+    k: int
+    file: Path
+    picture: NDArray[np.uint8] | None = None
+    error: InputError | None = None
+
+
+def _groups(images: Sequence[Path]) -> Iterator[list[_Read]]:
+    """The files read, in groups that are looked at together: some pictures, or one that is very large."""
+    group, pixels = list[_Read](), 0
+    for k, file in enumerate(images):
+        group.append(_read(k, file))
+        picture = group[-1].picture
+        pixels += 0 if picture is None else picture.shape[0] * picture.shape[1]
+        if len(group) >= MOST_TOGETHER or pixels >= MOST_PIXELS_TOGETHER:
+            yield group
+            group, pixels = [], 0
+    if group:
+        yield group
+
+
+def _read(k: int, file: Path) -> _Read:
     try:
-        picture = read_picture(file)
+        return _Read(k, file, read_picture(file))
     except InputError as error:
-        return Looked(file, error=error)
+        return _Read(k, file, error=error)
+
+
+def _look(detector: Detector, group: Sequence[_Read], drawings: Mapping[int, Path]) -> list[Looked]:
+    """What is seen in each file, drawn where wished. Raises InputError when a drawing cannot be written."""
+    pictures = [one.picture for one in group if one.picture is not None]
     begun = time.perf_counter()
-    (found,) = detector.detect([picture])
-    ms = 1000.0 * (time.perf_counter() - begun)
-    if drawing is not None:
-        write_picture(drawing, drawn(picture, found))
-    return Looked(file, found, ms)
+    found = iter(detector.detect(pictures))
+    ms = 1000.0 * (time.perf_counter() - begun) / max(1, len(pictures))
+    looked = [
+        Looked(one.file, error=one.error) if one.picture is None else Looked(one.file, next(found), ms) for one in group
+    ]
+    for read, seen in zip(group, looked, strict=True):
+        if read.picture is not None and read.k in drawings:
+            write_picture(drawings[read.k], drawn(read.picture, seen.found))
+    return looked
 
 
-def _drawing_names(images: Sequence[Path], folder: Path | None) -> list[Path | None]:
+def _drawing_names(images: Sequence[Path], folder: Path) -> dict[int, Path]:
     """Where each picture is drawn: under its own name, numbered where two have the same."""
-    if folder is None:
-        return [None] * len(images)
-    names = list[Path | None]()
+    names = list[Path]()
     for image in images:
         stems = [image.stem, *(f"{image.stem}-{k}" for k in range(2, len(images) + 1))]
         names.append(next(folder / f"{stem}.png" for stem in stems if folder / f"{stem}.png" not in names))
-    return names
+    return dict(enumerate(names))
 
 
 def _show(console: Console, looked: Sequence[Looked]) -> None:

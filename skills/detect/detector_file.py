@@ -41,9 +41,14 @@ class ModelFileError(ValueError):
 
 @dataclass(frozen=True)
 class DetectorModel:
-    """A loaded network and the names of its classes."""
+    """A loaded network and the names of its classes.
+
+    `session` runs one picture on THREADS threads, `single` on the thread that calls it; so many of these may do so at
+    once. The same picture gives the same each time; from one to the other a box may differ in the seventh digit.
+    """
 
     session: onnxruntime.InferenceSession
+    single: onnxruntime.InferenceSession
     class_names: tuple[str, ...]
 
 
@@ -51,13 +56,14 @@ def load_model(file: Path = MODEL_FILE) -> DetectorModel:
     """The network of a file, on two threads, with the same results each time. Raises ModelFileError."""
     content = _read(file)
     _check_seal(file, content)
-    session = _session(file, content)
+    session, single = _session(file, content, THREADS), _session(file, content, 1)
     metadata = session.get_modelmeta().custom_metadata_map
     _check_format(file, metadata)
     names = _class_names(file, metadata)
     _check_ports(file, session, len(names))
-    _try_out(file, session)
-    return DetectorModel(session, names)
+    for one in (session, single):
+        _try_out(file, one)
+    return DetectorModel(session, single, names)
 
 
 def sealed(content: bytes) -> bytes:
@@ -85,19 +91,19 @@ def _check_seal(file: Path, content: bytes) -> None:
         raise ModelFileError(file, "the model of the detector is damaged (it has another digest than it tells)")
 
 
-def _session(file: Path, content: bytes) -> onnxruntime.InferenceSession:
+def _session(file: Path, content: bytes, threads: int) -> onnxruntime.InferenceSession:
     try:
-        return onnxruntime.InferenceSession(content, _session_options(), providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(content, _session_options(threads), providers=["CPUExecutionProvider"])
     except Exception as error:  # the library has no common class of its own for them
         reason = str(error).splitlines()[0][:120]
         raise ModelFileError(file, f"the model of the detector is damaged or no ONNX file ({reason})") from error
 
 
-def _session_options() -> onnxruntime.SessionOptions:
+def _session_options(threads: int) -> onnxruntime.SessionOptions:
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads, options.inter_op_num_threads = THREADS, 1
+    options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
     options.use_deterministic_compute = True
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # idle threads leave the cores to others
+    options.add_session_config_entry("session.force_spinning_stop", "1")  # between pictures the cores are others'
     options.log_severity_level = QUIET
     return options
 

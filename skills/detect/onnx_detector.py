@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from onnxruntime import InferenceSession
 
-from skills.detect.detector_file import MODEL_FILE, DetectorModel, load_model
-from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX, Letterbox, fill_letterbox
+from skills.detect.detector_file import MODEL_FILE, THREADS, DetectorModel, load_model
+from skills.detect.letterbox import Letterbox, letterbox
 from skills.detect.suppression import SuppressionOptions, candidates_of, suppress
 from skills.detection import Detection
 
@@ -22,14 +25,10 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class DetectorOptions:
-    """The least score that is told, how boxes on one thing become one, and how many pictures the network takes at once.
-
-    More at once need more memory and are hardly faster on two cores.
-    """
+    """The least score that is told, and how boxes on one thing become one."""
 
     threshold: float = 0.5
     suppression: SuppressionOptions = field(default_factory=SuppressionOptions)
-    at_once: int = 1
 
 
 @dataclass(frozen=True)
@@ -47,16 +46,18 @@ class OnnxDetector:
     def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
         """What is in each picture, the surest first; boxes in the pictures' own pixels.
 
-        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. Raises ValueError for what is no such picture.
+        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. Several are looked at side by side, each on a thread of
+        its own, which is quicker than all threads on one. Raises ValueError for what is no such picture.
         """
-        step = max(1, self.options.at_once)
-        return [found for k in range(0, len(pictures), step) for found in self._batch(pictures[k : k + step])]
+        if len(pictures) < 2:
+            return [self._look(self.model.session, picture) for picture in pictures]
+        with ThreadPoolExecutor(THREADS) as threads:
+            return list(threads.map(partial(self._look, self.model.single), pictures))
 
-    def _batch(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
-        images = np.empty((len(pictures), HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
-        placed = [fill_letterbox(picture, images[k]) for k, picture in enumerate(pictures)]
-        boxes, scores = self.model.session.run(["boxes", "scores"], {"images": images})
-        return [self._detections(*one) for one in zip(boxes, scores, placed, strict=True)]
+    def _look(self, session: InferenceSession, picture: Picture) -> tuple[Detection, ...]:
+        image, placed = letterbox(picture)
+        boxes, scores = session.run(["boxes", "scores"], {"images": image[None]})
+        return self._detections(boxes[0], scores[0], placed)
 
     def _detections(self, boxes: Floats, scores: Floats, placed: Letterbox) -> tuple[Detection, ...]:
         """The things of one picture from the network's boxes (A, 4) and scores (A, K)."""

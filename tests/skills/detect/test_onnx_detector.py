@@ -62,9 +62,15 @@ def test_grey_pictures_are_taken(detector):
 
 def test_pictures_of_several_sizes_at_once_are_each_judged_alone(file):
     pictures = [picture_of(HAMMER), np.zeros((7, 900), np.uint8), picture_of(("beer", 0.7, (0, 0, 50, 50)))]
-    one_by_one = load_detector(file).detect(pictures)
-    assert [len(found) for found in one_by_one] == [1, 0, 1]
-    assert load_detector(file, DetectorOptions(at_once=2)).detect(pictures) == one_by_one
+    detector = load_detector(file)
+    together = detector.detect(pictures)
+    assert [len(found) for found in together] == [1, 0, 1]
+    assert together == [detector.detect([picture])[0] for picture in pictures]
+
+
+def test_one_that_is_no_picture_among_others_is_refused(detector):
+    with pytest.raises(ValueError, match="a picture is"):
+        detector.detect([picture_of(HAMMER), np.zeros((4, 4)), picture_of(HAMMER)])
 
 
 def test_no_pictures_no_detections(detector):

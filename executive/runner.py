@@ -26,7 +26,7 @@ from executive.snapshot import Snapshot
 from executive.tree_run import Ending
 from executive.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, tick_watch
 from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
-from skills.detection import NoDetector
+from skills.detection import NO_DETECTOR
 from skills.robot import Clock, LeaseError, Robot
 
 HOLDER = "errand"
@@ -41,7 +41,7 @@ class RunEntry:
     localiser: Localiser
     costmap: Costmap
     journal: Journal | None = None
-    detector: Detector = NoDetector()
+    detector: Detector = NO_DETECTOR
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
+from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
-from skills.detection import NoDetector
 from skills.robot import Clock, Lease, Pose2D, Robot, Scan
 
 ResultT = TypeVar("ResultT")
@@ -255,7 +255,7 @@ class SkillContext:
     publish: Publish
     seed: int
     ask: Ask = nobody_to_ask
-    detector: Detector = NoDetector()
+    detector: Detector = NO_DETECTOR
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""

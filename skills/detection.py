@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Detection", "Detector", "NoDetector", "NoDetectorError"]
+__all__ = ["NO_DETECTOR", "Detection", "Detector", "NoDetector", "NoDetectorError"]
 
 
 @dataclass(frozen=True)
@@ -49,3 +49,6 @@ class NoDetector:
     def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
         """Raises NoDetectorError."""
         raise NoDetectorError("there is no detector here: put one into the context's field 'detector'")
+
+
+NO_DETECTOR: Final = NoDetector()

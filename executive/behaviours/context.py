@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from executive.behaviours.board import Board
 from skills.api import Ask, Costmap, Detector, Localiser, Publish, SkillContext, Worker, nobody_to_ask
-from skills.detection import NoDetector
+from skills.detection import NO_DETECTOR
 from skills.robot import Clock, Lease, Robot
 
 
@@ -40,7 +40,7 @@ class RunContext:
     seed: int
     board: Board
     ask: Ask = nobody_to_ask
-    detector: Detector = NoDetector()
+    detector: Detector = NO_DETECTOR
     stop_pressed: Callable[[], str | None] = never_pressed
 
     def for_skill(self, path_id: str) -> SkillContext:

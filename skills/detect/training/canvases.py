@@ -35,7 +35,8 @@ class CanvasOptions:
     """Size of a canvas in pixels and how it is made.
 
     `mosaic` is the share of canvases of four pictures, `focused` the share of windows about a thing where there is
-    one. Scales are drawn evenly in their logarithm. `whole` takes whole pictures, turned and scaled only a little.
+    one. Scales are drawn evenly in their logarithm. `changed` is the share of canvases with other light and colours.
+    `whole` takes whole pictures, turned and scaled only a little.
     """
 
     width_px: int = 320
@@ -43,6 +44,7 @@ class CanvasOptions:
     mosaic: float = 0.5
     focused: float = 0.8
     scales: tuple[float, float] = (0.5, 1.5)
+    changed: float = 1.0
     whole: bool = False
 
 
@@ -68,7 +70,9 @@ class CanvasMaker:
         cells = _four(options, random) if several else [Cell(0, 0, options.width_px, options.height_px)]
         others = random.integers(0, len(self.pictures), len(cells) - 1).tolist()
         parts = [self._fill(canvas, cell, k, options, random) for cell, k in zip(cells, [index, *others], strict=True)]
-        return Canvas(as_seen_otherwise(canvas, random), joined(parts))
+        if random.random() < options.changed:
+            canvas = as_seen_otherwise(canvas, random)
+        return Canvas(canvas, joined(parts))
 
     def _fill(
         self, canvas: Picture, cell: Cell, index: int, options: CanvasOptions, random: np.random.Generator
@@ -123,9 +127,9 @@ def _chosen(labels: Labels, options: CanvasOptions, random: np.random.Generator)
 def _turn(random: np.random.Generator) -> float:
     """An angle: mostly about upright, sometimes by a right angle or two, as the body's cameras sit, or any."""
     kind = random.random()
-    if kind < 0.1:
+    if kind < 0.05:
         return float(random.uniform(-np.pi, np.pi))
-    quarter = 0.0 if kind < 0.75 else float(random.integers(1, 4)) * _RIGHT_ANGLE
+    quarter = 0.0 if kind < 0.85 else float(random.integers(1, 4)) * _RIGHT_ANGLE
     return quarter + float(random.normal(0.0, 0.15))
 
 
@@ -135,7 +139,7 @@ def _whole(_labels: Labels, cell: Cell, options: CanvasOptions, random: np.rando
     fit = min(cell.size[0] / WIDTH_PX, cell.size[1] / HEIGHT_PX)
     scale = fit * float(np.exp(random.uniform(*np.log(options.scales))))
     reach = np.array(cell.size) * 0.1
-    upright = random.random() < 0.5
+    upright = random.random() < 0.8
     angle = float(random.normal(0.0, 0.05)) + (0.0 if upright else float(random.integers(0, 4)) * _RIGHT_ANGLE)
     flipped = bool(random.random() < 0.5)
     to = (cell.middle + random.uniform(-reach, reach)).astype(np.float32)

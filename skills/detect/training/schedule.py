@@ -15,9 +15,9 @@ from skills.detect.training.canvases import CanvasOptions
 __all__ = ["Budget", "Phase", "Schedule", "shuffled"]
 
 _SMALL: Final = CanvasOptions(256, 192, mosaic=0.3, scales=(0.4, 1.4))
-_WINDOWS: Final = CanvasOptions(320, 256, mosaic=0.5, scales=(0.4, 1.5))
-_LARGER: Final = CanvasOptions(448, 352, mosaic=0.3, scales=(0.5, 1.4))
-_PICTURES: Final = CanvasOptions(640, 480, mosaic=0.0, scales=(0.8, 1.25), whole=True)
+_WINDOWS: Final = CanvasOptions(320, 256, mosaic=0.5, scales=(0.4, 1.5), changed=0.8)
+_LARGER: Final = CanvasOptions(448, 352, mosaic=0.3, scales=(0.5, 1.4), changed=0.7)
+_PICTURES: Final = CanvasOptions(640, 480, mosaic=0.0, scales=(0.8, 1.25), changed=0.5, whole=True)
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Schedule:
     last_share: float = 0.02
     warm_up_steps: int = 100
     phases: Sequence[Phase] = field(
-        default=(Phase(0.0, _SMALL, 16), Phase(0.3, _WINDOWS, 16), Phase(0.65, _LARGER, 8), Phase(0.84, _PICTURES, 4)),
+        default=(Phase(0.0, _SMALL, 16), Phase(0.45, _WINDOWS, 16), Phase(0.75, _LARGER, 8), Phase(0.88, _PICTURES, 4)),
     )
 
     def rate(self, step: int, progress: float) -> float:

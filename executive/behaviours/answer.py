@@ -22,7 +22,8 @@ class Answer(ExplainedDecorator):
     Child RUNNING: RUNNING. Child SUCCESS: SUCCESS, answer True. Child FAILURE with every surface looked at: SUCCESS,
     answer False. Child FAILURE with a surface that could not be looked at: FAILURE with what kept the robot from it.
     `looks` names for each surface the leaves that look at it, one for each viewpoint: all of them must have looked,
-    which means that they failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`.
+    which means that they failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; one that
+    `tells` repeats what was seen where, and how many.
     """
 
     def __init__(
@@ -36,11 +37,12 @@ class Answer(ExplainedDecorator):
         key: str,
         board: Board,
         publish: Publish,
+        tells: bool = False,
     ) -> None:
         super().__init__(path_id=path_id, name=name, child=child)
         self.answer: bool | None = None
         self._question, self._looks, self._key, self._board = question, looks, key, board
-        self._publish = publish
+        self._publish, self._tells = publish, tells
 
     def initialise(self) -> None:
         """Forget an earlier answer."""
@@ -60,7 +62,8 @@ class Answer(ExplainedDecorator):
 
     def _answered(self, answer: bool) -> Status:
         self.answer, self.cause = answer, None
-        self.message = f"{'yes' if answer else 'no'}: {self._question}"
+        found = f"; {self.message}" if answer and self._tells else ""
+        self.message = f"{'yes' if answer else 'no'}: {self._question}{found}"
         self._board.put(self._key, answer)
         told = {"node": self.path_id, "question": self._question, "answer": answer, "message": self.message}
         self._publish(ANSWER_TOPIC, told)

@@ -215,12 +215,16 @@ class HoldingPlan(DecoratorPlan):
 
 @dataclass(frozen=True, kw_only=True)
 class AnswerPlan(DecoratorPlan):
-    """Turns the search below into a yes or no; `looks` names for each surface the leaves that look at it."""
+    """Turns the search below into a yes or no; `looks` names for each surface the leaves that look at it.
+
+    One that `tells` says what was seen, too: where, and how many.
+    """
 
     kind: ClassVar[str] = "answer"
     question: str
     looks: tuple[tuple[str, tuple[str, ...]], ...]
     key: str
+    tells: bool = False
 
     def writes(self) -> Mapping[str, Any]:
         """The answer."""
@@ -237,4 +241,5 @@ class AnswerPlan(DecoratorPlan):
             key=self.key,
             board=context.board,
             publish=context.publish,
+            tells=self.tells,
         )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Final
 
 from executive.behaviours.board import FromBoard, SurfaceOfSighting, beside
@@ -15,6 +16,9 @@ from executive.errors import listing
 from executive.knowledge import Knowledge
 from skills.api import Cause, ObjectObservation
 
+Ports = Mapping[str, object]
+
+NO_PORTS: Final[Ports] = MappingProxyType({})
 MOST_ELSEWHERE: Final = 3
 MOST_ASIDE: Final = 2
 ASIDE_M: Final = 0.45
@@ -45,32 +49,29 @@ def surfaces_elsewhere(
 
 
 def look_plans(
-    shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str, *, floor: bool = False
+    shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str, extra: Ports = NO_PORTS
 ) -> tuple[tuple[str, SequencePlan], ...]:
-    """For each surface and viewpoint: drive there and look. The sighting goes to `key`.
-
-    With `floor` a thing on the floor about there will do as well.
-    """
+    """For each surface and viewpoint: drive there and look. The sighting goes to `key`; `extra` are detect's."""
     views = [(name, n) for name in surfaces for n in range(1, len(shop.knowledge.surfaces[name].viewpoints) + 1)]
-    return tuple((name, _look_plan(shop.at(f"{name}-{n}"), thing, name, n, key, floor)) for name, n in views)
+    return tuple((name, _look_plan(shop.at(f"{name}-{n}"), thing, name, n, key, extra)) for name, n in views)
 
 
-def _look_plan(shop: Workshop, thing: Thing, surface: str, number: int, key: str, floor: bool) -> SequencePlan:
+def _look_plan(shop: Workshop, thing: Thing, surface: str, number: int, key: str, extra: Ports) -> SequencePlan:
     view = shop.knowledge.surfaces[surface].viewpoints[number - 1]
     return shop.sequence(
         f"look at {surface}" + (f" ({number})" if number > 1 else ""),
         shop.navigate(pose_2d(view)),
-        detect_plan(shop, thing, (surface,), key, floor=floor),
+        detect_plan(shop, thing, (surface,), key, extra),
     )
 
 
 def detect_plan(
-    shop: Workshop, thing: Thing, surfaces: tuple[str, ...] | FromBoard, key: str, *, floor: bool = False
+    shop: Workshop, thing: Thing, surfaces: tuple[str, ...] | FromBoard, key: str, extra: Ports = NO_PORTS
 ) -> NodePlan:
     """Look for the thing on some surfaces, by name or from the blackboard, from where the robot stands."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(shop.surface, surfaces))
     ports = {"classes": shop.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
-    return shop.skill("detect", {**ports, "floor": True} if floor else ports, {"observation": key})
+    return shop.skill("detect", {**ports, **extra}, {"observation": key})
 
 
 def find_again_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodePlan:

@@ -53,13 +53,14 @@ def grasp_plan(shop: Workshop, *, anywhere: bool = True) -> NodePlan:
 
 
 def find_plan(shop: Workshop) -> NodePlan:
-    """Look at every surface of the place and answer yes or no."""
+    """Look at every surface of the place and answer yes or no; where it is asked where or how many, tell that, too."""
     thing = _required(shop, shop.command.object)
     place = None if shop.command.goal is None else shop.place(shop.command.goal)
     surfaces = required_surfaces(shop, thing, place)
     below = shop.at("search")
     whole_room = place is None or place in shop.knowledge.places
-    looks = look_plans(below, thing, surfaces, f"{shop.path_id}/sighting", floor=whole_room)
+    extra = {"floor": whole_room, "count": shop.command.object_count}
+    looks = look_plans(below, thing, surfaces, f"{shop.path_id}/sighting", extra)
     search = SelectorPlan(
         path_id=below.path_id, name=f"look for {thing}", source=shop.source, steps=tuple(look for _, look in looks)
     )
@@ -72,6 +73,7 @@ def find_plan(shop: Workshop) -> NodePlan:
         question=f"{thing} {where(place)}",
         looks=tuple(leaves.items()),
         key=f"{shop.path_id}/answer",
+        tells=place is None or shop.command.object_count != 1,
     )
     return tidied(shop.at("tidy"), answer)
 

@@ -227,6 +227,7 @@ class DetectInputs:
     attributes: tuple[str, ...]
     surfaces: tuple[Surface, ...]
     floor: bool = False
+    count: int = 1
 
 
 @dataclass(frozen=True)

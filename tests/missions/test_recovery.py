@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -51,11 +52,7 @@ class Mission:
 
     def run(self, robot=None, observer=None):
         """Run it to its end; the robot's result and the referee's verdict."""
-        entry = (
-            self.entry
-            if robot is None
-            else type(self.entry)(self.tree, robot, self.entry.localiser, self.entry.costmap)
-        )
+        entry = self.entry if robot is None else replace(self.entry, robot=robot)
         clock = self.simulation.clock
         result = run(
             [entry],

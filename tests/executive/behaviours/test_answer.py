@@ -21,7 +21,7 @@ class Look(Explained, py_trees.behaviour.Behaviour):
         return Status.SUCCESS if self.fails_with is None else Status.FAILURE
 
 
-def answer_of(context, *causes: Cause | None) -> Answer:
+def answer_of(context, *causes: Cause | None, tells: bool = False) -> Answer:
     looks = [Look(f"alice/q/{n}", cause) for n, cause in enumerate(causes)]
     root = Answer(
         path_id="alice/q",
@@ -32,6 +32,7 @@ def answer_of(context, *causes: Cause | None) -> Answer:
         key="alice/q/answer",
         board=context.board,
         publish=context.publish,
+        tells=tells,
     )
     root.tick_once()
     return root
@@ -41,6 +42,13 @@ def test_a_sighting_is_a_yes(context):
     root = answer_of(context, Cause.POSTCONDITION, None, Cause.POSTCONDITION)
     assert (root.status, root.answer, root.message) == (Status.SUCCESS, True, "yes: hammer in the workshop")
     assert context.board.get("alice/q/answer") is True
+
+
+def test_an_answer_may_tell_what_was_seen(context):
+    root = answer_of(context, Cause.POSTCONDITION, None, tells=True)
+    assert root.message == "yes: hammer in the workshop; None"
+    unseen = answer_of(context, *[Cause.POSTCONDITION] * 3, tells=True)
+    assert unseen.message == "no: hammer in the workshop"
 
 
 def test_an_answer_is_published_and_a_missed_view_is_none(context, published):

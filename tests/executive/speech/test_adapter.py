@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from executive.errors import InputError
-from executive.speech.adapter import Adapter, LowRank, read_adapter
+from executive.speech import adapter
+from executive.speech.adapter import Adapter, LowRank, packaged_adapter, read_adapter
 from executive.speech.model_file import read_model_file
+from executive.speech.whisper import BASE_SHA256
 
 BASE = "0123"
 DRAW = np.random.default_rng(1)
@@ -77,3 +79,17 @@ def test_one_of_other_weights_is_refused(tmp_path):
     Adapter({"a/weight": _low_rank(6, 4)}).save(tmp_path / "a.npz", base=BASE)
     with pytest.raises(InputError, match="other weights"):
         read_adapter((tmp_path / "a.npz").read_bytes(), base="4567")
+
+
+def test_the_packaged_one_belongs_to_the_published_weights():
+    packaged = packaged_adapter(base=BASE_SHA256)
+    assert len(packaged.changes) == 2 + 6 * 4 + 6 * 7
+    assert all(0 not in low_rank.shape for low_rank in packaged.changes.values())
+    assert all(np.isfinite(low_rank.change()).all() for low_rank in packaged.changes.values())
+
+
+def test_a_missing_one_is_told_with_the_mend(monkeypatch):
+    monkeypatch.setattr(adapter, "_FILE", "nowhere.npz")
+    with pytest.raises(InputError, match="missing") as refused:
+        packaged_adapter(base=BASE_SHA256)
+    assert "python -m executive.speech.training" in refused.value.mend

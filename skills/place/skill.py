@@ -29,6 +29,7 @@ _SURELY_FREE_M = 0.135
 _LOWEST_M = 0.02
 _STEP_M = 0.008
 _CONTACT_M = 0.005
+_RELAX_M = 0.003
 _SEEN_AGAIN_M = 0.12
 _FEEL_S = 0.4
 _OVER_SPOT_M = 0.45
@@ -153,7 +154,10 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self.move_to(goal, f"bringing the thing over the {surface.name}", speed_rad_s=0.8)
 
     def _lower(self, surface: Surface) -> Routine[None]:
-        """Go down in small steps until the arm is held up, by contact, or the height is that of the surface."""
+        """Go down in small steps until the arm is held up, by contact, or the height is that of the surface.
+
+        After contact the arm no longer presses, or it would dip onto the surface as the jaw lets go.
+        """
         message = f"putting the thing down on the {surface.name}"
         yield from self.shift_hand(np.array([0.0, 0.0, _SURELY_FREE_M - ABOVE_M]), message)
         q_wanted = self.q_rad()
@@ -169,6 +173,7 @@ class Place(ArmSkill[PlaceInputs]):
             q_wanted = path[-1]
             yield from self.follow(time_path(path, speed_rad_s=0.3), message)
             if self._hand_z() - float(X_BH.translation()[2]) + rest_m > _CONTACT_M:
+                yield from self.try_shift_hand(np.array([0.0, 0.0, _RELAX_M]), message)
                 return
 
     def _let_go(self) -> Routine[None]:

@@ -88,7 +88,7 @@ class TrackBook:
 
     def update(self, seen: Sequence[Sighting], in_plain_view: Callable[[Track], bool]) -> tuple[Track, ...]:
         """Take in all sightings of one picture; `in_plain_view` tells of a track whether the picture should show it."""
-        before = tuple(self._tracks.values())
+        before, seen = tuple(self._tracks.values()), distinct(seen)
         pairs = _matched(before, seen)
         for track in before:
             if track.number not in pairs.values() and in_plain_view(track):
@@ -121,6 +121,20 @@ class TrackBook:
             del self._tracks[track.number]
         else:
             self._tracks[track.number] = replace(track, belief=belief, missed=track.missed + 1)
+
+
+def distinct(seen: Sequence[Sighting]) -> tuple[Sighting, ...]:
+    """The sightings of one picture without those of a thing that was detected as two: of two classes at one place."""
+    kept: list[Sighting] = []
+    for one in sorted(seen, key=lambda sighting: -sighting.detection.score):
+        if not any(_is_same_thing(one, other) for other in kept):
+            kept.append(one)
+    return tuple(kept)
+
+
+def _is_same_thing(one: Sighting, other: Sighting) -> bool:
+    apart_m = float(np.linalg.norm(one.position_W - other.position_W))
+    return one.class_name != other.class_name and apart_m < _NEAR_M
 
 
 def _matched(tracks: Sequence[Track], seen: Sequence[Sighting]) -> dict[int, int]:

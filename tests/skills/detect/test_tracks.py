@@ -64,6 +64,12 @@ def test_two_things_in_one_picture_are_never_one_track():
     assert len(book_of(close, close).snapshot()) == 2
 
 
+def test_one_thing_that_is_detected_as_two_is_the_surer_one():
+    both = [sighting(name="beer", score=0.55), sighting(1.01, name="coke", score=0.8)]
+    (track,) = book_of(both, both).snapshot()
+    assert track.class_name == "coke"
+
+
 def test_a_thing_of_another_class_is_another_thing_unless_it_is_at_the_very_place():
     sure = [[sighting()], [sighting()], [sighting()]]
     assert len(book_of(*sure, [sighting(1.04, name="hammer")]).snapshot()) == 2

@@ -17,6 +17,7 @@ from skills.robot import FloatArray, Image
 _CELL_M = 0.05
 _OUT, _HIDDEN, _SEEN = 0, 1, 2
 _NEAR_M, _NEAR_SHARE = 0.04, 0.02
+_MUCH = 0.04
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,11 @@ class Coverage:
                 state = np.where(seen < depth - _NEAR_M - _NEAR_SHARE * depth, _HIDDEN, _SEEN)
             state = np.where(np.isfinite(depth) & np.isfinite(seen), state, _OUT)
             self._states[name] = np.maximum(self._states[name], state.astype(np.int8))
+
+    def hidden_middle_W(self) -> Mapping[str, FloatArray]:
+        """For each surface of which a good part was hidden, the middle of that part."""
+        hidden = {name: self._points[name][states == _HIDDEN] for name, states in self._states.items()}
+        return {n: points.mean(axis=0) for n, points in hidden.items() if len(points) > _MUCH * len(self._points[n])}
 
     def shares(self) -> Mapping[str, SurfaceShares]:
         """The shares of each surface by its name."""

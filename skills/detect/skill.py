@@ -42,6 +42,7 @@ _LEAST_SEEN = 0.02
 _CLOSER_LOOKS = 3
 _LOOKED_AT_M = 0.08
 _FRESH_S = 1.5
+_AROUND_RAD = (0.7, -0.7)
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,7 @@ class Detect(ArmSkill[DetectInputs]):
                 break
             yield Running(f"looking for {wanted(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
         yield from self._look_closer(inputs, X_HC)
+        yield from self._look_around(inputs, X_HC)
         yield from self._refresh(inputs, X_HC)
         self.context.publish("surfaces_seen", coverage_message(self.context, self._coverage.shares()))
         return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
@@ -152,6 +154,15 @@ class Detect(ArmSkill[DetectInputs]):
             yield from self._look_and_confirm(inputs, X_HC, p_BT, [], close=True)
             self._clusters = kept
 
+    def _look_around(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
+        """Look from either side at what something hides."""
+        for p_W in self._coverage.hidden_middle_W().values() if inputs.expected_W is None else ():
+            for shift_rad in _AROUND_RAD:
+                if self._has_enough(inputs):
+                    return
+                p_BT = self.X_WB().inverse() @ p_W
+                yield from self._look_and_confirm(inputs, X_HC, p_BT, [], shift_rad=shift_rad)
+
     def _refresh(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
         """Look once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""
         newest = next(iter(self._found(inputs)), None)
@@ -166,10 +177,11 @@ class Detect(ArmSkill[DetectInputs]):
         blocked: list[SkillFailure],
         *,
         close: bool = False,
+        shift_rad: float = 0.0,
     ) -> Routine[None]:
         """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
         try:
-            yield from self.look(inputs, X_HC, p_BT, 0.0, close=close)
+            yield from self.look(inputs, X_HC, p_BT, shift_rad, close=close)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -227,7 +239,10 @@ class Detect(ArmSkill[DetectInputs]):
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
             near = close_stations(self.model.p_BS, p_BT, shift_rad) if close else []
-            return look_configuration(scene, X_HC, [*near, *overview_stations(self.model, p_BT, shift_rad)], p_BT, q)
+            far = overview_stations(self.model, p_BT, shift_rad)
+            if abs(shift_rad) >= max(_AROUND_RAD):
+                far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
+            return look_configuration(scene, X_HC, [*near, *far], p_BT, q)
 
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)

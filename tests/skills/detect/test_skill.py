@@ -137,6 +137,17 @@ def test_a_hidden_part_of_the_surface_is_told():
     assert next(m["surfaces"]["table"]["hidden"] for topic, m in log if topic == "surfaces_seen") > 0.02
 
 
+def test_what_something_hides_is_looked_at_from_the_side():
+    wall = Can(1.0, 0.0, 0.06, 0.30, GREY)
+    hidden = Can(1.17, 0.0, 0.033, 0.115, RED)
+    log = []
+    step = outcome(Detect(context_of(ScriptedRobot(things=[wall, hidden]), log)), DetectInputs(("coke",), (TABLE,)))
+    seen_in = [bool(m["detections"]) for topic, m in log if topic == "detections"]
+    assert not any(seen_in[:2])
+    assert isinstance(step, Succeeded), step
+    assert step.outputs["observation"].position_W == pytest.approx((hidden.x, hidden.y, 0.8075), abs=0.03)
+
+
 def test_without_light_and_depth_nothing_was_looked_at():
     robot = ScriptedRobot()
     failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.EXECUTION, "it is dark")

@@ -99,6 +99,8 @@ class _Change:
         if isinstance(plan, SkillPlan):
             ports = {port: self.memory.board[key] for port, key in plan.outputs if key in self.memory.board}
             skill = resumed_skill(plan.skill, plan.path_id, ports, self.recollection)
+            bound = {port for port, _ in plan.outputs}
+            skill.outputs = {port: kind for port, kind in plan.skill.outputs.items() if port in bound}
             return dataclasses.replace(plan, skill=skill)
         if isinstance(plan, OnlyIfKnownPlan | OnlyIfHoldingPlan) and self._was_reached(plan.path_id):
             return _built(plan, lambda node: _applies_as_before(node, self._begun(plan.path_id)))

@@ -143,12 +143,12 @@ class _Course:
 
     def run(self) -> None:
         """Learn until the time is over, then write the file."""
+        if self._done() >= 1.0:
+            self._examine()
         while (done := self._done()) < 1.0:
             self._step(done)
             if int(self._done() / _EXAMINED_EVERY) > int(done / _EXAMINED_EVERY):
                 self._examine()
-        if not self.learner.course.exams or self.learner.course.exams[-1]["progress"] < 1.0:
-            self._examine()
 
     def _done(self) -> float:
         progress = self.learner.progress

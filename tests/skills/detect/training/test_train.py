@@ -1,0 +1,76 @@
+"""From a folder of pictures to the ONNX file; skipped without torch."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("onnx")
+
+from skills.detect.detector_file import load_model
+from skills.detect.training.canvases import CanvasOptions
+from skills.detect.training.labels import TrainingDataError
+from skills.detect.training.schedule import Budget, Phase, Schedule
+from skills.detect.training.train import CHECKPOINT, MODEL, Report, TrainOptions, train
+
+NAMES = ("beer", "coke")
+SMALL = Schedule(warm_up_steps=2, phases=(Phase(0.0, CanvasOptions(96, 64), 2),))
+
+
+def write_split(folder: Path, split: str, count: int) -> None:
+    images, labels = [], []
+    for k in range(count):
+        name = f"{split}{k}.png"
+        picture = np.full((240, 320, 3), 60, dtype=np.uint8)
+        picture[60:160, 100:180] = (30, 200, 30 * k)
+        cv2.imwrite(str(folder / name), picture)
+        images.append({"id": k, "file_name": name, "width": 320, "height": 240})
+        labels.append({"id": k, "image_id": k, "category_id": 1 + k % 2, "bbox": [100, 60, 80, 100]})
+    categories = [{"id": k + 1, "name": name} for k, name in enumerate(NAMES)]
+    document = {"images": images, "annotations": labels, "categories": categories}
+    (folder / f"{split}.json").write_text(json.dumps(document))
+
+
+@pytest.fixture
+def options(tmp_path: Path) -> TrainOptions:
+    data = tmp_path / "data"
+    data.mkdir()
+    write_split(data, "train", 4)
+    write_split(data, "val", 2)
+    return TrainOptions(data, tmp_path / "out", Budget(pictures=8), examined=2, schedule=SMALL)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_data_set_becomes_a_detectors_file(options: TrainOptions, processes: int) -> None:
+    told = list[Report]()
+    file = train(replace(options, processes=processes), told.append)
+    assert file == options.out / MODEL
+    assert load_model(file).class_names == NAMES
+    assert told[-1].progress == 1.0
+    assert told[-1].figures is not None
+    assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, "curves.png", "pictures"}
+
+
+def test_a_resumed_training_counts_what_it_has_seen(options: TrainOptions) -> None:
+    train(options, lambda _report: None)
+    told = list[Report]()
+    train(replace(options, resume=True, budget=Budget(pictures=12)), told.append)
+    assert told[-1].steps == 6
+
+
+def test_a_training_that_is_over_writes_its_file_anew(options: TrainOptions) -> None:
+    file = train(options, lambda _report: None)
+    content = file.read_bytes()
+    file.unlink()
+    train(replace(options, resume=True), lambda _report: None)
+    assert file.read_bytes() == content
+
+
+def test_a_picture_that_is_damaged_is_named(options: TrainOptions) -> None:
+    (options.data / "train2.png").write_bytes(b"no picture")
+    with pytest.raises(TrainingDataError, match=r"train2\.png"):
+        train(options, lambda _report: None)

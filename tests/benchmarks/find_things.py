@@ -222,7 +222,8 @@ def in_room(seed: int, index: int, number: int, detector: Detector) -> Iterator[
         families = list(dict.fromkeys(thing.model.family for thing in things))
         absent = [name for name in LYING_ABOUT if name not in {thing.model.family for thing in scene.things}]
         for name in families[:2]:
-            yield asked("room", number, bench, surface, name, [middle(t) for t in things if t.model.family == name])
+            alike = [thing for thing in scene.things if thing.model.family == name and _lies_on(thing, surface)]
+            yield asked("room", number, bench, surface, name, [middle(thing) for thing in alike])
         if absent:
             yield asked("room", number, bench, surface, str(rng.choice(absent)), [])
 

@@ -33,7 +33,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="the adapter's file (npz)")
     parser.add_argument("--folder", type=Path, default=Path("out/speech-training"), help="keeps what was spoken")
     parser.add_argument("--sentences", type=int, default=4500)
-    parser.add_argument("--steps", type=int, default=300)
+    parser.add_argument("--steps", type=int, default=214)
     parser.add_argument("--batch", type=int, default=6, help="sentences of each process in each step")
     parser.add_argument("--jobs", type=int, default=2, help="processes, each on one core")
     parser.add_argument("--seed", type=int, default=1)

@@ -37,6 +37,7 @@ _SHARE_POWER = 0.7
 _WITHOUT_PLANE = 0.85
 _FLOATS_M, _FLOATING = 0.025, 0.7
 _SMOOTHED = 5
+_GAP_PX = 11
 
 
 @dataclass(frozen=True)
@@ -104,14 +105,24 @@ class Foreground:
     fit: float
     covered: float
 
+    def pixel_mask(self, height: int, width: int) -> Mask:
+        """The thing's pixels in the whole colour picture (height, width), the gaps between them closed."""
+        mask = np.zeros((height, width), dtype=np.uint8)
+        u, v = self.window.u[self.mask], self.window.v[self.mask]
+        mask[_index(v, height), _index(u, width)] = 1
+        return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((_GAP_PX, _GAP_PX), np.uint8)) > 0)
+
     @property
     def points_O(self) -> FloatArray:
         """The points (N, 3)."""
         return np.asarray(self.window.p_O[self.mask])
 
 
-def window_about(image: Image, box: Box) -> Window | None:
-    """The depth about a box of the colour picture; None when no depth is there at all."""
+def window_about(image: Image, box: Box, taken: Mask | None = None) -> Window | None:
+    """The depth about a box of the colour picture; None when no depth is there at all.
+
+    `taken` (H, W) tells which pixels of the colour picture are known to be other things.
+    """
     lens, depth_lens = image.intrinsics, image.depth_intrinsics
     if image.depth_m.ndim != 2 or image.depth_m.size == 0:
         return None
@@ -129,6 +140,8 @@ def window_about(image: Image, box: Box) -> Window | None:
     X_OC = image.frames.pose(image.camera_frame)
     p_O = (rays * z[..., None]) @ X_OC.rotation().matrix().T + X_OC.translation()
     u, v = np.meshgrid(x_ray * lens.fx + lens.cx, y_ray * lens.fy + lens.cy)
+    if taken is not None:
+        valid &= ~taken[_index(v, taken.shape[0]), _index(u, taken.shape[1])]
     inside = (u >= u0) & (u <= u1) & (v >= v0) & (v <= v1)
     if not np.any(valid & inside):
         return None
@@ -136,6 +149,10 @@ def window_about(image: Image, box: Box) -> Window | None:
     return Window(
         p_O, u, v, z, valid, inside, box, X_OC.translation(), step / depth_lens.fx, X_OC.rotation().matrix(), lens
     )
+
+
+def _index(values: FloatArray, size: int) -> NDArray[np.int64]:
+    return np.clip(np.rint(values), 0, size - 1).astype(np.int64)
 
 
 def _pixels(low: float, high: float, c: float, f: float, depth_c: float, depth_f: float, size: int) -> FloatArray:

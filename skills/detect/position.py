@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 
 from skills.api import Detection
-from skills.detect.foreground import Foreground, LevelPlane, Window, foreground, window_about
+from skills.detect.foreground import Foreground, LevelPlane, Mask, Window, foreground, window_about
 from skills.detect.forms import ClassForm, class_forms
 from skills.detect.shape import circle_seen, without_strays
 from skills.robot import FloatArray, Image
@@ -64,10 +64,13 @@ class Position:
     fore: Foreground
 
 
-def position_of(image: Image, detection: Detection) -> Position | None:
-    """Where the thing of a box is; None where no depth is seen there. Raises KeyError for a class without a form."""
+def position_of(image: Image, detection: Detection, taken: Mask | None = None) -> Position | None:
+    """Where the thing of a box is; None where no depth is seen there. Raises KeyError for a class without a form.
+
+    `taken` (H, W) tells which pixels are known to be other things.
+    """
     form = class_forms()[detection.class_name]
-    window = window_about(image, detection.box)
+    window = window_about(image, detection.box, taken)
     if window is None:
         return None
     fore = foreground(window, form)

@@ -54,12 +54,28 @@ def sightings(
 ) -> tuple[Sighting, ...]:
     """The detections that have a place; those where no depth is seen, or of classes without a form, are left out."""
     known = [detection for detection in detections if detection.class_name in class_forms()]
-    placed = ((detection, position_of(image, detection)) for detection in known)
+    placed = zip(known, _positions(image, known), strict=True)
     return tuple(
         _sighting(image, localisation, detection, position, surfaces)
         for detection, position in placed
         if position is not None
     )
+
+
+def _positions(image: Image, detections: Sequence[Detection]) -> list[Position | None]:
+    """The place of each detection; what long things lie between or behind is found first, and is none of theirs."""
+    shape = (image.intrinsics.height, image.intrinsics.width)
+    taken, found = np.zeros(shape, dtype=bool), dict[int, Position | None]()
+    for k in sorted(range(len(detections)), key=lambda k: _is_long(detections[k])):
+        long = _is_long(detections[k])
+        position = found[k] = position_of(image, detections[k], taken if long else None)
+        if position is not None and not long:
+            taken |= position.fore.pixel_mask(*shape)
+    return [found[k] for k in range(len(detections))]
+
+
+def _is_long(detection: Detection) -> bool:
+    return class_forms()[detection.class_name].form == "long"
 
 
 def _sighting(

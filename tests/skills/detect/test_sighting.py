@@ -92,3 +92,14 @@ def test_a_thing_in_plain_view_should_be_seen_and_one_behind_another_should_not(
     assert in_plain_view(image, RigidTransform(), np.array([1.2, 0.3, 0.8]))
     assert not in_plain_view(image, RigidTransform(), np.array([COKE.x + 0.15, COKE.y - 0.02, 0.8]))
     assert not in_plain_view(image, RigidTransform(), np.array([-1.0, 0.0, 0.8]))
+
+
+def test_a_long_thing_beside_another_is_not_taken_for_it():
+    disk = Can(1.02, 0.16, 0.06, 0.012, RED)  # as flat as a wrench
+    before = Can(0.94, 0.115, 0.03, 0.10, BLUE)
+    image = scene([disk, before])
+    found = [seen_as("wrench", image), seen_as("coke", image, BLUE)]
+    wrench, coke = sightings(image, SURE, found, [TABLE])
+    assert wrench.position_W[:2] == pytest.approx([disk.x, disk.y], abs=0.03)
+    assert wrench.position_W[2] < TABLE.height_m + 0.02
+    assert coke.position_W[:2] == pytest.approx([before.x, before.y], abs=0.01)

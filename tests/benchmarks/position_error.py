@@ -14,14 +14,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from executive.cli.assembly import shared_detector
-from skills.api import Detection
-from skills.detect.position import position_of
+from skills.api import Detection, LocalisationEstimate
+from skills.detect.sighting import sightings
 from skills.detect.surface_view import box_overlap
 from tests.benchmarks.position_scenes import Shot, Truth, counts, load, shots
 
 Boxes = Callable[[Shot], tuple[Detection, ...]]
+HERE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
 SAME_BOX = 0.5
 WHOLE, UNCUT = 0.8, 0.05
 
@@ -50,16 +52,17 @@ def misses(shot: Shot, boxes: Boxes) -> Iterator[Miss]:
     """Of each thing that counts and has a box of its class, how far off it is."""
     found = boxes(shot)
     X_OC = shot.image.frames.pose(shot.image.camera_frame)
+    placed = {id(each.detection): each for each in sightings(shot.image, HERE, found, ())}
     for truth in filter(counts, shot.truths):
         box = next((each for each in found if _same(each, truth.detection)), None)
         if box is None:
             continue
-        position = position_of(shot.image, box)
-        if position is None:
+        seen = placed.get(id(box))
+        if seen is None:
             yield Miss(truth, None, None)
             continue
-        off = position.p_OT - X_OC @ truth.p_CT
-        yield Miss(truth, float(np.linalg.norm(off)), float(off @ np.linalg.solve(position.covariance_O, off)))
+        off = seen.position_W - X_OC @ truth.p_CT
+        yield Miss(truth, float(np.linalg.norm(off)), float(off @ np.linalg.solve(seen.covariance, off)))
 
 
 def _same(found: Detection, truth: Detection) -> bool:

@@ -12,7 +12,7 @@ from executive.knowledge import Knowledge
 from executive.language import DependencyParser, Status, Understanding, understand
 from executive.language.lexicon import lexicon
 from executive.language.roles import HERE
-from executive.language.wake import heard_wake
+from executive.language.wake import Address, heard_wake
 from executive.speech.alikes import SoundAlikes
 from executive.speech.repair import Reading
 from executive.speech.vocabulary import Vocabulary
@@ -53,7 +53,7 @@ class SpeechReader:
 
     def read(self, text: str) -> Reading[Meant]:
         """What `text` means; it fits when it becomes commands in known names."""
-        address = heard_wake(_with_pause(text, self.robot_name), self.robot_name, others=self.other_robots)
+        address = self._address(text)
         addressed = address.name is not None
         understood = understand(
             address.text if addressed else text,
@@ -70,6 +70,13 @@ class SpeechReader:
             return Reading(meant, fits=False, suspects=understood.unknown_words)
         strange = () if self.knowledge else tuple(self._strange(understood.commands))
         return Reading(meant, fits=not strange, suspects=strange)
+
+    def calls(self, text: str) -> bool:
+        """Whether the robot is called in `text`, its name perhaps misspelled."""
+        return self._address(text).name is not None
+
+    def _address(self, text: str) -> Address:
+        return heard_wake(_with_pause(text, self.robot_name), self.robot_name, others=self.other_robots)
 
     def _strange(self, commands: tuple[Command, ...]) -> Iterator[str]:
         """Names in the commands that the vocabulary does not know; none is strange where there is no vocabulary."""

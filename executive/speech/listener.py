@@ -12,6 +12,7 @@ from executive.errors import InputError
 from executive.language import Status
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
 from executive.speech.alikes import SoundAlikes
+from executive.speech.calling import opening_as_heard
 from executive.speech.hearing import Meant, SpeechReader
 from executive.speech.interpret import interpret
 from executive.speech.recogniser import Recogniser
@@ -83,7 +84,11 @@ class Listener:
         best = interpret(recognition, self.reader.read, self.alikes)
         if best is None:
             return None
-        return HeardUtterance(utterance.start_s, utterance.end_s, best.text, best.meaning)
+        text, meant = best.text, best.meaning
+        if meant.addressed:
+            text = opening_as_heard(recognition, text, self.reader.robot_name, self.reader.calls)
+            meant = meant if text == best.text else self.reader.read(text).meaning
+        return HeardUtterance(utterance.start_s, utterance.end_s, text, meant)
 
 
 @dataclass(frozen=True)

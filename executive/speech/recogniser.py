@@ -32,8 +32,12 @@ class Recognition(Protocol):
         """The readings of further searches, each slower than the one before; each set has its likeliest first."""
         ...
 
+    def unprompted(self) -> str:
+        """What is heard when no names are expected, by a quick search; empty for nothing."""
+        ...
+
     def likelihoods(self, texts: Sequence[str]) -> Sequence[float]:
-        """The log likelihood of each text given the sound.
+        """The log likelihood of each text given the sound, when no names are expected.
 
         They can be compared with each other, not with those of `transcripts`.
         """

@@ -170,6 +170,10 @@ class WhisperRecognition:
         """The readings of a wider search."""
         yield self._owner.search(self._encoded, self._prompt, beam=_WIDE_BEAM)
 
+    def unprompted(self) -> str:
+        """What is heard when no names are expected, by a quick search; empty for nothing."""
+        return next((t.text for t in self._owner.search(self._encoded, "", beam=1)), "")
+
     def likelihoods(self, texts: Sequence[str]) -> list[float]:
         """The log likelihood of each text given the sound."""
         return self._owner.likelihoods(self._encoded, len(self._sound) / RATE_HZ, texts)

@@ -29,16 +29,24 @@ __all__ = [
 
 @dataclass(frozen=True)
 class ScriptedRecognition:
-    """Readings as given; `likely` holds the log likelihoods of other texts, and `otherwise` is that of all else."""
+    """Readings as given; `likely` holds the log likelihoods of other texts, and `otherwise` is that of all else.
+
+    `plain` is what is heard when no names are expected; when empty, the first of the readings.
+    """
 
     transcripts: Sequence[Transcript] = ()
     wider: Sequence[Transcript] = ()
     likely: Mapping[str, float] = field(default_factory=dict)
     otherwise: float = 0.0
+    plain: str = ""
 
     def more(self) -> Iterator[Sequence[Transcript]]:
         """The readings of one further search."""
         yield self.wider
+
+    def unprompted(self) -> str:
+        """The text that was given for it, or the first of the readings."""
+        return self.plain or next((transcript.text for transcript in self.transcripts), "")
 
     def likelihoods(self, texts: Sequence[str]) -> list[float]:
         """The likelihoods that were given."""

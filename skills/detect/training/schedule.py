@@ -50,7 +50,7 @@ class Schedule:
     Windows come first and cost little; whole pictures come last, as the detector will see them.
     """
 
-    highest_rate: float = 2e-3
+    highest_rate: float = 6e-3
     last_share: float = 0.02
     warm_up_steps: int = 100
     phases: Sequence[Phase] = field(

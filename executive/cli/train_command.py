@@ -14,7 +14,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from executive.cli.output import console_for, print_json, refusals
 from executive.errors import InputError
 from skills.detect.training.labels import TrainingDataError, read_split
-from skills.detect.training.schedule import Budget
+from skills.detect.training.options import TrainOptions
+from skills.detect.training.schedule import HIGHEST_RATE, Budget, Schedule
 
 if TYPE_CHECKING:
     from skills.detect.training.train import Report
@@ -34,6 +35,7 @@ def train_command(
     ] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how often to see each picture.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all that is drawn by chance.")] = 1,
+    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = HIGHEST_RATE,
     jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
     start: Annotated[Path | None, typer.Option(help="A checkpoint whose weights are taken over at first.")] = None,
@@ -45,7 +47,17 @@ def train_command(
         _check_folders(data, out, resume)
         _check_time(minutes, epochs)
         _check_libraries()
-        model, figures = _trained(data, out, minutes, epochs, seed, jobs or os.cpu_count() or 1, resume, start, console)
+        options = TrainOptions(
+            data,
+            out,
+            _budget(data, minutes, epochs),
+            seed=seed,
+            processes=jobs or os.cpu_count() or 1,
+            resume=resume,
+            start=start,
+            schedule=Schedule(highest_rate=rate),
+        )
+        model, figures = _trained(options, console)
     console.print(f"{model}: {_line(figures)}")
     if as_json:
         print_json({"model": str(model), "figures": figures})
@@ -73,19 +85,9 @@ def _check_libraries() -> None:
         raise InputError(f"training needs {' and '.join(missing)}", mend="pip install '.[train]'")
 
 
-def _trained(
-    data: Path,
-    out: Path,
-    minutes: float | None,
-    epochs: int | None,
-    seed: int,
-    jobs: int,
-    resume: bool,
-    start: Path | None,
-    console: Console,
-) -> tuple[Path, dict[str, float]]:
+def _trained(options: TrainOptions, console: Console) -> tuple[Path, dict[str, float]]:
     """The ONNX file and its figures. Raises InputError."""
-    from skills.detect.training.train import TrainOptions, train
+    from skills.detect.training.train import train
 
     figures = dict[str, float]()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
@@ -99,19 +101,23 @@ def _trained(
                 console.print(f"{report.progress:4.0%}  {_line(report.figures)}")
 
         try:
-            budget = _budget(data, minutes, epochs)
-            options = TrainOptions(data, out, budget, seed=seed, processes=jobs, resume=resume, start=start)
             return train(options, told), figures
         except TrainingDataError as error:
             raise InputError(error.message, mend=error.mend) from error
         except OSError as error:
-            raise InputError(f"{out}: cannot be written ({error})", mend="name another folder, or make room") from error
+            raise InputError(
+                f"{options.out}: cannot be written ({error})", mend="name another folder, or make room"
+            ) from error
 
 
 def _budget(data: Path, minutes: float | None, epochs: int | None) -> Budget:
-    if epochs is not None:
+    """Raises InputError."""
+    if epochs is None:
+        return Budget(seconds=60.0 * (UNLESS_SAID_MINUTES if minutes is None else minutes))
+    try:
         return Budget(pictures=epochs * len(read_split(data, "train")))
-    return Budget(seconds=60.0 * (UNLESS_SAID_MINUTES if minutes is None else minutes))
+    except TrainingDataError as error:
+        raise InputError(error.message, mend=error.mend) from error
 
 
 def _told(report: Report) -> str:

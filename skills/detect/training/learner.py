@@ -19,7 +19,7 @@ from skills.detect.training.network import DetectorNetwork, cells
 from skills.detect.training.peers import Peers
 from skills.detect.training.records import Course
 
-__all__ = ["Learner", "Progress"]
+__all__ = ["Learner", "Progress", "read_checkpoint"]
 
 FORMAT = 1
 _LONGEST_STEP = 10.0
@@ -88,7 +88,7 @@ class Learner:
 
     def restore(self, file: Path) -> None:
         """Go on where a file left off. Raises TrainingDataError."""
-        state = _state(file)
+        state = read_checkpoint(file)
         self.network.load_state_dict(state["network"])
         self.average.restore(state["average"])
         for optimiser, kept in zip(self.optimisers, state["optimisers"], strict=True):
@@ -98,7 +98,7 @@ class Learner:
 
     def start_from(self, file: Path) -> None:
         """Take over only the averaged weights of a file; all else begins anew. Raises TrainingDataError."""
-        weights = _state(file)["average"]["network"]
+        weights = read_checkpoint(file)["average"]["network"]
         self.network.load_state_dict(weights)
         self.average.network.load_state_dict(weights)
 
@@ -116,7 +116,8 @@ def _moved(truth: TruthBatch, device: torch.device) -> TruthBatch:
     return TruthBatch(*(part.to(device) for part in (truth.boxes, truth.classes, truth.ignored, truth.present)))
 
 
-def _state(file: Path) -> dict[str, Any]:
+def read_checkpoint(file: Path) -> dict[str, Any]:
+    """The state in a file. Raises TrainingDataError."""
     mend = "begin anew without it"
     try:
         state = torch.load(file, map_location="cpu", weights_only=True)

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from skills.detect.training.canvases import CanvasOptions
 
-__all__ = ["Budget", "Phase", "Schedule", "shuffled"]
+__all__ = ["HIGHEST_RATE", "Budget", "Phase", "Schedule", "shuffled"]
 
+HIGHEST_RATE: Final = 3e-3
 _SMALL: Final = CanvasOptions(256, 192, mosaic=0.3, scales=(0.4, 1.4))
 _WINDOWS: Final = CanvasOptions(320, 256, mosaic=0.5, scales=(0.4, 1.5), changed=0.8)
 _LARGER: Final = CanvasOptions(448, 352, mosaic=0.3, scales=(0.5, 1.4), changed=0.7)
@@ -50,7 +51,7 @@ class Schedule:
     Windows come first and cost little; whole pictures come last, as the detector will see them.
     """
 
-    highest_rate: float = 6e-3
+    highest_rate: float = HIGHEST_RATE
     last_share: float = 0.02
     warm_up_steps: int = 100
     phases: Sequence[Phase] = field(

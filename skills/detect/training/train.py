@@ -18,11 +18,11 @@ from skills.detect.scoring import Score
 from skills.detect.training.batches import Feed
 from skills.detect.training.canvases import CanvasMaker
 from skills.detect.training.export import export
-from skills.detect.training.labels import category_names, digest_of, read_split
-from skills.detect.training.learner import Learner
+from skills.detect.training.labels import TrainingDataError, category_names, digest_of, read_split
+from skills.detect.training.learner import Learner, read_checkpoint
+from skills.detect.training.options import TrainOptions
 from skills.detect.training.peers import Peers, joined_peers
 from skills.detect.training.records import draw_curves
-from skills.detect.training.schedule import Budget, Schedule
 from skills.detect.training.store import open_store
 from skills.detect.training.validate import Examination, examination, examine, offsets_by
 
@@ -32,26 +32,9 @@ CHECKPOINT: Final = "checkpoint.pt"
 MODEL: Final = "errand_detector.onnx"
 CURVES: Final = "curves.png"
 _NOTED_EVERY_STEPS: Final = 20
+_GO_ON: Final = "perhaps for want of memory; the same command with --resume goes on from its checkpoint"
 _EXAMINED_EVERY: Final = 0.1
 _CALIBRATED_BY: Final = 900
-
-
-@dataclass(frozen=True)
-class TrainOptions:
-    """What to learn from, where to write, how long, and with how many processes of one thread.
-
-    `start` names a checkpoint of which the weights are taken over. With `resume`, learning goes on where `out` stands.
-    """
-
-    data: Path
-    out: Path
-    budget: Budget
-    seed: int = 1
-    processes: int = 1
-    resume: bool = False
-    start: Path | None = None
-    examined: int = 320
-    schedule: Schedule = field(default_factory=Schedule)
 
 
 @dataclass(frozen=True)
@@ -74,6 +57,8 @@ def train(options: TrainOptions, told: Told) -> Path:
     pictures = read_split(options.data, "train")
     examination(options.data, "val", category_names(options.data))
     open_store(options.out / "pictures", pictures)
+    if (begins := _beginning(options)) is not None:
+        read_checkpoint(begins)
     if torch.cuda.is_available() or options.processes == 1:
         _learn(0, 1, options, Path(), told)
     else:
@@ -88,8 +73,11 @@ def _learn_together(options: TrainOptions, told: Told) -> None:
     with tempfile.TemporaryDirectory() as folder:
         arguments = (options.processes, options, Path(folder) / "meeting", reports)
         running = torch.multiprocessing.spawn(_process, arguments, nprocs=options.processes, join=False)
-        while not running.join(timeout=0.2):
-            _pass_on(reports, told)
+        try:
+            while not running.join(timeout=0.2):
+                _pass_on(reports, told)
+        except torch.multiprocessing.ProcessExitedException as error:
+            raise TrainingDataError(f"{options.out}: a training process was killed", mend=_GO_ON) from error
         _pass_on(reports, told)
 
 
@@ -121,12 +109,18 @@ def _learn(rank: int, count: int, options: TrainOptions, meeting: Path, told: To
     _Course(options, learner, peers, feed, exam, told).run()
 
 
-def _begin(learner: Learner, options: TrainOptions) -> None:
+def _beginning(options: TrainOptions) -> Path | None:
+    """The checkpoint from which learning begins."""
     checkpoint = options.out / CHECKPOINT
-    if options.resume and checkpoint.is_file():
-        learner.restore(checkpoint)
-    elif options.start is not None:
-        learner.start_from(options.start)
+    return checkpoint if options.resume and checkpoint.is_file() else options.start
+
+
+def _begin(learner: Learner, options: TrainOptions) -> None:
+    begins = _beginning(options)
+    if begins is not None and begins == options.start:
+        learner.start_from(begins)
+    elif begins is not None:
+        learner.restore(begins)
 
 
 @dataclass

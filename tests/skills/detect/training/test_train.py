@@ -70,6 +70,20 @@ def test_a_training_that_is_over_writes_its_file_anew(options: TrainOptions) -> 
     assert file.read_bytes() == content
 
 
+@pytest.mark.parametrize("processes", [1, 2])
+def test_weights_that_are_not_there_are_named(options: TrainOptions, tmp_path: Path, processes: int) -> None:
+    chosen = replace(options, start=tmp_path / "none.pt", processes=processes)
+    with pytest.raises(TrainingDataError, match=r"none\.pt"):
+        train(chosen, lambda _report: None)
+
+
+def test_weights_of_another_training_are_taken_over(options: TrainOptions, tmp_path: Path) -> None:
+    train(options, lambda _report: None)
+    told = list[Report]()
+    train(replace(options, out=tmp_path / "next", start=options.out / CHECKPOINT), told.append)
+    assert told[-1].steps == 4
+
+
 def test_a_picture_that_is_damaged_is_named(options: TrainOptions) -> None:
     (options.data / "train2.png").write_bytes(b"no picture")
     with pytest.raises(TrainingDataError, match=r"train2\.png"):

@@ -1,0 +1,28 @@
+"""What a training is told. Needs no torch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from skills.detect.training.schedule import Budget, Schedule
+
+__all__ = ["TrainOptions"]
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """What to learn from, where to write, how long, and with how many processes of one thread.
+
+    `start` names a checkpoint of which the weights are taken over. With `resume`, learning goes on where `out` stands.
+    """
+
+    data: Path
+    out: Path
+    budget: Budget
+    seed: int = 1
+    processes: int = 1
+    resume: bool = False
+    start: Path | None = None
+    examined: int = 320
+    schedule: Schedule = field(default_factory=Schedule)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from skills.api import Surface
-from skills.detect.surface_view import Cluster, Plane, SurfaceView
 from skills.detect.points import PointCloud
 from skills.detect.shape import SeenShape
+from skills.detect.surface_view import Cluster, Plane, SurfaceView
 from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, spots
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)

@@ -24,6 +24,7 @@ _SAME_THING_M = 0.06
 _LEAST_OVERLAP = 0.2
 _LEAST_PART = 0.15
 _GAP_PX = 11
+_APART_M = 0.035
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,10 @@ def _cluster(points: PointCloud, surface: str, plane: Plane, p_WC: FloatArray) -
 
 
 def parted(view: SurfaceView, sighting: Sighting) -> SurfaceView:
-    """The view with a detected thing cut out of a cluster that holds others as well, such as two things that touch."""
+    """The view with a detected thing cut out of a cluster that holds others as well, such as two things that touch.
+
+    What is above or below it is a part of it that its box left out.
+    """
     whole = cluster_of(view.clusters, sighting)
     if whole is None or len(sighting.pixels) == 0:
         return view
@@ -141,6 +145,9 @@ def parted(view: SurfaceView, sighting: Sighting) -> SurfaceView:
     if min(np.count_nonzero(own), np.count_nonzero(~own)) < max(_FEWEST_POINTS, _LEAST_PART * len(own)):
         return view
     halves = (whole.points.where(own), whole.points.where(~own))
+    middles = [np.median(points.p_W[:, :2], axis=0) for points in halves]
+    if float(np.linalg.norm(middles[0] - middles[1])) < _APART_M:
+        return view
     parts = tuple(_cluster(points, whole.surface, whole.plane, sighting.eye_W) for points in halves)
     others = tuple(each for each in view.clusters if each is not whole)
     return SurfaceView(view.plane, view.plane_points, (*parts, *others))

@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RigidTransform
 from table_scene import BLUE, CAMERA, COKE, RED, TABLE, Can, scene, seen_as
 
-from skills.api import LocalisationEstimate, Surface
+from skills.api import Detection, LocalisationEstimate, Surface
 from skills.detect.sighting import sightings
 from skills.detect.surface_view import cluster_of, parted, view_surface
 from skills.robot import Image
@@ -100,6 +100,15 @@ def test_a_thing_that_touches_another_is_cut_out_of_their_cluster():
 def test_a_thing_for_itself_stays_whole():
     image = scene([COKE])
     (sighting,) = sightings(image, PLACE, [seen_as("coke", image)], [TABLE])
+    view = viewed(image)
+    assert parted(view, sighting) is view
+
+
+def test_a_box_that_leaves_out_the_top_of_a_thing_does_not_part_it():
+    image = scene([Can(0.95, -0.1, 0.033, 0.24, RED)])
+    u0, v0, u1, v1 = seen_as("beer", image).box
+    low = Detection("beer", 0.8, (u0, v0 + 0.4 * (v1 - v0), u1, v1))
+    (sighting,) = sightings(image, PLACE, [low], [TABLE])
     view = viewed(image)
     assert parted(view, sighting) is view
 

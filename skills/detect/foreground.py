@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detect.forms import ClassForm
+from skills.detect.plane import LevelPlane
 from skills.detect.points import MAX_DEPTH_M, MIN_DEPTH_M
 from skills.robot import FloatArray, Image, Intrinsics
 
@@ -76,20 +77,6 @@ class Window:
             return -math.inf
         u, v = x / z * self.lens.fx + self.lens.cx, y / z * self.lens.fy + self.lens.cy
         return float(min(u, v, self.lens.width - 1 - u, self.lens.height - 1 - v))
-
-
-@dataclass(frozen=True)
-class LevelPlane:
-    """What a thing rests on: z = height_m + slope . ((x, y) - origin) in O, and the spread of its points (m)."""
-
-    origin: tuple[float, float]
-    height_m: float
-    slope: tuple[float, float]
-    noise_m: float
-
-    def z(self, xy: FloatArray) -> FloatArray:
-        """Height of the plane at (..., 2) places."""
-        return np.asarray(self.height_m + (xy - np.array(self.origin)) @ np.array(self.slope))
 
 
 @dataclass(frozen=True)

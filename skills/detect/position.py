@@ -22,8 +22,9 @@ import cv2
 import numpy as np
 
 from skills.api import Detection
-from skills.detect.foreground import Foreground, LevelPlane, Mask, Window, foreground, window_about
+from skills.detect.foreground import Foreground, Mask, Window, foreground, window_about
 from skills.detect.forms import ClassForm, class_forms
+from skills.detect.plane import LevelPlane
 from skills.detect.shape import circle_seen, without_strays
 from skills.robot import FloatArray, Image
 

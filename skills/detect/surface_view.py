@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Surface
+from skills.detect.plane import LevelPlane
 from skills.detect.points import PointCloud, camera_pose_W, cloud_from_image, inside_polygon
 from skills.detect.shape import SeenShape, measure
 from skills.detect.sighting import Sighting
@@ -28,26 +29,12 @@ _APART_M = 0.035
 
 
 @dataclass(frozen=True)
-class Plane:
-    """A nearly level plane in W: z = height + slope . ((x, y) - origin); noise_m is the spread of its points."""
-
-    origin: tuple[float, float]
-    height_m: float
-    slope: tuple[float, float]
-    noise_m: float
-
-    def z(self, xy: FloatArray) -> FloatArray:
-        """Height of the plane at rows of xy (N, 2)."""
-        return np.asarray(self.height_m + (xy - np.array(self.origin)) @ np.array(self.slope))
-
-
-@dataclass(frozen=True)
 class Cluster:
     """The points of one thing, the plane that it stands on, its shape and its box (u0, v0, u1, v1) in the picture."""
 
     points: PointCloud
     surface: str
-    plane: Plane
+    plane: LevelPlane
     shape: SeenShape
     box: tuple[int, int, int, int]
 
@@ -61,7 +48,7 @@ class Cluster:
 class SurfaceView:
     """What one picture shows of a surface: the plane, its own points, and the clusters on it."""
 
-    plane: Plane
+    plane: LevelPlane
     plane_points: PointCloud
     clusters: tuple[Cluster, ...]
 
@@ -82,7 +69,7 @@ def view_surface(image: Image, X_WO: RigidTransform, surface: Surface, margin_m:
     return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
 
 
-def fit_plane(points_W: FloatArray, height_m: float) -> Plane | None:
+def fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:
     """The plane near a surveyed height, robust against things standing on it; None when too few points show it."""
     near = points_W[np.abs(points_W[:, 2] - height_m) < _PLANE_BAND_M]
     if len(near) < 80:
@@ -91,13 +78,13 @@ def fit_plane(points_W: FloatArray, height_m: float) -> Plane | None:
     smooth = np.convolve(counts, [1, 2, 1], mode="same")
     level = float(edges[int(np.argmax(smooth))] + 0.002)
     origin = near[:, :2].mean(axis=0)
-    plane = Plane((float(origin[0]), float(origin[1])), level, (0.0, 0.0), 0.004)
+    plane = LevelPlane((float(origin[0]), float(origin[1])), level, (0.0, 0.0), 0.004)
     for _ in range(4):
         plane = _refined(plane, near) or plane
     return plane
 
 
-def _refined(plane: Plane, points_W: FloatArray) -> Plane | None:
+def _refined(plane: LevelPlane, points_W: FloatArray) -> LevelPlane | None:
     """One step of trimmed least squares; slopes beyond 2 degrees are taken for other things and dropped."""
     residual = points_W[:, 2] - plane.z(points_W[:, :2])
     inliers = points_W[np.abs(residual) < max(0.006, 2.5 * plane.noise_m)]
@@ -107,9 +94,9 @@ def _refined(plane: Plane, points_W: FloatArray) -> Plane | None:
     (height, slope_x, slope_y), *_ = np.linalg.lstsq(design, inliers[:, 2], rcond=None)
     if np.hypot(slope_x, slope_y) > 0.035:
         height, slope_x, slope_y = float(np.median(inliers[:, 2])), 0.0, 0.0
-    fitted = Plane(plane.origin, float(height), (float(slope_x), float(slope_y)), plane.noise_m)
+    fitted = LevelPlane(plane.origin, float(height), (float(slope_x), float(slope_y)), plane.noise_m)
     noise = 1.48 * float(np.median(np.abs(inliers[:, 2] - fitted.z(inliers[:, :2]))))
-    return Plane(fitted.origin, fitted.height_m, fitted.slope, max(noise, 0.001))
+    return LevelPlane(fitted.origin, fitted.height_m, fitted.slope, max(noise, 0.001))
 
 
 def _groups(points: PointCloud) -> list[PointCloud]:
@@ -127,7 +114,7 @@ def _groups(points: PointCloud) -> list[PointCloud]:
     return [group for group in groups if len(group) >= _FEWEST_POINTS]
 
 
-def _cluster(points: PointCloud, surface: str, plane: Plane, p_WC: FloatArray) -> Cluster:
+def _cluster(points: PointCloud, surface: str, plane: LevelPlane, p_WC: FloatArray) -> Cluster:
     (u0, v0), (u1, v1) = points.pixels.min(axis=0), points.pixels.max(axis=0)
     shape = measure(points.p_W, plane.z(points.p_W[:, :2]), p_WC)
     return Cluster(points, surface, plane, shape, (int(u0), int(v0), int(u1), int(v1)))

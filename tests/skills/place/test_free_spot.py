@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from skills.api import Surface
+from skills.detect.plane import LevelPlane
 from skills.detect.points import PointCloud
 from skills.detect.shape import SeenShape
-from skills.detect.surface_view import Cluster, Plane, SurfaceView
+from skills.detect.surface_view import Cluster, SurfaceView
 from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, spots
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)
-PLANE = Plane((1.3, 0.0), 0.7, (0.0, 0.0), 0.002)
+PLANE = LevelPlane((1.3, 0.0), 0.7, (0.0, 0.0), 0.002)
 
 
 def _cloud(xy, z=0.7):

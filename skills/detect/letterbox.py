@@ -42,10 +42,6 @@ class Letterbox:
         width, height = self.inside_px
         return width / self.width_px, height / self.height_px
 
-    def to_letterbox(self, boxes: NDArray[np.floating]) -> Boxes:
-        """Boxes of the picture in letterbox pixels."""
-        return np.asarray(np.asarray(boxes, dtype=np.float32).reshape(-1, 4) * self._factors(), dtype=np.float32)
-
     def to_picture(self, boxes: NDArray[np.floating]) -> Boxes:
         """Boxes of the letterbox in the picture's pixels, clipped to it."""
         found = np.asarray(boxes, dtype=np.float32).reshape(-1, 4) / self._factors()

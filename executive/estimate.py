@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final, Protocol
 from pydantic import BaseModel, ConfigDict, Field
 
 from executive.behaviours.board import Constant, FromBoard
-from executive.compiling.plans import NodePlan, RememberPosePlan, SelectorPlan, SkillPlan
+from executive.compiling.plans import NodePlan, RememberPosePlan, RoundPlan, SelectorPlan, SkillPlan
 from executive.compiling.recovery import OnlyIfKnownPlan
 from executive.errors import InputError
 from executive.yaml_source import read_yaml, validate
@@ -147,6 +147,21 @@ def _first_of(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
     raise _CannotError(reasons[0] if reasons else None)
 
 
+def _all_that_can(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+    """All ways that can be gone; when there is none, the first one's reason."""
+    done, reasons = list[Estimate](), list[InputError | None]()
+    for child in node.expected:
+        here, noted = walk.pose, dict(walk.noted)
+        try:
+            done.append(_followed(child, walk, first=True))
+        except _CannotError as cannot:
+            walk.pose, walk.noted = here, noted
+            reasons.append(cannot.error)
+    if not done:
+        raise _CannotError(next(filter(None, reasons), None))
+    return sum(done, Estimate())
+
+
 def _if_known(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
     """What runs only after an earlier node has written something."""
     assert isinstance(node, OnlyIfKnownPlan)
@@ -197,4 +212,5 @@ _VISITS: Final[Mapping[type[NodePlan], Callable[[NodePlan, _Walk, bool], Estimat
     RememberPosePlan: _remember,
     OnlyIfKnownPlan: _if_known,
     SelectorPlan: _first_of,
+    RoundPlan: _all_that_can,
 }

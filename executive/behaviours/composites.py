@@ -1,4 +1,4 @@
-"""Sequence and selector with memory that keep the results of finished children in sight."""
+"""Sequence, selector and round with memory that keep the results of finished children in sight."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Conditional(Protocol):
 class MemoryComposite(Explained, Composite):
     """Ticks its children one after the other and never goes back to one that is done."""
 
-    goes_on_after: Status
+    goes_on_after: frozenset[Status]
 
     def __init__(self, *, path_id: str, name: str, children: Sequence[Behaviour]) -> None:
         if not children:
@@ -45,7 +45,7 @@ class MemoryComposite(Explained, Composite):
             passed_over = self._passes_over(child)
             if not passed_over:
                 yield from child.tick()
-            goes_on = passed_over or child.status == self.goes_on_after
+            goes_on = passed_over or child.status in self.goes_on_after
             if not goes_on or self._index + 1 == len(self.children):
                 break
             self._index += 1
@@ -95,7 +95,7 @@ class MemorySequence(MemoryComposite):
     the next in the same tick; after the last: SUCCESS.
     """
 
-    goes_on_after = Status.SUCCESS
+    goes_on_after = frozenset({Status.SUCCESS})
 
 
 class MemorySelector(MemoryComposite):
@@ -107,7 +107,7 @@ class MemorySelector(MemoryComposite):
     POSTCONDITION, else `exhausted_cause` where given, else the last child's.
     """
 
-    goes_on_after = Status.FAILURE
+    goes_on_after = frozenset({Status.FAILURE})
 
     def __init__(
         self,
@@ -139,3 +139,21 @@ class MemorySelector(MemoryComposite):
         if Cause.ERROR in obstacles:
             return Cause.ERROR
         return obstacles[0] if obstacles else self._exhausted_cause or causes[-1]
+
+
+class MemoryRound(MemorySelector):
+    """All ways, one after the other, whatever becomes of each.
+
+    Child that does not apply: passed over. Child RUNNING: RUNNING. Child SUCCESS or FAILURE: on to the next in the same
+    tick. After the last: SUCCESS with the sentences of those that worked when any did, else FAILURE as a selector.
+    """
+
+    goes_on_after = frozenset({Status.SUCCESS, Status.FAILURE})
+
+    def _take_over(self, child: Behaviour) -> None:
+        done = [one for one in self.children if one.status == Status.SUCCESS]
+        if child.status == Status.RUNNING or not done:
+            super()._take_over(child)
+            return
+        super()._take_over(done[-1])
+        self.message = "; ".join(dict.fromkeys(map(message_of, done)))

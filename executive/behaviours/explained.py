@@ -9,11 +9,15 @@ from skills.api import Cause
 
 
 class Explained:
-    """Mixin for behaviours. `cause` is None unless the node failed or was cancelled; `message` is one sentence."""
+    """Mixin for behaviours, which have the `status`.
+
+    `cause` is None unless the node failed or was cancelled; `message` is one sentence.
+    """
 
     path_id: str
     cause: Cause | None
     message: str
+    status: Status
 
     def clear_explanation(self) -> None:
         """Forget cause and message."""

@@ -149,7 +149,7 @@ class Interrupts(MemoryComposite):
     With nothing to do, the mission is ticked, and its status, cause and sentence are taken over.
     """
 
-    goes_on_after = Status.SUCCESS
+    goes_on_after = frozenset({Status.SUCCESS})
 
     def __init__(self, *, path_id: str, name: str, watches: Sequence[Monitor | Interrupt], mission: Behaviour) -> None:
         super().__init__(path_id=path_id, name=name, children=[*watches, mission])

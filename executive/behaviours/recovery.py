@@ -65,7 +65,7 @@ class Recover(MemoryComposite):
     When it starts anew, remedies are counted from zero and the blackboard keys in `forgets` are empty.
     """
 
-    goes_on_after = Status.SUCCESS
+    goes_on_after = frozenset({Status.SUCCESS})
 
     def __init__(
         self,
@@ -151,7 +151,7 @@ class Afterwards(MemoryComposite):
     failure mentioned.
     """
 
-    goes_on_after = Status.SUCCESS
+    goes_on_after = frozenset({Status.SUCCESS})
 
     def __init__(
         self,
@@ -194,7 +194,7 @@ class Afterwards(MemoryComposite):
 class OnlyIfKnown(MemoryComposite):
     """As its only child, for selectors that pass it over while the blackboard does not hold `key`."""
 
-    goes_on_after = Status.SUCCESS
+    goes_on_after = frozenset({Status.SUCCESS})
 
     def __init__(self, *, path_id: str, name: str, child: Behaviour, key: str, board: Board) -> None:
         super().__init__(path_id=path_id, name=name, children=[child])
@@ -208,7 +208,7 @@ class OnlyIfKnown(MemoryComposite):
 class OnlyIfHolding(MemoryComposite):
     """As its only child, for selectors that pass it over while the gripper holds nothing."""
 
-    goes_on_after = Status.SUCCESS
+    goes_on_after = frozenset({Status.SUCCESS})
 
     def __init__(self, *, path_id: str, name: str, child: Behaviour, robot: Robot) -> None:
         super().__init__(path_id=path_id, name=name, children=[child])

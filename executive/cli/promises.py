@@ -106,6 +106,7 @@ def _answered(command: Command, knowledge: Knowledge, robot: str, given: Iterato
     return Promise(
         kind=PromiseKind.ANSWERED,
         classes=knowledge.classes(knowledge.thing(thing.name) or thing.name),
+        count=command.object_count,
         source=_regions(knowledge, thing, command.goal),
         answer=next(given, None),
         robot=robot,

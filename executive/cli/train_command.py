@@ -95,7 +95,10 @@ def _trained(options: TrainOptions, console: Console) -> tuple[Path, dict[str, f
         task = bar.add_task("learning", total=1.0)
 
         def told(report: Report) -> None:
+            new_percent = int(100 * report.progress) > int(100 * bar.tasks[task].completed)
             bar.update(task, completed=report.progress, description=_told(report))
+            if new_percent and not console.is_terminal:
+                console.print(f"{report.progress:4.0%}  step {report.steps}, {_told(report)}")
             if report.figures is not None:
                 figures.update(report.figures)
                 console.print(f"{report.progress:4.0%}  {_line(report.figures)}")

@@ -12,9 +12,9 @@ from typing import Any, ClassVar
 
 from py_trees.behaviour import Behaviour
 
-from executive.behaviours.answer import Answer
+from executive.behaviours.answer import Answer, Tally
 from executive.behaviours.board import Binding
-from executive.behaviours.composites import MemorySelector, MemorySequence
+from executive.behaviours.composites import MemoryRound, MemorySelector, MemorySequence
 from executive.behaviours.conditions import holding
 from executive.behaviours.context import RunContext
 from executive.behaviours.decorators import Guard, Retry, Timeout
@@ -108,6 +108,17 @@ class SelectorPlan(_Composite):
             exhausted_cause=self.exhausted_cause,
             exhausted_message=self.exhausted_message,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoundPlan(_Composite):
+    """All ways, one after the other, whatever becomes of each; one that works is enough."""
+
+    kind: ClassVar[str] = "round"
+
+    def build(self, context: RunContext) -> Behaviour:
+        """A MemoryRound."""
+        return MemoryRound(path_id=self.path_id, name=self.name, children=self.built(context))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,7 +228,8 @@ class HoldingPlan(DecoratorPlan):
 class AnswerPlan(DecoratorPlan):
     """Turns the search below into a yes or no; `looks` names for each surface the leaves that look at it.
 
-    One that `tells` says what was seen, too: where, and how many.
+    One that `tells` says what was seen, too: where. One with `tallies` counts what each of the leaves saw, which is
+    under the key beside it, and says how many; yes is then as many as `needed`.
     """
 
     kind: ClassVar[str] = "answer"
@@ -225,6 +237,8 @@ class AnswerPlan(DecoratorPlan):
     looks: tuple[tuple[str, tuple[str, ...]], ...]
     key: str
     tells: bool = False
+    tallies: tuple[tuple[str, str], ...] = ()
+    needed: int = 1
 
     def writes(self) -> Mapping[str, Any]:
         """The answer."""
@@ -242,4 +256,5 @@ class AnswerPlan(DecoratorPlan):
             board=context.board,
             publish=context.publish,
             tells=self.tells,
+            tally=Tally(dict(self.tallies), self.needed) if self.tallies else None,
         )

@@ -49,29 +49,46 @@ def surfaces_elsewhere(
 
 
 def look_plans(
-    shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str, extra: Ports = NO_PORTS
+    shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str, extra: Ports = NO_PORTS, *, tallied: bool = False
 ) -> tuple[tuple[str, SequencePlan], ...]:
-    """For each surface and viewpoint: drive there and look. The sighting goes to `key`; `extra` are detect's."""
+    """For each surface and viewpoint: drive there and look. The sighting goes to `key`; `extra` are detect's.
+
+    With `tallied`, all that a look saw goes to the key that `tally_key` gives for its leaf.
+    """
     views = [(name, n) for name in surfaces for n in range(1, len(shop.knowledge.surfaces[name].viewpoints) + 1)]
-    return tuple((name, _look_plan(shop.at(f"{name}-{n}"), thing, name, n, key, extra)) for name, n in views)
+    return tuple((name, _look_plan(shop.at(f"{name}-{n}"), thing, name, n, key, extra, tallied)) for name, n in views)
 
 
-def _look_plan(shop: Workshop, thing: Thing, surface: str, number: int, key: str, extra: Ports) -> SequencePlan:
+def tally_key(leaf: str) -> str:
+    """The blackboard key of all that the leaf of a look saw."""
+    return f"{leaf}/all"
+
+
+def _look_plan(
+    shop: Workshop, thing: Thing, surface: str, number: int, key: str, extra: Ports, tallied: bool
+) -> SequencePlan:
     view = shop.knowledge.surfaces[surface].viewpoints[number - 1]
     return shop.sequence(
         f"look at {surface}" + (f" ({number})" if number > 1 else ""),
         shop.navigate(pose_2d(view)),
-        detect_plan(shop, thing, (surface,), key, extra),
+        detect_plan(shop, thing, (surface,), key, extra, tallied=tallied),
     )
 
 
 def detect_plan(
-    shop: Workshop, thing: Thing, surfaces: tuple[str, ...] | FromBoard, key: str, extra: Ports = NO_PORTS
+    shop: Workshop,
+    thing: Thing,
+    surfaces: tuple[str, ...] | FromBoard,
+    key: str,
+    extra: Ports = NO_PORTS,
+    *,
+    tallied: bool = False,
 ) -> NodePlan:
     """Look for the thing on some surfaces, by name or from the blackboard, from where the robot stands."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(shop.surface, surfaces))
     ports = {"classes": shop.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
-    return shop.skill("detect", {**ports, **extra}, {"observation": key})
+    tally = {"observations": tally_key(f"{shop.path_id}/detect")} if tallied else {}
+    return shop.skill("detect", {**ports, **extra}, {"observation": key, **tally})
 
 
 def find_again_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodePlan:

@@ -11,9 +11,10 @@ from executive.behaviours.board import FromBoard
 from executive.command import Task, Thing
 from executive.compiling.geometry import inside
 from executive.compiling.handling import go_near_plan, pick_up_plan, tidied, tuck_plan, unless_dropped
-from executive.compiling.plans import AnswerPlan, HoldingPlan, NodePlan, SelectorPlan
-from executive.compiling.search import look_plans, required_surfaces, search_plan, surfaces_elsewhere, where
+from executive.compiling.plans import AnswerPlan, HoldingPlan, NodePlan, RoundPlan, SelectorPlan
+from executive.compiling.search import look_plans, required_surfaces, search_plan, surfaces_elsewhere, tally_key, where
 from executive.compiling.workshop import Workshop, pose_2d
+from skills.detect.words import numbered, plural
 from skills.robot import Pose2D
 
 START: Final = "start"
@@ -53,27 +54,34 @@ def grasp_plan(shop: Workshop, *, anywhere: bool = True) -> NodePlan:
 
 
 def find_plan(shop: Workshop) -> NodePlan:
-    """Look at every surface of the place and answer yes or no; where it is asked where or how many, tell that, too."""
-    thing = _required(shop, shop.command.object)
+    """Look at the surfaces of the place and answer yes or no; where it is asked where or how many, tell that, too.
+
+    The first thing that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
+    """
+    thing, count = _required(shop, shop.command.object), shop.command.object_count
     place = None if shop.command.goal is None else shop.place(shop.command.goal)
     surfaces = required_surfaces(shop, thing, place)
-    below = shop.at("search")
+    below, counting = shop.at("search"), count != 1
     whole_room = place is None or place in shop.knowledge.places
-    extra = {"floor": whole_room, "count": shop.command.object_count}
-    looks = look_plans(below, thing, surfaces, f"{shop.path_id}/sighting", extra)
-    search = SelectorPlan(
+    extra = {"floor": whole_room, "count": 0 if counting else 1}
+    looks = look_plans(below, thing, surfaces, f"{shop.path_id}/sighting", extra, tallied=counting)
+    kind = RoundPlan if counting else SelectorPlan
+    search = kind(
         path_id=below.path_id, name=f"look for {thing}", source=shop.source, steps=tuple(look for _, look in looks)
     )
     leaves = {s: tuple(f"{look.path_id}/detect" for name, look in looks if name == s) for s in surfaces}
+    asked = plural(str(thing)) if count == 0 else numbered(count, str(thing)) if counting else str(thing)
     answer = AnswerPlan(
         path_id=shop.path_id,
-        name=f"is there {thing} {where(place)}?",
+        name=f"{'are' if counting else 'is'} there {asked} {where(place)}?",
         source=shop.source,
         child=search,
-        question=f"{thing} {where(place)}",
+        question=f"{asked} {where(place)}",
         looks=tuple(leaves.items()),
         key=f"{shop.path_id}/answer",
-        tells=place is None or shop.command.object_count != 1,
+        tells=place is None,
+        tallies=tuple((leaf, tally_key(leaf)) for own in leaves.values() for leaf in own) if counting else (),
+        needed=max(1, count),
     )
     return tidied(shop.at("tidy"), answer)
 

@@ -50,17 +50,18 @@ def trips_plan(shop: Workshop, bring: Command) -> NodePlan:
 
 
 def refuse_several(shop: Workshop) -> None:
-    """Refuse a count that no trips are made of; a plural in a question ("are there any hammers") asks for one.
+    """Refuse a count that no trips are made of; in a question any count will do.
 
     Raises:
         InputError: more than one thing, or an open number of things.
     """
     command = shop.command
-    for thing, count in ((command.item, command.item_count), (command.object, command.object_count)):
-        if count > 1 or (count == 0 and command.task is not Task.FIND):
+    asked = 1 if command.task is Task.FIND else command.object_count
+    for thing, count in ((command.item, command.item_count), (command.object, asked)):
+        if count != 1:
             said = f"{count} of '{thing}'" if count else f"an open number of '{thing}'"
-            mend = "say from where to where, and how many" if command.task is not Task.FIND else "ask for one"
-            raise shop.error(f"{said} cannot be carried in one go", f"{mend}, or ask for one at a time")
+            mend = "say from where to where, and how many, or ask for one at a time"
+            raise shop.error(f"{said} cannot be carried in one go", mend)
 
 
 def _trip(shop: Workshop, bring: Command, number: int) -> NodePlan:

@@ -30,13 +30,14 @@ def counted(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> 
     """ "there are two wrenches on the bench"; each kind of thing is counted for itself."""
     kinds = list(dict.fromkeys(str(seen.thing) for seen in found))
     numbers = {kind: sum(str(seen.thing) == kind for seen in found) for kind in kinds}
-    told = " and ".join(_number(count, kind) for kind, count in numbers.items())
+    told = " and ".join(numbered(count, kind) for kind, count in numbers.items())
     places = dict.fromkeys(seen.surface for seen in found if seen.surface)
     where = " and ".join(f"the {name}" for name in places) or surface_names(surfaces)
     return f"there {'is' if len(found) == 1 else 'are'} {told} on {where}"
 
 
-def _number(count: int, kind: str) -> str:
+def numbered(count: int, kind: str) -> str:
+    """ "no hammer", "one hammer", "two hammers"."""
     word = _NUMBERS[count] if count < len(_NUMBERS) else str(count)
     return f"{word} {kind if count == 1 else plural(kind)}"
 

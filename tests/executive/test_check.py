@@ -103,6 +103,14 @@ def test_a_search_goes_on_when_one_surface_is_out_of_reach(check):
     assert checked.errors == ()
 
 
+def test_a_count_goes_to_all_surfaces_that_can_be_reached(check):
+    asked = "Take [Nothing] to [kitchen] and do [find] to [{}coke]"
+    near, every = StraightWays(far_m=4.6), StraightWays()
+    assert check(asked.format("some "), ways=near).errors == ()
+    assert check(asked.format("some "), ways=every).errors == check(asked.format(""), ways=StraightWays()).errors
+    assert len(every.asked) == 3
+
+
 def test_a_raw_pose_out_of_reach_is_refused(check):
     call = SkillCall("navigate", {"x": 50.0, "y": 0.0})
     ((line, message),) = told(check(call, ways=StraightWays(far_m=9.0)))

@@ -14,7 +14,7 @@ __all__ = ["WeightAverage"]
 class WeightAverage:
     """Follows a network; slowly later, fast at first."""
 
-    def __init__(self, network: nn.Module, decay: float = 0.9995, settle_steps: float = 10.0) -> None:
+    def __init__(self, network: nn.Module, decay: float = 0.998, settle_steps: float = 10.0) -> None:
         self.network = copy.deepcopy(network).eval().requires_grad_(False)
         self.decay = decay
         self.settle_steps = settle_steps

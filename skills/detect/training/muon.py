@@ -44,11 +44,19 @@ class Muon(torch.optim.Optimizer):
 
 
 def orthogonal(matrix: Tensor, rounds: int = 5) -> Tensor:
-    """Nearly the orthogonal matrix next to a matrix (M, N): singular values about 1, by Newton-Schulz iteration."""
+    """Nearly the orthogonal matrix next to a matrix (M, N): singular values about 1, by Newton-Schulz iteration.
+
+    The rounds are taken on the products of its shorter side's rows, which are all that they depend on.
+    """
     a, b, c = _COEFFICIENTS
     tall = matrix.shape[0] > matrix.shape[1]
     x = (matrix.T if tall else matrix) / (matrix.norm() + 1e-7)
+    gram = x @ x.T
+    factor = torch.eye(len(gram), dtype=x.dtype, device=x.device)
     for _ in range(rounds):
-        gram = x @ x.T
-        x = a * x + (b * gram + c * gram @ gram) @ x
+        turn = torch.addmm(gram, gram, gram, beta=b, alpha=c)
+        turn.diagonal().add_(a)
+        factor = turn @ factor
+        gram = turn @ gram @ turn
+    x = factor @ x
     return x.T if tall else x

@@ -15,9 +15,8 @@ from skills.detect.training.canvases import CanvasOptions
 __all__ = ["HIGHEST_RATE", "Budget", "Phase", "Schedule", "shuffled"]
 
 HIGHEST_RATE: Final = 3e-3
-_SMALL: Final = CanvasOptions(256, 192, mosaic=0.3, scales=(0.4, 1.4))
-_WINDOWS: Final = CanvasOptions(320, 256, mosaic=0.5, scales=(0.4, 1.5), changed=0.8)
-_LARGER: Final = CanvasOptions(448, 352, mosaic=0.3, scales=(0.5, 1.4), changed=0.7)
+_CHIPS: Final = CanvasOptions(128, 128, mosaic=0.0, focused=0.85, scales=(0.4, 1.5), changed=0.8)
+_WINDOWS: Final = CanvasOptions(256, 192, mosaic=0.3, scales=(0.4, 1.4), changed=0.7)
 _PICTURES: Final = CanvasOptions(640, 480, mosaic=0.0, scales=(0.8, 1.25), changed=0.5, whole=True)
 
 
@@ -48,14 +47,15 @@ class Budget:
 class Schedule:
     """A warm-up of so many steps, then half a cosine from the highest rate to the last.
 
-    Windows come first and cost little; whole pictures come last, as the detector will see them.
+    Chips that hold little but a thing come first, since most things are learnt from in the same time there; then wider
+    windows; whole pictures, as the detector will see them, last.
     """
 
     highest_rate: float = HIGHEST_RATE
     last_share: float = 0.02
     warm_up_steps: int = 100
     phases: Sequence[Phase] = field(
-        default=(Phase(0.0, _SMALL, 16), Phase(0.45, _WINDOWS, 16), Phase(0.75, _LARGER, 8), Phase(0.88, _PICTURES, 4)),
+        default=(Phase(0.0, _CHIPS, 64), Phase(0.4, _WINDOWS, 20), Phase(0.7, _PICTURES, 6)),
     )
 
     def rate(self, step: int, progress: float) -> float:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import queue
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -78,7 +79,17 @@ def _learn_together(options: TrainOptions, told: Told) -> None:
                 _pass_on(reports, told)
         except torch.multiprocessing.ProcessExitedException as error:
             raise TrainingDataError(f"{options.out}: a training process was killed", mend=_GO_ON) from error
+        finally:
+            _end(running.processes)
         _pass_on(reports, told)
+
+
+def _end(processes: Sequence[multiprocessing.Process]) -> None:
+    """End those that still run, so that none stays behind when this one is interrupted."""
+    for process in processes:
+        if process.is_alive():
+            process.terminate()
+            process.join()
 
 
 def _pass_on(reports: Any, told: Told) -> None:

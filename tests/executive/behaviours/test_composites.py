@@ -5,7 +5,7 @@ import pytest
 from py_trees.behaviours import StatusQueue, TickCounter
 from py_trees.common import Status
 
-from executive.behaviours.composites import MemorySelector, MemorySequence
+from executive.behaviours.composites import MemoryRound, MemorySelector, MemorySequence
 from executive.behaviours.explained import Explained
 from skills.api import Cause
 
@@ -31,6 +31,10 @@ def sequence(*children):
 
 def selector(*children, **more):
     return MemorySelector(path_id="a/sel", name="sel", children=children, **more)
+
+
+def round_of(*children):
+    return MemoryRound(path_id="a/round", name="round", children=children)
 
 
 def table(root, ticks: int) -> list[tuple[Status, ...]]:
@@ -84,6 +88,21 @@ def test_exhausted_selector_tells_the_sentences_of_all_that_began():
     root = selector(*children, exhausted_message="found nothing")
     root.tick_once()
     assert root.message == "found nothing: a; b"
+
+
+def test_round_goes_on_whatever_becomes_of_each():
+    # tick   round     first  second  third
+    # 1      RUNNING   S      R       -
+    # 2      SUCCESS   S      F       F
+    root = round_of(queue(S), queue(R, F), Fails(Cause.PLANNING, "no"))
+    assert table(root, 2) == [(R, S, R, N), (S, S, F, F)]
+    assert root.cause is None
+
+
+def test_round_of_which_nothing_works_fails_with_the_decisive_cause():
+    root = round_of(Fails(Cause.POSTCONDITION, "a"), Fails(Cause.PLANNING, "b"), Fails(Cause.POSTCONDITION, "c"))
+    assert table(root, 1) == [(F, F, F, F)]
+    assert (root.cause, root.message) == (Cause.PLANNING, "a; b; c")
 
 
 @pytest.mark.parametrize("kind", [sequence, selector])

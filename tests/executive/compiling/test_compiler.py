@@ -10,6 +10,8 @@ from executive.compiler import Step, compile_commands
 from executive.compiling.plans import AnswerPlan, HoldingPlan, RememberPosePlan, SkillPlan, Source
 from executive.compiling.search import surfaces_to_search
 from executive.errors import InputError
+from executive.outcome import Outcome
+from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
 from skills.robot import Pose2D
 
 
@@ -165,6 +167,36 @@ def test_a_status_check_names_every_look(compiled):
 
 
 @pytest.mark.parametrize(
+    ("asked", "seen_on", "answer", "told"),
+    [
+        (
+            "some coke",
+            ("counter", "shelf"),
+            True,
+            "yes: cokes in the kitchen; there are two cokes on the counter and",
+        ),
+        ("2 coke", ("counter", "shelf"), True, "yes: two cokes in the kitchen; there are two cokes"),
+        ("2 coke", ("shelf",), False, "no: two cokes in the kitchen; there is one coke on the shelf"),
+        ("some coke", (), False, "no: cokes in the kitchen"),
+    ],
+)
+def test_things_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, script, asked, seen_on, answer, told):
+    def look(skill):
+        (surface,) = skill.inputs.surfaces
+        if surface.name not in seen_on:
+            return Failed(Cause.POSTCONDITION, "not seen")
+        x_m, y_m = surface.polygon_W[0]
+        seen = ObjectObservation(0.0, Thing("coke"), (x_m, y_m, 1.0), (0.1, 0.1, 0.1), 0.0, 0.9, surface.name)
+        return Succeeded("seen", {"observation": seen, "observations": (seen,)})
+
+    script.ends["detect"] = look
+    worst = run_tree(compiled(f"Take [Nothing] to [kitchen] and do [find] to [{asked}]")).worst
+    assert (worst.outcome, list(worst.answers.values())) == (Outcome.SUCCESS, [answer])
+    assert worst.message.startswith(told)
+    assert script.begun.count("detect") == 3
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         (
@@ -178,7 +210,7 @@ def test_a_status_check_names_every_look(compiled):
         ("Take [coke] to [Nothing] and do [Nothing] to [Nothing]", "not said where"),
         ("Take [coke] to [kitchen] and do [grasp] to [beer]", "one gripper"),
         ("Take [Nothing] to [kitchen] and do [grasp] to [2 coke]", "2 of 'coke' cannot be carried in one go"),
-        ("Take [Nothing] to [kitchen] and do [grasp] to [several coke]", "cannot be carried in one go|is no"),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [some coke]", "cannot be carried in one go|is no"),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_a_reason(compiled, text, words):

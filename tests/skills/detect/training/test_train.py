@@ -1,6 +1,7 @@
 """From a folder of pictures to the ONNX file; skipped without torch."""
 
 import json
+import multiprocessing
 from dataclasses import replace
 from pathlib import Path
 
@@ -53,6 +54,15 @@ def test_a_data_set_becomes_a_detectors_file(options: TrainOptions, processes: i
     assert told[-1].progress == 1.0
     assert told[-1].figures is not None
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, "curves.png", "pictures"}
+
+
+def test_an_interrupted_training_leaves_no_process_behind(options: TrainOptions) -> None:
+    def interrupted(_report: Report) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(replace(options, processes=2, budget=Budget(seconds=3600.0)), interrupted)
+    assert multiprocessing.active_children() == []
 
 
 def test_a_resumed_training_counts_what_it_has_seen(options: TrainOptions) -> None:

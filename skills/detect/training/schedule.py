@@ -17,6 +17,7 @@ __all__ = ["HIGHEST_RATE", "Budget", "Phase", "Schedule", "shuffled"]
 HIGHEST_RATE: Final = 3e-3
 _CHIPS: Final = CanvasOptions(128, 128, mosaic=0.0, focused=0.85, scales=(0.4, 1.5), changed=0.8)
 _WINDOWS: Final = CanvasOptions(256, 192, mosaic=0.3, scales=(0.4, 1.4), changed=0.7)
+_LARGER: Final = CanvasOptions(384, 320, mosaic=0.25, focused=0.75, scales=(0.5, 1.3), changed=0.6)
 _PICTURES: Final = CanvasOptions(640, 480, mosaic=0.0, scales=(0.8, 1.25), changed=0.5, whole=True)
 
 
@@ -55,7 +56,7 @@ class Schedule:
     last_share: float = 0.02
     warm_up_steps: int = 100
     phases: Sequence[Phase] = field(
-        default=(Phase(0.0, _CHIPS, 64), Phase(0.4, _WINDOWS, 20), Phase(0.7, _PICTURES, 6)),
+        default=(Phase(0.0, _CHIPS, 64), Phase(0.4, _WINDOWS, 20), Phase(0.55, _LARGER, 8), Phase(0.82, _PICTURES, 4)),
     )
 
     def rate(self, step: int, progress: float) -> float:

@@ -138,28 +138,30 @@ def _first_of(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
     """The first way that can be gone; when there is none, the first one's reason."""
     reasons: list[InputError] = []
     for child in node.expected:
-        here, noted = walk.pose, dict(walk.noted)
-        try:
-            return _followed(child, walk, first=True)
-        except _CannotError as cannot:
-            walk.pose, walk.noted = here, noted
-            reasons += [] if cannot.error is None else [cannot.error]
+        tried = _tried(child, walk, reasons)
+        if tried is not None:
+            return tried
     raise _CannotError(reasons[0] if reasons else None)
 
 
 def _all_that_can(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
     """All ways that can be gone; when there is none, the first one's reason."""
-    done, reasons = list[Estimate](), list[InputError | None]()
-    for child in node.expected:
-        here, noted = walk.pose, dict(walk.noted)
-        try:
-            done.append(_followed(child, walk, first=True))
-        except _CannotError as cannot:
-            walk.pose, walk.noted = here, noted
-            reasons.append(cannot.error)
+    reasons: list[InputError] = []
+    done = [tried for child in node.expected if (tried := _tried(child, walk, reasons)) is not None]
     if not done:
-        raise _CannotError(next(filter(None, reasons), None))
+        raise _CannotError(reasons[0] if reasons else None)
     return sum(done, Estimate())
+
+
+def _tried(way: NodePlan, walk: _Walk, reasons: list[InputError]) -> Estimate | None:
+    """One way; None where it cannot be gone: then the walk stands as before, and `reasons` has its reason."""
+    here, noted = walk.pose, dict(walk.noted)
+    try:
+        return _followed(way, walk, first=True)
+    except _CannotError as cannot:
+        walk.pose, walk.noted = here, noted
+        reasons += [] if cannot.error is None else [cannot.error]
+        return None
 
 
 def _if_known(node: NodePlan, walk: _Walk, first: bool) -> Estimate:

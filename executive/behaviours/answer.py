@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 from py_trees.behaviour import Behaviour
@@ -23,8 +23,8 @@ ANSWER_TOPIC: Final = "answer"
 class Tally:
     """What is to be counted: all that the leaves of looks saw, each under a blackboard key; yes is `needed` of them."""
 
-    keys: Mapping[str, str] = field(default_factory=dict)
-    needed: int = 1
+    keys: Mapping[str, str]
+    needed: int
 
 
 class Answer(ExplainedDecorator):

@@ -70,7 +70,7 @@ def find_plan(shop: Workshop) -> NodePlan:
         path_id=below.path_id, name=f"look for {thing}", source=shop.source, steps=tuple(look for _, look in looks)
     )
     leaves = {s: tuple(f"{look.path_id}/detect" for name, look in looks if name == s) for s in surfaces}
-    asked = plural(str(thing)) if count == 0 else numbered(count, str(thing)) if counting else str(thing)
+    asked = _asked_for(str(thing), count)
     answer = AnswerPlan(
         path_id=shop.path_id,
         name=f"{'are' if counting else 'is'} there {asked} {where(place)}?",
@@ -84,6 +84,13 @@ def find_plan(shop: Workshop) -> NodePlan:
         needed=max(1, count),
     )
     return tidied(shop.at("tidy"), answer)
+
+
+def _asked_for(thing: str, count: int) -> str:
+    """What a question is about: "beer", "two beers", or "beers" for any number."""
+    if count == 1:
+        return thing
+    return numbered(count, thing) if count else plural(thing)
 
 
 def carry_plan(shop: Workshop) -> NodePlan:

@@ -22,7 +22,6 @@ from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
 from skills.detect.attributes import known_attributes
 from skills.detect.detector_file import MODEL_FILE
-from skills.detect.interim_segmentation import SurfaceSegmentationDetector
 from skills.detect.onnx_detector import DetectorOptions
 from skills.detection import Detector
 from skills.estimate.costmap import LayeredCostmap
@@ -87,7 +86,7 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
         robot=simulation.robots[tree.robot_name],
         localiser=_localiser(scan_map, world.start, believed),
         costmap=LayeredCostmap(keepout_map),
-        detector=thing_detector(),
+        detector=shared_detector(),
     )
 
 
@@ -95,12 +94,6 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
 def shared_detector() -> Detector:
     """The one detector of this process, loaded at the first call. Raises InputError when its model cannot be used."""
     return detector_of(MODEL_FILE, DetectorOptions())
-
-
-@cache
-def thing_detector() -> Detector:
-    """What finds the things for the skills; INTERIM: on surfaces by size and colour."""
-    return SurfaceSegmentationDetector(shared_detector())
 
 
 def _localiser(scan_map: GridMap, start: Pose2D, believed: Pose2D | None) -> ScanMatchingLocaliser:
@@ -142,7 +135,7 @@ def itinerary_of(world: World) -> PlannedWays:
 def abilities_of() -> Abilities:
     """What the robot can lift, and what the things weigh that there are models of."""
     masses = {name: _mass_kg(one.path()) for name, one in load_catalogue().items() if one.file is not None}
-    return Abilities(masses, LIFT_KG, frozenset(thing_detector().class_names), known_attributes())
+    return Abilities(masses, LIFT_KG, frozenset(shared_detector().class_names), known_attributes())
 
 
 def _mass_kg(sdf: Path) -> float:

@@ -1,4 +1,4 @@
-"""What things look like: colour shares and sizes from `appearance.yaml`."""
+"""What colour words mean: ranges of hue, saturation and value from `appearance.yaml`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
-
-from skills.detect.shape import SeenShape
 
 Colours = NDArray[np.uint8]
 
@@ -38,28 +36,9 @@ class ColourRange(_Model):
         return float(np.mean(in_hue & in_saturation & in_value))
 
 
-class ColourShare(_Model):
-    """Share of a thing's visible points (from, to) in any of some colour ranges."""
-
-    any_of: tuple[ColourRange, ...]
-    share: tuple[float, float]
-
-
-class ClassAppearance(_Model):
-    """One class: id in messages, extents in m (from, to), colours that it shows."""
-
-    id: int
-    length_m: tuple[float, float]
-    width_m: tuple[float, float]
-    height_m: tuple[float, float]
-    colours: tuple[ColourShare, ...]
-
-
 class Appearance(_Model):
-    """All classes, colour words, and the score from which a thing is believed."""
+    """The colour words."""
 
-    accept_score: float
-    classes: dict[str, ClassAppearance]
     attributes: dict[str, ColourRange]
 
     def shows(self, colours: Colours, attribute: str) -> bool:
@@ -72,28 +51,3 @@ def load_appearance() -> Appearance:
     """The appearance data beside this module. Raises pydantic.ValidationError when it is malformed."""
     path = Path(__file__).with_name("appearance.yaml")
     return Appearance.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
-
-
-def score_class(appearance: Appearance, name: str, shape: SeenShape, colours: Colours) -> float:
-    """How well a thing fits a class, 0 to 1. Raises KeyError for an unknown class."""
-    look = appearance.classes[name]
-    sizes = [
-        _membership(shape.length_m, look.length_m, 0.25),
-        _membership(shape.width_m, look.width_m, 0.25),
-        _membership(shape.height_m, look.height_m, 0.25),
-    ]
-    shares = [
-        _membership(min(1.0, sum(part.share(colours) for part in colour.any_of)), colour.share, 0.5)
-        for colour in look.colours
-    ]
-    return float(min(sizes) * np.prod(shares))
-
-
-def _membership(value: float, limits: tuple[float, float], tolerance: float) -> float:
-    """1 inside the limits, falling to 0 over a tolerance relative to the limit passed."""
-    low, high = limits
-    if value < low:
-        return max(0.0, 1.0 - (low - value) / (tolerance * low))
-    if value > high:
-        return max(0.0, 1.0 - (value - high) / (tolerance * high))
-    return 1.0

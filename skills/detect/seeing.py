@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from pydrake.math import RigidTransform
-
-from skills.api import Detection, Detector, Surface
-from skills.detect.interim_segmentation import SurfaceDetector
-from skills.detect.surface_view import view_surface
+from skills.api import Detection, Detector
 from skills.robot import Image
 
 DETECTION_LATENCY_S = 0.15
@@ -16,13 +10,8 @@ DETECTION_LATENCY_S = 0.15
 _DARK_MEAN, _DARK_SPREAD = 6.0, 4.0
 
 
-def detections_in(
-    detector: Detector, image: Image, X_WO: RigidTransform, surfaces: Sequence[Surface]
-) -> tuple[Detection, ...]:
+def detections_in(detector: Detector, image: Image) -> tuple[Detection, ...]:
     """What the detector finds in a picture."""
-    if isinstance(detector, SurfaceDetector):
-        views = (view_surface(image, X_WO, surface) for surface in surfaces)
-        return detector.detect_on([view for view in views if view is not None])
     return detector.detect([image.grey if image.colour is None else image.colour])[0]
 
 

@@ -250,7 +250,7 @@ class Detect(ArmSkill[DetectInputs]):
         place, detector = self.context.localiser.estimate(), self.context.detector
 
         def examine() -> Look:
-            found = detections_in(detector, image, place.X_WO, inputs.surfaces)
+            found = detections_in(detector, image)
             views = (view_surface(image, place.X_WO, surface) for surface in inputs.surfaces)
             clusters = tuple(cluster for view in views if view is not None for cluster in view.clusters)
             return Look(image, place, found, sightings(image, place, found, inputs.surfaces), clusters)

@@ -171,7 +171,7 @@ class Grasp(ArmSkill[GraspInputs]):
         place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
 
         def examine() -> CloseView | None:
-            found = detections_in(detector, image, place.X_WO, [surface])
+            found = detections_in(detector, image)
             same_class = [each for each in found if each.class_name == seen.thing.name]
             return _examine(image, X_WB, surface, seen, place, sightings(image, place, same_class, [surface]))
 

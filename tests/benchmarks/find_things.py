@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
-from executive.cli.assembly import knowledge_of, open_world, thing_detector
+from executive.cli.assembly import knowledge_of, open_world, shared_detector
 from executive.testing.bench import SkillBench
 from plant.dataset.compose import Placed, Scene, compose
 from plant.dataset.lighting import random_lighting
@@ -129,7 +129,7 @@ def in_flat(seed: int, number: int) -> Iterator[Asked]:
         engine,
         localiser=ScanMatchingLocaliser(load_grid_map(world.scan_map_path), pose),
         costmap=LayeredCostmap(load_grid_map(world.keepout_map_path)),
-        detector=thing_detector(),
+        detector=shared_detector(),
         seed=number,
     )
     for each in there:
@@ -322,7 +322,7 @@ def main() -> None:
     parser.add_argument("--true-boxes", action="store_true", help="in the rooms, boxes of a perfect detector")
     args = parser.parse_args()
     every = []
-    for each in results(args.seed, args.flat, args.rooms, TrueBoxes() if args.true_boxes else thing_detector()):
+    for each in results(args.seed, args.flat, args.rooms, TrueBoxes() if args.true_boxes else shared_detector()):
         every.append(each)
         told = "there" if each.there else "absent"
         sys.stderr.write(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.cli.assembly import thing_detector
+from executive.cli.assembly import shared_detector
 from executive.testing.bench import SkillBench
 from executive.testing.skill_test import RobotSetup, WorldSetup
 from executive.testing.small_room import write_small_room
@@ -37,7 +37,7 @@ def make_small_plant(folder: Path, *, seed: int = 1, can: bool = True) -> SmallP
         simulation.clock,
         localiser=ScanMatchingLocaliser(load_grid_map(world.scan_map_path), world.start),
         costmap=LayeredCostmap(load_grid_map(world.keepout_map_path)),
-        detector=thing_detector(),
+        detector=shared_detector(),
         seed=seed,
     )
     return SmallPlant(world, simulation, bench)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -14,7 +14,7 @@ from onnxruntime import InferenceSession
 
 from skills.detect.detector_file import MODEL_FILE, THREADS, DetectorModel, load_model
 from skills.detect.letterbox import Letterbox, letterbox
-from skills.detect.suppression import SuppressionOptions, candidates_of, suppress
+from skills.detect.suppression import SuppressionOptions, candidates_of, rivals_of, suppress
 from skills.detection import Detection
 
 __all__ = ["DetectorOptions", "OnnxDetector", "load_detector"]
@@ -25,9 +25,10 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class DetectorOptions:
-    """The least score that is told, and how boxes on one thing become one."""
+    """The least score that is told, also of a class that a thing may be as well, and how boxes on it become one."""
 
     threshold: float = 0.5
+    rival_threshold: float = 0.1
     suppression: SuppressionOptions = field(default_factory=SuppressionOptions)
 
 
@@ -62,15 +63,26 @@ class OnnxDetector:
     def _detections(self, boxes: Floats, scores: Floats, placed: Letterbox) -> tuple[Detection, ...]:
         """The things of one picture from the network's boxes (A, 4) and scores (A, K)."""
         rules = self.options.suppression
-        candidates = candidates_of(boxes, scores, self.options.threshold, rules.most_candidates)
-        kept = suppress(candidates, rules)
+        least = min(self.options.threshold, self.options.rival_threshold)
+        candidates = candidates_of(boxes, scores, least, rules.most_candidates)
+        kept = suppress(candidates.from_score(self.options.threshold), rules)
         corners = placed.to_picture(kept.boxes).astype(np.float64)
-        rows = zip(kept.classes.tolist(), kept.scores.tolist(), corners.tolist(), strict=True)
+        rows = zip(
+            kept.classes.tolist(),
+            kept.scores.tolist(),
+            corners.tolist(),
+            rivals_of(kept, candidates, rules),
+            strict=True,
+        )
         return tuple(
-            Detection(self.class_names[which], score, (u0, v0, u1, v1))
-            for which, score, (u0, v0, u1, v1) in rows
+            Detection(self.class_names[which], score, (u0, v0, u1, v1), self._named(rivals))
+            for which, score, (u0, v0, u1, v1), rivals in rows
             if u1 > u0 and v1 > v0
         )
+
+    def _named(self, rivals: Mapping[int, float]) -> tuple[tuple[str, float], ...]:
+        """Classes by name, the likeliest first."""
+        return tuple((self.class_names[k], rivals[k]) for k in sorted(rivals, key=lambda k: -rivals[k]))
 
 
 def load_detector(file: Path = MODEL_FILE, options: DetectorOptions | None = None) -> OnnxDetector:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Candidates", "SuppressionOptions", "candidates_of", "suppress"]
+__all__ = ["Candidates", "SuppressionOptions", "candidates_of", "rivals_of", "suppress"]
 
 Floats = NDArray[np.float32]
 
@@ -18,12 +18,14 @@ class SuppressionOptions:
 
     Boxes of one class that overlap by more than `same_class` (shared area / area of both) are one thing. So are boxes
     of two classes over `other_class`, when the surer of the two has at least `sure_score`. Of more than
-    `most_candidates` boxes in a picture the surest are looked at, and `most_kept` of those that stay are told.
+    `most_candidates` boxes in a picture the surest are looked at, and `most_kept` of those that stay are told. What a
+    thing may be as well is told by boxes of other classes that overlap its own by more than `rival`.
     """
 
     same_class: float = 0.6
     other_class: float = 0.8
     sure_score: float = 0.5
+    rival: float = 0.55
     most_candidates: int = 1000
     most_kept: int = 300
 
@@ -42,6 +44,10 @@ class Candidates:
     def at(self, rows: NDArray[np.int64]) -> Candidates:
         """Those of some rows."""
         return Candidates(self.boxes[rows], self.scores[rows], self.classes[rows])
+
+    def from_score(self, threshold: float) -> Candidates:
+        """Those with at least a score."""
+        return self.at(np.flatnonzero(self.scores >= threshold))
 
 
 def candidates_of(boxes: Floats, scores: Floats, threshold: float, most: int) -> Candidates:
@@ -75,17 +81,26 @@ def suppress(candidates: Candidates, options: SuppressionOptions) -> Candidates:
 
 def _replaced_by(candidates: Candidates, options: SuppressionOptions) -> NDArray[np.bool_]:
     """(N, N): whether the one of the row stands for the one of the column, if that is less sure."""
-    shared = _overlaps(candidates.boxes)
+    shared = _overlaps(candidates.boxes, candidates.boxes)
     same = candidates.classes[:, None] == candidates.classes[None, :]
     sure = (candidates.scores >= options.sure_score)[:, None]
     return np.asarray(np.where(same, shared > options.same_class, sure & (shared > options.other_class)))
 
 
-def _overlaps(boxes: Floats) -> Floats:
-    """Shared area / area of both together (N, N)."""
-    u0, v0, u1, v1 = (boxes[:, k] for k in range(4))
-    width = np.minimum(u1[:, None], u1[None, :]) - np.maximum(u0[:, None], u0[None, :])
-    height = np.minimum(v1[:, None], v1[None, :]) - np.maximum(v0[:, None], v0[None, :])
-    shared = np.clip(width, 0.0, None) * np.clip(height, 0.0, None)
-    areas = (u1 - u0) * (v1 - v0)
-    return np.asarray(shared / (areas[:, None] + areas[None, :] - shared), dtype=np.float32)
+def rivals_of(kept: Candidates, candidates: Candidates, options: SuppressionOptions) -> list[dict[int, float]]:
+    """For each of those kept, the other classes that it may be with their best scores on the same thing."""
+    alike = _overlaps(kept.boxes, candidates.boxes) > options.rival
+    alike &= kept.classes[:, None] != candidates.classes[None, :]
+    rivals: list[dict[int, float]] = [{} for _ in range(len(kept))]
+    for row, column in np.argwhere(alike).tolist():
+        rivals[row].setdefault(int(candidates.classes[column]), float(candidates.scores[column]))
+    return rivals
+
+
+def _overlaps(first: Floats, second: Floats) -> Floats:
+    """Shared area / area of both together (N, M)."""
+    low = np.maximum(first[:, None, :2], second[None, :, :2])
+    high = np.minimum(first[:, None, 2:], second[None, :, 2:])
+    shared = np.clip(high - low, 0.0, None).prod(axis=2)
+    areas, others = ((boxes[:, 2:] - boxes[:, :2]).prod(axis=1) for boxes in (first, second))
+    return np.asarray(shared / (areas[:, None] + others[None, :] - shared), dtype=np.float32)

@@ -186,10 +186,11 @@ def _fused(track: Track, sighting: Sighting, names: Sequence[str]) -> Track:
 
 
 def _classes(before: Mapping[str, float], sighting: Sighting) -> Mapping[str, float]:
-    """Class beliefs after a sighting: its score for its class, the rest spread over the others."""
+    """Class beliefs after a sighting: its scores for its class and for the rivals, the rest spread over the others."""
     score = float(np.clip(sighting.detection.score, 0.3, 0.97))
     others = (1.0 - score) / max(len(before) - 1, 1)
-    raw = {name: p * (score if name == sighting.class_name else others) for name, p in before.items()}
+    scores = {name: max(rival, others) for name, rival in sighting.detection.rivals} | {sighting.class_name: score}
+    raw = {name: p * scores.get(name, others) for name, p in before.items()}
     total = sum(raw.values())
     return MappingProxyType({name: max(value / total, 1e-3) for name, value in raw.items()})
 

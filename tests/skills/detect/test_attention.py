@@ -20,14 +20,22 @@ def clusters(*things):
     return view.clusters
 
 
-def track_at(x, y):
-    book = TrackBook(("coke",))
-    return book.update([replace(sighting(), position_W=np.array([x, y, 0.8]))], lambda track: True)
+def track_at(x, y, **seen):
+    book = TrackBook(("coke", "beer", "hammer", "wrench", "cube"))
+    return book.update([replace(sighting(**seen), position_W=np.array([x, y, 0.8]))], lambda track: True)
 
 
 def test_what_has_a_track_is_named():
     left = unnamed(clusters(COKE, BOX), track_at(COKE.x, COKE.y), ("coke",))
     assert [round(one.shape.centre[1], 1) for one in left] == [0.2]
+
+
+def test_what_may_be_meant_though_it_is_likelier_something_else_is_not_named():
+    # what it was taken for, and how many clusters are left of the one that stands there
+    rows = [("coke", (), 0), ("beer", (("coke", 0.4),), 1), ("beer", (("hammer", 0.4),), 0), ("beer", (), 0)]
+    for name, rivals, expected in rows:
+        tracks = track_at(COKE.x, COKE.y, name=name, score=0.76, rivals=rivals)
+        assert len(unnamed(clusters(COKE), tracks, ("coke",))) == expected, (name, rivals)
 
 
 def test_what_is_too_large_or_small_for_the_class_is_passed_over():

@@ -40,6 +40,17 @@ def test_a_lower_threshold_tells_more(file):
     assert len(detector.detect([picture_of(("beer", 0.2, (0, 0, 50, 50)))])[0]) == 1
 
 
+def test_what_a_thing_may_be_as_well_is_told_with_it(detector):
+    things = [
+        HAMMER,
+        ("coke", 0.3, (100, 50, 200, 78)),
+        ("beer", 0.4, (100, 50, 200, 80)),
+        ("beer", 0.05, (0, 0, 9, 9)),
+    ]
+    (found,) = detector.detect([picture_of(*things)])
+    assert [one.rivals for one in found] == [(("beer", pytest.approx(0.4)), ("coke", pytest.approx(0.3)))]
+
+
 def test_two_boxes_on_one_thing_become_one(detector):
     double = ("coke", 0.7, (100, 50, 200, 77.5))
     (found,) = detector.detect([picture_of(HAMMER, double)])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skills.detect.suppression import Candidates, SuppressionOptions, candidates_of, suppress
+from skills.detect.suppression import Candidates, SuppressionOptions, candidates_of, rivals_of, suppress
 
 OPTIONS = SuppressionOptions(same_class=0.6, other_class=0.8, sure_score=0.5)
 
@@ -47,6 +47,21 @@ def test_what_has_gone_takes_nothing_with_it():
 def test_no_more_than_asked_for_are_kept():
     rows = [((20 * k, 0, 20 * k + 10, 10), 0.9 - 0.1 * k, 1) for k in range(4)]
     assert len(kept(*rows, options=SuppressionOptions(most_kept=2))) == 2
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        ([(WHOLE, 0.9, 1), (MOST, 0.4, 2), (MOST, 0.2, 3)], {2: 0.4, 3: 0.2}),
+        ([(WHOLE, 0.9, 1), (WHOLE, 0.4, 2), (MOST, 0.3, 2)], {2: 0.4}),
+        ([(WHOLE, 0.9, 1), (MOST, 0.4, 1)], {}),
+        ([(WHOLE, 0.9, 1), (HALF, 0.4, 2), (BESIDE, 0.4, 2)], {}),
+    ],
+    ids=["two rivals", "the surer box of one", "its own class", "too little shared"],
+)
+def test_what_a_thing_may_be_as_well(rows, expected):
+    (found,) = rivals_of(suppress(candidates(rows[0]), OPTIONS), candidates(*rows), OPTIONS)
+    assert found == pytest.approx(expected)
 
 
 def test_nothing_stays_nothing():

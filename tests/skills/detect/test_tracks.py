@@ -83,6 +83,17 @@ def test_class_belief_follows_the_scores_of_all_views():
     assert sum(track.classes.values()) == pytest.approx(1.0, abs=0.01)
 
 
+def test_a_class_that_was_only_likely_at_first_may_win():
+    # wrench-like from afar, 0.6 to 0.35; plainly a hammer from near
+    far = sighting(name="coke", score=0.6, rivals=(("hammer", 0.35),))
+    (track,) = book_of([far]).snapshot()
+    assert track.class_name == "coke"
+    assert track.classes["hammer"] > track.classes["beer"]
+    (track,) = book_of([far], [sighting(name="hammer", score=0.9)]).snapshot()
+    assert track.class_name == "hammer"
+    assert track.classes["hammer"] > 0.8
+
+
 def test_what_should_be_seen_again_and_is_not_loses_belief_and_is_forgotten():
     beliefs = [t.belief for n in range(1, 4) for t in book_of([sighting()], *[[]] * n).snapshot()]
     assert beliefs == sorted(beliefs, reverse=True)

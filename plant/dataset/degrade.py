@@ -48,7 +48,7 @@ class Degradation:
 
 def degraded(clean: Picture, how: Degradation, rng: np.random.Generator, *, grey: bool) -> Picture:
     """The picture (H, W, 3), or (H, W) in grey."""
-    image = _exposed(clean.astype(np.float32), how)
+    image = exposed(clean.astype(np.float32), how.mean, how.gamma)
     scale = clean.shape[1] / 640.0
     image = _blurred(image, how, scale)
     height, width = clean.shape[:2]
@@ -63,10 +63,10 @@ def degraded(clean: Picture, how: Degradation, rng: np.random.Generator, *, grey
     return _counts(image + grain * (0.6 + 0.8 * (image / 255.0)))
 
 
-def _exposed(image: FloatPicture, how: Degradation) -> FloatPicture:
-    """Brightness set to a mean, as automatic exposure does, not always well."""
-    gain = float(np.clip(how.mean / max(float(image.mean()), 1.0), 0.35, 8.0))
-    lit = 255.0 * np.clip(image * gain / 255.0, 0, 1) ** how.gamma
+def exposed(image: FloatPicture, mean: float, gamma: float = 1.0) -> FloatPicture:
+    """Brightness (0 to 255) set to a mean, as automatic exposure does, not always well."""
+    gain = float(np.clip(mean / max(float(image.mean()), 1.0), 0.35, 8.0))
+    lit = 255.0 * np.clip(image * gain / 255.0, 0, 1) ** gamma
     return np.asarray(lit, dtype=np.float32)
 
 

@@ -34,6 +34,7 @@ _FEWEST_POINTS = 12
 _LOWEST_M = 0.004
 _JOIN_GAIN = 0.05
 _MOST_GROUPS = 5
+_MOSTLY_INSIDE = 0.8
 _SHARE_POWER = 0.7
 _WITHOUT_PLANE = 0.85
 _FLOATS_M, _FLOATING = 0.025, 0.7
@@ -230,15 +231,35 @@ def _resting(window: Window, mask: Mask, plane: LevelPlane | None) -> float:
 
 
 def _best_groups(window: Window, labels: NDArray[np.int32], count: int, form: ClassForm) -> tuple[Mask, float]:
-    """The group that fits best, with others where they make it fit better."""
-    fits = {k: _fit(window, labels == k, form) for k in _largest_inside(window, labels, count)}
-    best, fit = np.zeros_like(window.valid), 0.0
-    for k in sorted(fits, key=lambda k: -fits[k]):
-        joined = best | (labels == k)
-        both = fits[k] if fit == 0.0 else _fit(window, joined, form)
-        if fit == 0.0 or both > fit + _JOIN_GAIN:
-            best, fit = joined, both
-    return best & window.inside, fit
+    """The group that fits best, with others that hardly reach beyond the box where they make it fit better.
+
+    The first may be one that reaches beyond, such as a wall, or else one that does not.
+    """
+    largest = _largest_inside(window, labels, count)
+    fits = {k: _fit(window, labels == k, form) for k in largest}
+    order = sorted(fits, key=lambda k: -fits[k])
+    kept = [k for k in order if _share_inside(window, labels == k) >= _MOSTLY_INSIDE]
+    firsts = dict.fromkeys([*order[:1], *kept[:1]])
+    options = [_with_others(window, labels, first, kept, fits[first], form) for first in firsts]
+    mask, fit = max(options, key=lambda option: option[1], default=(np.zeros_like(window.valid), 0.0))
+    return mask & window.inside, fit
+
+
+def _with_others(
+    window: Window, labels: NDArray[np.int32], first: int, others: list[int], fit: float, form: ClassForm
+) -> tuple[Mask, float]:
+    """A group with those of some others that make it fit better, one after the other."""
+    mask = labels == first
+    for k in others:
+        both = _fit(window, mask | (labels == k), form) if k != first else 0.0
+        if both > fit + _JOIN_GAIN:
+            mask, fit = mask | (labels == k), both
+    return mask, fit
+
+
+def _share_inside(window: Window, mask: Mask) -> float:
+    """The share of a group that lies in the box."""
+    return int((mask & window.inside).sum()) / max(int(mask.sum()), 1)
 
 
 def _largest_inside(window: Window, labels: NDArray[np.int32], count: int) -> list[int]:
@@ -294,7 +315,7 @@ def _groups_in_picture(window: Window, standing: Mask, *, parted: bool) -> tuple
 def _fit(window: Window, mask: Mask, form: ClassForm) -> float:
     """How well a group has the box of the detection and the size of its class, 0 to 1."""
     inside = mask & window.inside
-    share = int(inside.sum()) / int(mask.sum())
+    share = _share_inside(window, mask)
     return float(_covered(window, inside) * share**_SHARE_POWER * _sized(window.p_O[inside], form) ** 2)
 
 

@@ -216,6 +216,8 @@ def _with_appendages(
 def _lying(points: FloatArray, fore: Foreground, form: ClassForm, base_m: float, height_m: float, cut: _Cut) -> Extents:
     """The outline from above, completed on the far side and beyond the picture's edge."""
     centre, length, width, yaw = _outline(points, base_m, height_m, form)
+    if form.form == "box" and fore.plane is None and width > height_m:
+        base_m, height_m = base_m + height_m - width, width
     if cut.anywhere and form.form in ("long", "round"):
         centre, length = _continued(centre, length, yaw, base_m, fore.window, form)
     wanted = (length, width)

@@ -50,6 +50,16 @@ def test_another_thing_in_the_box_is_left_out():
     assert np.count_nonzero(foreground(window, FORM).mask & blue) < 20
 
 
+def test_a_wall_behind_two_parts_of_a_thing_is_left_out():
+    tank, hose = Can(1.0, -0.1, 0.06, 0.30, COKE.colour), Can(1.0, 0.08, 0.012, 0.28, COKE.colour)
+    image = scene([tank, hose, Can(1.85, 0.0, 0.55, 1.2, BLUE)])
+    window = window_of(image)
+    mask = foreground(window, class_forms()["extinguisher"]).mask
+    for colour, low, high in ((BLUE, 0.0, 0.05), (COKE.colour, 0.8, 1.0)):
+        its = np.all(image.colour == colour, axis=-1)[np.rint(window.v).astype(int), np.rint(window.u).astype(int)]
+        assert low <= np.count_nonzero(mask & its) / np.count_nonzero(its & window.inside) <= high
+
+
 def test_large_boxes_are_looked_at_with_fewer_pixels():
     image = scene([Can(0.75, 0.0, 0.12, 0.3, COKE.colour)])
     window = window_of(image)

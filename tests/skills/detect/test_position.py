@@ -122,6 +122,18 @@ def test_half_the_depth_lost_on_the_thing_is_enough():
     assert off_m(position_of(holes, seen_as("coke", image))) < 0.01
 
 
+def test_of_a_cube_of_which_only_the_top_is_seen_the_height_is_its_width():
+    eye = np.array([0.5, 0.0, 1.0])
+    frames = FrameTree({"hand_camera": ("odom", camera_pose(eye, np.array([0.501, 0.0, 0.0])))})
+    depth = np.zeros((LENS.height, LENS.width), dtype=np.float32)
+    depth[92:148, 132:188] = 0.8  # 56 pixels are 0.162 m, seen from above; what is around it has no depth
+    colour = np.full((LENS.height, LENS.width, 3), GREY, dtype=np.uint8)
+    image = Image(0.0, "hand", "hand_camera", LENS, LENS, colour, colour[..., 0], depth, frames)
+    position = position_of(image, Detection("cube", 0.9, (132.0, 92.0, 188.0, 148.0)))
+    assert position.p_OT == pytest.approx([0.5, 0.0, 0.2 - 0.5 * 0.162], abs=0.01)
+    assert position.extents.height_m == pytest.approx(0.162, abs=0.01)
+
+
 def test_a_person_is_from_the_floor_to_the_top_of_the_head():
     frames = FrameTree({"hand_camera": ("odom", camera_pose(np.array([0.0, 0.0, 0.9]), np.array([2.0, 0.0, 0.9])))})
     depth = np.full((LENS.height, LENS.width), 3.8, dtype=np.float32)

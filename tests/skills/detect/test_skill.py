@@ -184,6 +184,19 @@ def test_what_is_not_named_from_afar_is_looked_at_from_near():
     assert seen_in[-1]
 
 
+def test_what_may_be_meant_though_it_is_likelier_something_else_is_looked_at_from_near():
+    class ConfusedFromAfar(Colours):
+        def detect(self, pictures):
+            return [tuple(self.taken(d) for d in found) for found in super().detect(pictures)]
+
+        def taken(self, one):
+            small = one.box[3] - one.box[1] < 75.0
+            return replace(one, class_name="beer", score=0.6, rivals=(("coke", 0.4),)) if small else one
+
+    step, _ = found([COKE], DetectInputs(("coke",), (TABLE,)), detector=ConfusedFromAfar())
+    assert step.outputs["observation"].thing.name == "coke"
+
+
 def test_the_jaw_is_opened_to_look_and_closed_again():
     robot = ScriptedRobot(things=[])
     failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "no coke")

@@ -22,8 +22,8 @@ class SuppressionOptions:
     thing may be as well is told by boxes of other classes that overlap its own by more than `rival`.
     """
 
-    same_class: float = 0.6
-    other_class: float = 0.8
+    same_class: float = 0.45
+    other_class: float = 0.6
     sure_score: float = 0.5
     rival: float = 0.55
     most_candidates: int = 1000

@@ -49,7 +49,8 @@ class Schedule:
     """A warm-up of so many steps, then half a cosine from the highest rate to the last.
 
     Chips that hold little but a thing come first, since most things are learnt from in the same time there; then wider
-    windows; whole pictures, as the detector will see them, last.
+    windows; whole pictures, as the detector will see them, last. What goes on from learnt weights needs no chips:
+    see `refining`.
     """
 
     highest_rate: float = HIGHEST_RATE
@@ -58,6 +59,11 @@ class Schedule:
     phases: Sequence[Phase] = field(
         default=(Phase(0.0, _CHIPS, 64), Phase(0.4, _WINDOWS, 20), Phase(0.55, _LARGER, 8), Phase(0.82, _PICTURES, 4)),
     )
+
+    @staticmethod
+    def refining(highest_rate: float = HIGHEST_RATE) -> Schedule:
+        """For weights that have been learnt already: the larger windows, then whole pictures."""
+        return Schedule(highest_rate, phases=(Phase(0.0, _LARGER, 8), Phase(0.6, _PICTURES, 4)))
 
     def rate(self, step: int, progress: float) -> float:
         """The learning rate of a step."""

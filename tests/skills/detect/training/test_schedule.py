@@ -23,7 +23,14 @@ def test_windows_come_first_and_whole_pictures_last() -> None:
 
 
 def test_sizes_of_canvases_fit_the_networks_strides() -> None:
-    assert all(phase.canvas.width_px % 32 == 0 and phase.canvas.height_px % 32 == 0 for phase in Schedule().phases)
+    phases = [*Schedule().phases, *Schedule.refining().phases]
+    assert all(phase.canvas.width_px % 32 == 0 and phase.canvas.height_px % 32 == 0 for phase in phases)
+
+
+def test_learnt_weights_are_refined_on_what_comes_last_from_nothing() -> None:
+    last = [phase.canvas for phase in Schedule().phases[-2:]]
+    assert [phase.canvas for phase in Schedule.refining(0.002).phases] == last
+    assert Schedule.refining(0.002).highest_rate == 0.002
 
 
 # pictures, seconds of the budget; taken, gone -> share

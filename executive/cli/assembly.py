@@ -21,6 +21,7 @@ from plant.snapshot.file import SnapshotError
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
 from skills.detect.attributes import known_attributes
+from skills.detect.careful_detector import CarefulDetector
 from skills.detect.detector_file import MODEL_FILE
 from skills.detect.onnx_detector import DetectorOptions
 from skills.detection import Detector
@@ -93,7 +94,7 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
 @cache
 def shared_detector() -> Detector:
     """The one detector of this process, loaded at the first call. Raises InputError when its model cannot be used."""
-    return detector_of(MODEL_FILE, DetectorOptions())
+    return CarefulDetector(detector_of(MODEL_FILE, DetectorOptions()))
 
 
 def _localiser(scan_map: GridMap, start: Pose2D, believed: Pose2D | None) -> ScanMatchingLocaliser:

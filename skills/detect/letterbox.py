@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["HEIGHT_PX", "PADDING", "WIDTH_PX", "Letterbox", "fill_letterbox", "letterbox"]
+__all__ = ["HEIGHT_PX", "PADDING", "WIDTH_PX", "Letterbox", "check_picture", "fill_letterbox", "letterbox"]
 
 WIDTH_PX: Final = 640
 HEIGHT_PX: Final = 480
@@ -63,7 +63,7 @@ def letterbox(picture: Picture) -> tuple[Picture, Letterbox]:
 
 def fill_letterbox(picture: Picture, into: Picture) -> Letterbox:
     """The same, written `into` an array (480, 640, 3), such as one of a batch. Raises ValueError."""
-    _check(picture)
+    check_picture(picture)
     placed = Letterbox(width_px=picture.shape[1], height_px=picture.shape[0])
     width, height = placed.inside_px
     into[height:] = PADDING
@@ -72,7 +72,8 @@ def fill_letterbox(picture: Picture, into: Picture) -> Letterbox:
     return placed
 
 
-def _check(picture: Picture) -> None:
+def check_picture(picture: Picture) -> None:
+    """Raises ValueError for what is no picture: no array of uint8, neither (H, W, 3) nor (H, W), or empty."""
     if not isinstance(picture, np.ndarray) or picture.dtype != np.uint8:
         raise ValueError(f"a picture is an array of uint8, not {getattr(picture, 'dtype', type(picture).__name__)}")
     if picture.ndim not in (2, 3) or (picture.ndim == 3 and picture.shape[2] != 3) or not picture.size:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from onnxruntime import InferenceSession
 
 from skills.detect.detector_file import MODEL_FILE, THREADS, DetectorModel, load_model
 from skills.detect.letterbox import Letterbox, letterbox
-from skills.detect.suppression import SuppressionOptions, candidates_of, rivals_of, suppress
+from skills.detect.suppression import SuppressionOptions, candidates_of, told
 from skills.detection import Detection
 
 __all__ = ["DetectorOptions", "OnnxDetector", "load_detector"]
@@ -62,27 +62,11 @@ class OnnxDetector:
 
     def _detections(self, boxes: Floats, scores: Floats, placed: Letterbox) -> tuple[Detection, ...]:
         """The things of one picture from the network's boxes (A, 4) and scores (A, K)."""
-        rules = self.options.suppression
-        least = min(self.options.threshold, self.options.rival_threshold)
-        candidates = candidates_of(boxes, scores, least, rules.most_candidates)
-        kept = suppress(candidates.from_score(self.options.threshold), rules)
-        corners = placed.to_picture(kept.boxes).astype(np.float64)
-        rows = zip(
-            kept.classes.tolist(),
-            kept.scores.tolist(),
-            corners.tolist(),
-            rivals_of(kept, candidates, rules),
-            strict=True,
-        )
-        return tuple(
-            Detection(self.class_names[which], score, (u0, v0, u1, v1), self._named(rivals))
-            for which, score, (u0, v0, u1, v1), rivals in rows
-            if u1 > u0 and v1 > v0
-        )
-
-    def _named(self, rivals: Mapping[int, float]) -> tuple[tuple[str, float], ...]:
-        """Classes by name, the likeliest first."""
-        return tuple((self.class_names[k], rivals[k]) for k in sorted(rivals, key=lambda k: -rivals[k]))
+        options = self.options
+        least = min(options.threshold, options.rival_threshold)
+        found = candidates_of(boxes, scores, least, options.suppression.most_candidates)
+        in_picture = replace(found, boxes=placed.to_picture(found.boxes))
+        return told(in_picture, self.class_names, options.threshold, options.suppression)
 
 
 def load_detector(file: Path = MODEL_FILE, options: DetectorOptions | None = None) -> OnnxDetector:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from skills.api import Detection, Detector
+from skills.detect.careful_detector import LooksCarefully
 from skills.robot import Image
 
 DETECTION_LATENCY_S = 0.15
@@ -11,8 +12,9 @@ _DARK_MEAN, _DARK_SPREAD = 6.0, 4.0
 
 
 def detections_in(detector: Detector, image: Image) -> tuple[Detection, ...]:
-    """What the detector finds in a picture."""
-    return detector.detect([image.grey if image.colour is None else image.colour])[0]
+    """What the detector finds in a picture, looking carefully if it can."""
+    picture = image.grey if image.colour is None else image.colour
+    return detector.detect_carefully(picture) if isinstance(detector, LooksCarefully) else detector.detect([picture])[0]
 
 
 def is_dark(image: Image) -> bool:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Candidates", "SuppressionOptions", "candidates_of", "rivals_of", "suppress"]
+from skills.detection import Detection
+
+__all__ = ["Candidates", "SuppressionOptions", "candidates_of", "rivals_of", "suppress", "told"]
 
 Floats = NDArray[np.float32]
 
@@ -85,6 +88,25 @@ def _replaced_by(candidates: Candidates, options: SuppressionOptions) -> NDArray
     same = candidates.classes[:, None] == candidates.classes[None, :]
     sure = (candidates.scores >= options.sure_score)[:, None]
     return np.asarray(np.where(same, shared > options.same_class, sure & (shared > options.other_class)))
+
+
+def told(
+    candidates: Candidates, class_names: Sequence[str], threshold: float, options: SuppressionOptions
+) -> tuple[Detection, ...]:
+    """What is told of candidates in a picture: those from a score on that stay, with what else they may be."""
+    candidates = candidates.at(np.flatnonzero((candidates.boxes[:, 2:] > candidates.boxes[:, :2]).all(axis=1)))
+    kept = suppress(candidates.from_score(threshold), options)
+    rows = zip(
+        kept.classes.tolist(),
+        kept.scores.tolist(),
+        kept.boxes.astype(np.float64).tolist(),
+        rivals_of(kept, candidates, options),
+        strict=True,
+    )
+    return tuple(
+        Detection(class_names[which], score, (u0, v0, u1, v1), tuple((class_names[k], s) for k, s in rivals.items()))
+        for which, score, (u0, v0, u1, v1), rivals in rows
+    )
 
 
 def rivals_of(kept: Candidates, candidates: Candidates, options: SuppressionOptions) -> list[dict[int, float]]:

@@ -1,0 +1,105 @@
+"""Several looks at a picture, with a small network whose pictures tell what it sees there."""
+
+import numpy as np
+import pytest
+from tiny_detector import CLASSES, picture_of, write_model
+
+from skills.detect.careful_detector import CarefulDetector, LooksCarefully, Variant
+from skills.detect.onnx_detector import OnnxDetector, load_detector
+from skills.detection import Detection, Detector
+
+SEEN = np.full((480, 640, 3), 90, dtype=np.uint8)
+BOX = (100.0, 50.0, 300.0, 150.0)
+MIRRORED = (340.0, 50.0, 540.0, 150.0)
+SMALL = (50.0, 25.0, 150.0, 75.0)
+VARIANTS = (Variant(), Variant(mirrored=True), Variant(scale=0.5))
+
+
+@pytest.fixture
+def looked(tmp_path, monkeypatch):
+    model = load_detector(write_model(tmp_path / "tiny.onnx")).model
+
+    def look(*answers):
+        monkeypatch.setattr(OnnxDetector, "detect", lambda self, pictures: [tuple(found) for found in answers])
+        return CarefulDetector(OnnxDetector(model), VARIANTS).detect_carefully(SEEN)
+
+    return look
+
+
+def test_what_all_looks_tell_has_their_mean_score_and_place(looked):
+    (found,) = looked(
+        [Detection("hammer", 0.9, BOX)], [Detection("hammer", 0.6, MIRRORED)], [Detection("hammer", 0.6, SMALL)]
+    )
+    assert (found.class_name, found.score) == ("hammer", pytest.approx(0.7))
+    assert found.box == pytest.approx(BOX)
+
+
+def test_what_most_looks_take_for_something_else_is_that(looked):
+    # hammer 0.6, 0.9, 0.9; coke 0.9, 0.3, 0
+    both = [Detection("coke", 0.9, BOX, (("hammer", 0.6),))]
+    (found,) = looked(both, [Detection("hammer", 0.9, MIRRORED, (("coke", 0.3),))], [Detection("hammer", 0.9, SMALL)])
+    assert (found.class_name, found.score) == ("hammer", pytest.approx(0.8))
+    assert found.rivals == (("coke", pytest.approx(0.4)),)
+
+
+def test_what_one_look_alone_tells_is_not_sure(looked):
+    assert looked([Detection("hammer", 0.9, BOX)], [], []) == ()
+
+
+def test_a_look_at_which_a_thing_would_be_too_small_does_not_count(looked):
+    little, mirrored = (100.0, 50.0, 140.0, 70.0), (500.0, 50.0, 540.0, 70.0)
+    (found,) = looked([Detection("beer", 0.8, little)], [Detection("beer", 0.6, mirrored)], [])
+    assert found.score == pytest.approx(0.7)
+
+
+def test_what_is_very_large_is_judged_where_it_is_smaller(looked):
+    # 400 pixels long; 200 in the look at half the size
+    found = looked(
+        [Detection("coke", 0.9, (100.0, 50.0, 500.0, 150.0))],
+        [Detection("coke", 0.9, (140.0, 50.0, 540.0, 150.0))],
+        [Detection("hammer", 0.8, (50.0, 25.0, 250.0, 75.0))],
+    )
+    assert [(one.class_name, one.score) for one in found] == [("hammer", pytest.approx(0.8))]
+
+
+def test_two_things_of_a_class_stay_two(looked):
+    other = (400.0, 300.0, 600.0, 400.0)
+    found = looked(
+        [Detection("beer", 0.8, BOX), Detection("beer", 0.7, other)],
+        [Detection("beer", 0.8, MIRRORED), Detection("beer", 0.7, (40.0, 300.0, 240.0, 400.0))],
+        [Detection("beer", 0.8, SMALL), Detection("beer", 0.7, (200.0, 150.0, 300.0, 200.0))],
+    )
+    assert [one.box for one in found] == [pytest.approx(BOX), pytest.approx(other)]
+
+
+def test_nothing_seen_is_nothing(looked):
+    assert looked([], [], []) == ()
+
+
+@pytest.mark.parametrize("variant", [Variant(), Variant(True), Variant(scale=0.7), Variant(True, 0.5)], ids=str)
+@pytest.mark.parametrize("shape", [(480, 640, 3), (240, 320)], ids=["colour", "grey"])
+def test_a_box_of_a_variant_lies_where_the_thing_is_in_the_picture(variant, shape):
+    picture = np.zeros(shape, dtype=np.uint8)
+    picture[50:150, 100:300] = 255
+    varied = variant.of(picture)
+    white = varied if varied.ndim == 2 else varied[..., 0]
+    rows, columns = np.nonzero(white > 200)
+    box = (float(columns.min()), float(rows.min()), float(columns.max() + 1), float(rows.max() + 1))
+    assert varied.shape == picture.shape
+    assert variant.back(box, shape[1]) == pytest.approx((100.0, 50.0, 300.0, 150.0), abs=3.0)
+
+
+def test_it_is_a_detector_that_looks_once_unless_asked(tmp_path):
+    inner = load_detector(write_model(tmp_path / "tiny.onnx"))
+    careful: Detector = CarefulDetector(inner)
+    picture = picture_of(("hammer", 0.9, (100, 50, 200, 80)))
+    assert isinstance(careful, LooksCarefully)
+    assert not isinstance(inner, LooksCarefully)
+    assert careful.class_names == CLASSES
+    assert careful.detect([picture]) == inner.detect([picture])
+
+
+@pytest.mark.parametrize("bad", [np.zeros((0, 0, 3), np.uint8), np.zeros((9, 9, 7), np.uint8)], ids=["empty", "seven"])
+def test_what_is_no_picture_is_refused(tmp_path, bad):
+    with pytest.raises(ValueError, match="picture"):
+        CarefulDetector(load_detector(write_model(tmp_path / "tiny.onnx"))).detect_carefully(bad)

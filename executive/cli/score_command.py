@@ -20,6 +20,7 @@ from executive.cli.picture_files import Picture, read_picture, write_picture
 from executive.cli.score_report import score_json, show_score
 from executive.cli.worst_sheet import Shown, contact_sheet
 from executive.errors import InputError
+from skills.detect.careful_detector import CarefulDetector
 from skills.detect.onnx_detector import DetectorOptions, OnnxDetector
 from skills.detect.scoring import judged, picture_errors, score
 from skills.detect.scoring_labels import LabelledPicture, pictures_of_coco
@@ -42,6 +43,7 @@ class _Work:
     pictures: tuple[LabelledPicture, ...]
     files: tuple[Path, ...]
     detector: OnnxDetector
+    careful: bool
 
 
 def score_command(
@@ -51,13 +53,17 @@ def score_command(
     limit: Annotated[int | None, typer.Option(min=1, help="Only so many pictures, the first.")] = None,
     worst: Annotated[int | None, typer.Option(min=1, help="How many of the worst pictures to name.")] = None,
     sheet: Annotated[Path | None, typer.Option(help="Draw the worst pictures, 20 unless said, into this PNG.")] = None,
+    careful: Annotated[
+        bool, typer.Option("--careful", help="Look several times at each picture, as the detect skill does.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
     """Judge the detector by labelled pictures: average precision as COCO has it, precision, recall, speed."""
     console = console_for(as_json)
     with refusals():
         drawing = _png(sheet)
-        work = _work(data, pictures or data.parent, limit, detector_of(model, DetectorOptions(threshold=LEAST_SCORE)))
+        detector = detector_of(model, DetectorOptions(threshold=LEAST_SCORE))
+        work = _work(data, pictures or data.parent, limit, detector, careful)
         found = _all_found(work, console)
         names = work.detector.class_names
         told = score(work.pictures, found, names)
@@ -74,7 +80,7 @@ def score_command(
             console.print(f"{one['error']:7.3f}  {one['file']}", markup=False)
 
 
-def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector) -> _Work:
+def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, careful: bool) -> _Work:
     """Read the labels, and see that all pictures are there. Raises InputError."""
     try:
         labelled = pictures_of_coco(_document(data), detector.class_names)[:limit]
@@ -87,7 +93,7 @@ def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector) -
         raise InputError(what, mend="name the folder from which their names count with --pictures", file=missing[0])
     if not files:
         raise InputError("it names no pictures", mend="name a COCO file with pictures with --data", file=data)
-    return _Work(labelled, files, detector)
+    return _Work(labelled, files, detector, careful)
 
 
 def _document(data: Path) -> Any:
@@ -109,9 +115,16 @@ def _all_found(work: _Work, console: Console) -> list[Found]:
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("pictures", total=len(work.files))
         for group in _groups(len(work.files)):
-            found += work.detector.detect([_read(work, k) for k in group])
+            found += _looked(work.detector, [_read(work, k) for k in group], work.careful)
             bar.update(task, completed=len(found))
     return found
+
+
+def _looked(detector: OnnxDetector, pictures: Sequence[Picture], careful: bool) -> list[Found]:
+    """What is in some pictures."""
+    if not careful:
+        return detector.detect(pictures)
+    return [CarefulDetector(detector).detect_carefully(picture) for picture in pictures]
 
 
 def _groups(count: int) -> list[range]:
@@ -136,7 +149,7 @@ def _pictures_per_second(work: _Work) -> float:
     for group in _groups(min(len(work.files), TIMED_PICTURES)):
         pictures = [_read(work, k) for k in group]
         begun = time.perf_counter()
-        detector.detect(pictures)
+        _looked(detector, pictures, work.careful)
         times_s.append((time.perf_counter() - begun) / len(pictures))
     return 1.0 / statistics.median(times_s)
 

@@ -9,6 +9,7 @@ from tiny_detector import picture_of, write_model
 from typer.testing import CliRunner
 
 from executive.cli.entry import light_app
+from skills.detect.careful_detector import CarefulDetector
 
 HAMMER, BEER, STRAY = (
     ("hammer", 0.9, (100, 50, 200, 80)),
@@ -106,6 +107,12 @@ def test_a_plain_coco_file_has_no_figures_by_distance(score, data):
     figures = told(score("--data", written(data, document), "--json"))
     assert (figures["by_distance_m"], figures["by_visibility"]) == ([], [])
     assert figures["recall"] == pytest.approx(3 / 4)
+
+
+def test_what_careful_looks_find_is_judged_when_asked_for(score, data, monkeypatch):
+    monkeypatch.setattr(CarefulDetector, "detect_carefully", lambda self, picture: ())
+    assert told(score("--data", data, "--careful", "--json"))["recall"] == 0.0
+    assert told(score("--data", data, "--json"))["recall"] == pytest.approx(3 / 4)
 
 
 def test_only_so_many_pictures_are_taken(score, data):

@@ -9,7 +9,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NO_DETECTOR", "Detection", "Detector", "NoDetector", "NoDetectorError"]
+__all__ = ["NO_DETECTOR", "Detection", "Detector", "NoDetector", "NoDetectorError", "box_overlap"]
 
 
 @dataclass(frozen=True)
@@ -56,3 +56,12 @@ class NoDetector:
 
 
 NO_DETECTOR: Final = NoDetector()
+
+
+def box_overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> float:
+    """Intersection over union of two boxes."""
+    width, height = (min(a[k + 2], b[k + 2]) - max(a[k], b[k]) for k in (0, 1))
+    if width <= 0 or height <= 0:
+        return 0.0
+    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (a, b)]
+    return float(width * height / max(sum(areas) - width * height, 1e-6))

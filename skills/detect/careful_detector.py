@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from skills.detect.letterbox import PADDING, check_picture
 from skills.detect.onnx_detector import OnnxDetector
 from skills.detect.suppression import Candidates, told
-from skills.detect.surface_view import box_overlap
-from skills.detection import Detection
+from skills.detection import Detection, box_overlap
 
 __all__ = ["AS_IT_IS_AND_OTHERWISE", "CarefulDetector", "LooksCarefully", "Variant"]
 

@@ -14,6 +14,7 @@ from skills.detect.plane import LevelPlane
 from skills.detect.points import PointCloud, camera_pose_W, cloud_from_image, inside_polygon
 from skills.detect.shape import SeenShape, measure
 from skills.detect.sighting import Sighting
+from skills.detection import box_overlap
 from skills.robot import FloatArray, Image
 
 _CELL_M = 0.008
@@ -159,12 +160,3 @@ def cluster_of(clusters: tuple[Cluster, ...], sighting: Sighting) -> Cluster | N
 
 def _apart(cluster: Cluster, sighting: Sighting) -> float:
     return float(np.linalg.norm(np.array(cluster.shape.centre) - sighting.position_W[:2]))
-
-
-def box_overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> float:
-    """Intersection over union of two boxes."""
-    width, height = (min(a[k + 2], b[k + 2]) - max(a[k], b[k]) for k in (0, 1))
-    if width <= 0 or height <= 0:
-        return 0.0
-    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (a, b)]
-    return float(width * height / max(sum(areas) - width * height, 1e-6))

@@ -14,16 +14,19 @@ from numpy.typing import NDArray
 from plant.models.builder.pictures import FloatArray, Picture, cloth, noise, speckle, to_picture, wood
 from plant.models.families.model import held_out
 
-TEXTURES = 64
+TEXTURES = 256
 """How many textures each role has."""
+VALIDATION_BELOW = 64
+"""Validation takes held-out textures below this number, so that its pictures stay the same when more are added."""
 SIZE_PX = 256
 
 Maker = Callable[[np.random.Generator], FloatArray]
 
 
 def numbers(*, for_training: bool) -> list[int]:
-    """The textures that training may see, or those that are held out."""
-    return [number for number in range(TEXTURES) if held_out(number) != for_training]
+    """The textures that training may see, or those that validation does. Every fourth number is kept from training."""
+    count = TEXTURES if for_training else VALIDATION_BELOW
+    return [number for number in range(count) if held_out(number) != for_training]
 
 
 def texture(role: str, number: int) -> Picture:

@@ -39,10 +39,14 @@ __all__ = [
 
 Maker = Callable[[Draft], tuple[Finished, str, str]]
 
-INSTANCES = 48
-"""How many instances of each class the data set uses."""
-DISTRACTOR_INSTANCES = 8
-"""The same of each kind of distractor."""
+INSTANCES = 240
+"""How many instances of each class there are for the data set."""
+PEOPLE = 48
+"""How many of them are people: each takes seconds to make."""
+DISTRACTOR_INSTANCES = 32
+"""How many of each kind of distractor there are."""
+VALIDATION_BELOW, DISTRACTOR_VALIDATION_BELOW = 48, 8
+"""Validation takes held-out instances below these numbers, so that its pictures stay the same when more are added."""
 
 _CLASS_MAKERS: Mapping[str, Maker] = {
     "beer": beer,
@@ -60,9 +64,15 @@ DISTRACTORS: tuple[str, ...] = tuple(sorted(DISTRACTOR_MAKERS))
 
 
 def numbers(family: str, *, for_training: bool) -> list[int]:
-    """The instances of a family that training may see, or those that are held out."""
-    count = INSTANCES if family in _CLASS_MAKERS else DISTRACTOR_INSTANCES
-    return [number for number in range(count) if held_out(number) != for_training]
+    """The instances of a family that training may see, or those that validation does.
+
+    Every fourth number is kept from training.
+    """
+    if not for_training:
+        below = VALIDATION_BELOW if family in _CLASS_MAKERS else DISTRACTOR_VALIDATION_BELOW
+        return [number for number in range(below) if held_out(number)]
+    count = PEOPLE if family == "person" else INSTANCES if family in _CLASS_MAKERS else DISTRACTOR_INSTANCES
+    return [number for number in range(count) if not held_out(number)]
 
 
 def make(family: str, seed: int) -> tuple[Finished, str, str]:

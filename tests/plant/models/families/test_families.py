@@ -11,7 +11,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from plant.models.catalogue import load_catalogue
-from plant.models.families import CLASSES, DISTRACTORS, INSTANCES, held_out, instance, make, numbers
+from plant.models.families import CLASSES, DISTRACTORS, held_out, instance, make, numbers
 
 SMALL = tuple(name for name in CLASSES if name != "person")
 
@@ -63,14 +63,21 @@ def test_a_made_model_is_read_from_the_cache() -> None:
 def test_a_quarter_of_the_instances_is_held_out_and_training_never_sees_it() -> None:
     for family in (*CLASSES, *DISTRACTORS):
         training, kept = numbers(family, for_training=True), numbers(family, for_training=False)
-        assert not set(training) & set(kept)
-        assert len(kept) * 4 == len(training) + len(kept)
+        everything = range(max(training) + 2)
+        assert len(training) * 4 == len(everything) * 3
+        assert not any(held_out(number) for number in training)
         assert all(held_out(number) for number in kept)
+
+
+def test_validation_sees_the_same_instances_however_many_there_are() -> None:
+    # family: held-out numbers
+    expected = {"hammer": list(range(3, 48, 4)), "person": list(range(3, 48, 4)), "mug": [3, 7]}
+    assert {family: numbers(family, for_training=False) for family in expected} == expected
 
 
 def test_there_are_nine_classes_with_thirty_instances_and_forty_distractors() -> None:
     assert set(CLASSES) == set(load_catalogue())
-    assert INSTANCES >= 30
+    assert all(len(numbers(family, for_training=True)) >= 30 for family in CLASSES)
     assert len(DISTRACTORS) >= 40
     assert not set(CLASSES) & set(DISTRACTORS)
 

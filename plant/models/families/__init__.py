@@ -40,9 +40,9 @@ __all__ = [
 Maker = Callable[[Draft], tuple[Finished, str, str]]
 
 INSTANCES = 240
-"""How many instances of each class there are for the data set."""
+"""How many instances of each class there are for the data set, but of people."""
 PEOPLE = 48
-"""How many of them are people: each takes seconds to make."""
+"""How many people: each takes seconds to make."""
 DISTRACTOR_INSTANCES = 32
 """How many of each kind of distractor there are."""
 VALIDATION_BELOW, DISTRACTOR_VALIDATION_BELOW = 48, 8

@@ -26,8 +26,6 @@ from plant.models.families.wrenches import wrench
 __all__ = [
     "CLASSES",
     "DISTRACTORS",
-    "DISTRACTOR_INSTANCES",
-    "INSTANCES",
     "ObjectModel",
     "Surface",
     "held_out",

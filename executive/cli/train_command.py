@@ -38,7 +38,13 @@ def train_command(
     rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = HIGHEST_RATE,
     jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
-    start: Annotated[Path | None, typer.Option(help="A checkpoint whose weights are taken over, and refined.")] = None,
+    start: Annotated[
+        Path | None,
+        typer.Option(help="A checkpoint or a detector's ONNX file whose weights are taken over, and refined."),
+    ] = None,
+    keep_early: Annotated[
+        bool, typer.Option("--keep-early", help="Leave the first layers as they are: more steps in the same time.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
     """Train the detector and export it, with checkpoints and curves on the way."""
@@ -55,6 +61,7 @@ def train_command(
             processes=jobs or os.cpu_count() or 1,
             resume=resume,
             start=start,
+            keep_early=keep_early,
             schedule=Schedule.refining(rate) if start else Schedule(rate),
         )
         model, figures = _trained(options, console)

@@ -17,7 +17,10 @@ from plant.worlds.placement import polygon_distance
 
 FloatArray = NDArray[np.float64]
 
+SELDOM_BY_CHANCE = ("person", "extinguisher")
+"""What stands apart from the clutter, and so is seldom in the views of other things."""
 CLASSES_PER_SCENE = 7
+CROWDED_SHARE, MOST_ROUNDS = 0.65, 4
 ONLY_DISTRACTORS_EVERY = 10
 ATTEMPTS = 30
 CLEAR_M = 0.004
@@ -44,20 +47,31 @@ class Held:
 
 @dataclass(frozen=True)
 class Scene:
-    """All that is to be seen, before light and cameras. `seats` are boxes under people who sit: (x, y, yaw, height)."""
+    """All that is to be seen, before light and cameras. `seats` are boxes under people who sit: (x, y, yaw, height).
+
+    `crowded` tells that there is more in it than in those for validation.
+    """
 
     room: Room
     things: tuple[Placed, ...]
     held: Held | None
     seats: tuple[tuple[float, float, float, float], ...]
+    crowded: bool = False
 
 
 def compose(rng: np.random.Generator, index: int, *, for_training: bool) -> Scene:
-    """The scene of a number. Every tenth holds distractors only."""
+    """The scene of a number. Every tenth holds distractors only.
+
+    Many of those for training hold two to four times as much as those for validation, so that a picture teaches more.
+    """
     room = random_room(rng, for_training=for_training)
     bare = index % ONLY_DISTRACTORS_EVERY == ONLY_DISTRACTORS_EVERY - 1
-    wanted = [] if bare else _class_models(rng, for_training=for_training)
-    others = [_any_instance(rng, str(name), for_training) for name in rng.choice(DISTRACTORS, int(rng.integers(6, 16)))]
+    rounds = int(rng.integers(2, MOST_ROUNDS + 1)) if for_training and rng.random() < CROWDED_SHARE else 1
+    wanted = [] if bare else _class_models(rng, rounds, for_training=for_training)
+    others = [
+        _any_instance(rng, str(name), for_training)
+        for name in rng.choice(DISTRACTORS, int(rng.integers(6, 16)) * rounds)
+    ]
     table = _Table(room, rng)
     crowded = list(rng.permutation(len(room.supports)))[: int(rng.integers(2, 5))] if room.supports else []
     for model in [*wanted, *others]:
@@ -65,14 +79,15 @@ def compose(rng: np.random.Generator, index: int, *, for_training: bool) -> Scen
     held = None
     if rng.random() < 0.3:
         held = _hold(rng, others[0] if bare else None, for_training=for_training)
-    return Scene(room, tuple(table.things), held, tuple(table.seats))
+    return Scene(room, tuple(table.things), held, tuple(table.seats), rounds > 1)
 
 
-def _class_models(rng: np.random.Generator, *, for_training: bool) -> list[ObjectModel]:
-    """Instances of some of the classes, now and then two of one; large things first."""
+def _class_models(rng: np.random.Generator, rounds: int, *, for_training: bool) -> list[ObjectModel]:
+    """Instances of some of the classes, now and then two of one, and all that is small so many times; large first."""
     chosen = [str(name) for name in rng.permutation(CLASSES)[:CLASSES_PER_SCENE]]
-    doubled = [name for name in chosen if name not in ("person", "extinguisher") and rng.random() < 0.35]
-    models = [_any_instance(rng, name, for_training) for name in [*chosen, *doubled]]
+    doubled = [name for name in chosen if name not in SELDOM_BY_CHANCE and rng.random() < 0.35]
+    again = [name for name in CLASSES if name not in SELDOM_BY_CHANCE] * (rounds - 1)
+    models = [_any_instance(rng, name, for_training) for name in [*chosen, *doubled, *again]]
     return sorted(models, key=lambda model: model.family != "person")
 
 
@@ -82,7 +97,7 @@ def _any_instance(rng: np.random.Generator, family: str, for_training: bool) -> 
 
 def _hold(rng: np.random.Generator, other: ObjectModel | None, *, for_training: bool) -> Held | None:
     """A thing that fits between the jaws, its long side across them."""
-    families = [name for name in CLASSES if name not in ("person", "extinguisher")]
+    families = [name for name in CLASSES if name not in SELDOM_BY_CHANCE]
     model = other or _any_instance(rng, str(rng.choice(families)), for_training)
     size = np.array(model.size_m)
     if size.max() > HELD_LONGEST_M or np.sort(size)[0] > 0.09:

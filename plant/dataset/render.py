@@ -31,7 +31,7 @@ from pydrake.geometry import Mesh as MeshShape
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.dataset.coco import annotation, lost_in_the_dark
-from plant.dataset.compose import Held, Placed, Scene, compose
+from plant.dataset.compose import SELDOM_BY_CHANCE, Held, Placed, Scene, compose
 from plant.dataset.degrade import Degradation, degraded
 from plant.dataset.hand import hand_mesh
 from plant.dataset.lighting import Lighting, random_lighting
@@ -46,11 +46,10 @@ from plant.sensors.camera_spec import colour_render_camera
 
 Picture = NDArray[np.uint8]
 
-VIEWS_PER_SCENE: Final = 8
+TRAINING_VIEWS: Final = 24
+VALIDATION_VIEWS: Final = 8
 VALIDATION_EVERY: Final = 6
 _BACKGROUND: Final = 32000
-_SELDOM_BY_CHANCE: Final = ("person", "extinguisher")
-"""What stands apart from the clutter is seldom in the views of other things, and so gets more views of its own."""
 _RENDERER: Final = "vtk"
 _FAR_AWAY: Final = RigidTransform([0.0, 0.0, -200.0])
 
@@ -70,6 +69,11 @@ def is_validation(index: int) -> bool:
     return index % VALIDATION_EVERY == VALIDATION_EVERY - 1
 
 
+def views_in(index: int) -> int:
+    """How many pictures are taken of the scene of a number."""
+    return VALIDATION_VIEWS if is_validation(index) else TRAINING_VIEWS
+
+
 def render_scene(seed: int, index: int) -> list[Shot]:
     """The pictures of a scene; the same for the same seed and number."""
     rng = np.random.default_rng([seed, index, 71])
@@ -77,26 +81,26 @@ def render_scene(seed: int, index: int) -> list[Shot]:
     lighting = random_lighting(rng, scene.room)
     with tempfile.TemporaryDirectory(prefix="errand-scene-") as folder:
         stage = Stage(scene, lighting, Path(folder), float(rng.uniform(0.8, 1.57)))
-        views = _views(rng, scene)
+        views = _views(rng, scene, views_in(index))
         return [_shot(rng, stage, view, scene, lighting, index, number) for number, view in enumerate(views)]
 
 
-def _views(rng: np.random.Generator, scene: Scene) -> list[View]:
-    """Eight views: the things of the classes take turns; where there is none, others do."""
+def _views(rng: np.random.Generator, scene: Scene, count: int) -> list[View]:
+    """So many views: the things of the classes take turns; where there is none, others do."""
     specs = camera_specs()
     things = [thing for thing in scene.things if thing.model.class_id] or list(scene.things)
-    turns = [thing for thing in things for _ in range(2 if thing.model.family in _SELDOM_BY_CHANCE else 1)]
+    turns = [thing for thing in things for _ in range(2 if thing.model.family in SELDOM_BY_CHANCE else 1)]
     order = [turns[k] for k in rng.permutation(len(turns))]
     views: list[View] = []
-    for attempt in range(3 * VIEWS_PER_SCENE):
-        if len(views) == VIEWS_PER_SCENE or not order:
+    for attempt in range(3 * count):
+        if len(views) == count or not order:
             break
         view = view_of(rng, scene.room, order[attempt % len(order)], specs)
         if view is not None:
             views.append(view)
-    views += [any_view(rng, scene.room, specs) for _ in range(VIEWS_PER_SCENE - len(views))]
+    views += [any_view(rng, scene.room, specs) for _ in range(count - len(views))]
     by_hand = [k for k, view in enumerate(views) if view.camera == "hand"]
-    shown = by_hand[: 2 if scene.held else int(rng.random() < 0.5)]
+    shown = by_hand[: count // 4 if scene.held else count // 8 * int(rng.random() < 0.5)]
     return [hand_view(rng, view) if k in shown else view for k, view in enumerate(views)]
 
 
@@ -217,6 +221,7 @@ def _shot(
         "view": number,
         "split": "val" if is_validation(index) else "train",
         "style": lighting.style,
+        "crowded": scene.crowded,
         "motion_px": round(how.motion_px, 1),
     }
     return Shot(picture, how.quality, facts, label_view(stage.labelled, labels, view, stage.hand_pose(view), picture))
@@ -256,4 +261,4 @@ def label_view(
     return found
 
 
-__all__ = ["VIEWS_PER_SCENE", "Placed", "Shot", "is_validation", "label_view", "render_scene"]
+__all__ = ["Placed", "Shot", "is_validation", "label_view", "render_scene", "views_in"]

@@ -29,7 +29,7 @@ import cv2
 from plant.dataset.coco import counts, document
 from plant.dataset.errors import DatasetError
 from plant.dataset.overview import contact_sheet
-from plant.dataset.render import VIEWS_PER_SCENE, Shot, render_scene
+from plant.dataset.render import Shot, render_scene, views_in
 from plant.models.families import sources_digest
 
 FORMAT: Final = 1
@@ -63,7 +63,7 @@ def render(out: Path, *, images: int, seed: int, jobs: int, progress: Callable[[
 
     `progress` is told how many scenes are there, and how many there will be.
     """
-    scenes = -(-images // VIEWS_PER_SCENE)
+    scenes = len(_taken(images))
     with _told(out):
         _claim(out, seed)
         missing = [index for index in range(scenes) if not _scene_folder(out, index).is_dir()]
@@ -93,7 +93,7 @@ def _told(out: Path) -> Iterator[None]:
 
 def _claim(out: Path, seed: int) -> None:
     """Make the folder ours, or check that it is: of the same seed and sources."""
-    wanted = {"format": FORMAT, "seed": seed, "sources": digest(), "views_per_scene": VIEWS_PER_SCENE}
+    wanted = {"format": FORMAT, "seed": seed, "sources": digest()}
     path = out / MANIFEST
     if not out.exists() or not any(out.iterdir()):
         (out / _SCENES).mkdir(parents=True, exist_ok=True)
@@ -124,6 +124,14 @@ def _compare(path: Path, wanted: Mapping[str, Any]) -> None:
             f"{path}: this data set was made by another version of the renderer or the models",
             "its pictures would not fit together with new ones; name another folder with --out",
         )
+
+
+def _taken(images: int) -> list[int]:
+    """How many pictures are taken into the data set of each scene, in order; all of them but of the last one."""
+    counts: list[int] = []
+    while (left := images - sum(counts)) > 0:
+        counts.append(min(left, views_in(len(counts))))
+    return counts
 
 
 def _scene_folder(out: Path, index: int) -> Path:
@@ -186,14 +194,14 @@ def _assemble(out: Path, images: int, seed: int) -> Summary:
 
 
 def _shots(out: Path, images: int) -> Iterator[Mapping[str, Any]]:
-    for index in range(-(-images // VIEWS_PER_SCENE)):
+    for index, count in enumerate(_taken(images)):
         path = _scene_folder(out, index) / "shots.json"
         try:
             entries = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, json.JSONDecodeError) as error:
             mend = f"remove {path.parent}; the same command makes it anew"
             raise DatasetError(f"{path}: is damaged or missing", mend) from error
-        yield from entries[: images - index * VIEWS_PER_SCENE]
+        yield from entries[:count]
 
 
 def _summary(shots: list[Mapping[str, Any]]) -> Summary:

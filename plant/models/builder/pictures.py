@@ -59,11 +59,11 @@ def speckle(rng: np.random.Generator, shape: tuple[int, int], colour: Colour, co
     return shaded(colour, brightness)
 
 
-def write_png(path: Path, picture: Picture) -> None:
-    """Write an RGB picture as PNG, making its folder."""
+def write_png(path: Path, picture: Picture, *, compression: int = 9) -> None:
+    """Write an RGB picture as PNG, making its folder. A compression of 1 takes a fifth of the time of 9."""
     path.parent.mkdir(parents=True, exist_ok=True)
     bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
-    ok, data = cv2.imencode(".png", bgr, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    ok, data = cv2.imencode(".png", bgr, [cv2.IMWRITE_PNG_COMPRESSION, compression])
     if not ok:
         raise OSError(f"{path}: the picture could not be encoded")
     path.write_bytes(data.tobytes())

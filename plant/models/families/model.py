@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from plant.models.families.draft import Finished
 FloatArray = NDArray[np.float64]
 
 HELD_OUT_EVERY = 4
+_QUICK: Final = 1
+"""What is kept in a cache need not be small; packing it as tightly as can be took a third of the time."""
 
 
 def held_out(number: int) -> bool:
@@ -92,9 +95,9 @@ def write_model(folder: Path, model: ObjectModel, made: Finished) -> None:
     write_text(folder / f"{model.family}.mtl", mtl_text(made.mesh, "palette.png"))
     write_text(folder / model.gltf_path.name, gltf_text(made.mesh))
     for name, picture in made.pictures.items():
-        write_png(folder / name, picture)
+        write_png(folder / name, picture, compression=_QUICK)
     if plain_colours(made.mesh.materials):
-        write_png(folder / "palette.png", palette_picture(made.mesh.materials))
+        write_png(folder / "palette.png", palette_picture(made.mesh.materials), compression=_QUICK)
     surface = surface_of(made.mesh)
     np.savez_compressed(
         folder / "surface.npz", points=surface.points.astype(np.float32), faces=surface.faces.astype(np.int32)

@@ -8,20 +8,23 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from skills.detect.training.averaging import WeightAverage
 from skills.detect.training.batches import Batch
+from skills.detect.training.export import fused
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.losses import LossOptions, TruthBatch, losses
 from skills.detect.training.muon import Muon
-from skills.detect.training.network import DetectorNetwork, cells
+from skills.detect.training.network import Backbone, DetectorNetwork, cells
+from skills.detect.training.onnx_weights import take_over
 from skills.detect.training.peers import Peers
 from skills.detect.training.records import Course
 
 __all__ = ["Learner", "Progress", "read_checkpoint"]
 
 FORMAT = 1
+ONNX = ".onnx"
 _LONGEST_STEP = 10.0
 
 
@@ -36,7 +39,10 @@ class Progress:
 
 @dataclass
 class Learner:
-    """All that changes while learning."""
+    """All that changes while learning.
+
+    `early` is what makes the features at stride 8 when they are no longer learnt (`keep_early`).
+    """
 
     network: DetectorNetwork
     average: WeightAverage
@@ -45,6 +51,7 @@ class Learner:
     loss: LossOptions = field(default_factory=LossOptions)
     progress: Progress = field(default_factory=Progress)
     course: Course = field(default_factory=Course)
+    early: Backbone | None = None
 
     @staticmethod
     def new(classes: int, seed: int, device: torch.device) -> Learner:
@@ -59,8 +66,8 @@ class Learner:
             for group in optimiser.param_groups:
                 group["lr"] = rate
         self.network.train()
-        with torch.autocast(self.device.type, torch.bfloat16):
-            logits, boxes = self.network(batch.pictures.to(self.device))
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=quick_in_bfloat16(self.device)):
+            logits, boxes = self._answers(batch.pictures.to(self.device))
         middles = cells(batch.pictures.shape[2], batch.pictures.shape[3])[0].to(self.device)
         found = losses(logits, boxes, middles, _moved(batch.truth, self.device), self.loss)
         self.network.zero_grad(set_to_none=True)
@@ -71,6 +78,22 @@ class Learner:
             optimiser.step()
         self.average.follow(self.network)
         return float(found.scores.detach()), float(found.boxes.detach()), clock
+
+    def _answers(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        if self.early is None:
+            logits, boxes = self.network(pictures)
+            return logits, boxes
+        with torch.no_grad():
+            at8 = self.early.early(pictures)
+        return self.network.from_early(at8)
+
+    def keep_early(self) -> None:
+        """Learn no longer what makes the features at stride 8, and compute them without normalisation from now on."""
+        backbone = self.network.backbone
+        for part in (backbone.stem, backbone.stage8):
+            part.requires_grad_(False)
+        made = fused(self.average.network).backbone.requires_grad_(False)
+        self.early = made.to(self.device, memory_format=torch.channels_last)
 
     def save(self, file: Path) -> None:
         """Write everything; whole or not at all."""
@@ -97,10 +120,15 @@ class Learner:
         self.course = Course.of(state["course"])
 
     def start_from(self, file: Path) -> None:
-        """Take over only the averaged weights of a file; all else begins anew. Raises TrainingDataError."""
-        weights = read_checkpoint(file)["average"]["network"]
-        self.network.load_state_dict(weights)
-        self.average.network.load_state_dict(weights)
+        """Take over the weights of an ONNX file, or a checkpoint's averaged ones; all else begins anew.
+
+        Those of an ONNX file are still to be settled. Raises TrainingDataError.
+        """
+        if file.suffix == ONNX:
+            take_over(self.network, file)
+        else:
+            self.network.load_state_dict(read_checkpoint(file)["average"]["network"])
+        self.average.network.load_state_dict(self.network.state_dict())
 
 
 def optimisers_of(network: DetectorNetwork) -> tuple[torch.optim.Optimizer, ...]:
@@ -110,6 +138,12 @@ def optimisers_of(network: DetectorNetwork) -> tuple[torch.optim.Optimizer, ...]
     chosen = {id(weight) for weight in weights}
     others = [weight for weight in network.parameters() if id(weight) not in chosen]
     return Muon(weights, lr=1e-3), torch.optim.AdamW(others, lr=1e-3, betas=(0.9, 0.99), weight_decay=0.0)
+
+
+def quick_in_bfloat16(device: torch.device) -> bool:
+    """Whether numbers of 16 bits save time: on processors that cannot reckon with them they cost twice as much."""
+    capabilities = torch.cpu.get_capabilities()
+    return device.type != "cpu" or any(capabilities.get(name, False) for name in ("amx_bf16", "avx512_bf16"))
 
 
 def _moved(truth: TruthBatch, device: torch.device) -> TruthBatch:

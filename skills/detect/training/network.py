@@ -112,7 +112,15 @@ class Backbone(nn.Module):
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """(N, 3, H, W) to three levels."""
-        at8 = self.stage8(self.stem(pictures))
+        return self.late(self.early(pictures))
+
+    def early(self, pictures: Tensor) -> Tensor:
+        """(N, 3, H, W) to features at stride 8: edges and textures, half of the time that a step of learning takes."""
+        at8: Tensor = self.stage8(self.stem(pictures))
+        return at8
+
+    def late(self, at8: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Features at stride 8 to three levels."""
         at16 = self.stage16(at8)
         return at8, at16, self.stage32(at16)
 
@@ -176,7 +184,11 @@ class DetectorNetwork(nn.Module):
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, A, classes) and boxes (N, A, 4) as x0 y0 x1 y1 in pixels."""
-        levels = self.neck(self.backbone(pictures))
+        return self.from_early(self.backbone.early(pictures))
+
+    def from_early(self, at8: Tensor) -> tuple[Tensor, Tensor]:
+        """The same of what the backbone's early part makes of pictures."""
+        levels = self.neck(self.backbone.late(at8))
         logits, boxes = [], []
         for head, level, stride in zip(self.heads, levels, STRIDES, strict=True):
             scores, sides = head(level)

@@ -14,7 +14,9 @@ __all__ = ["TrainOptions"]
 class TrainOptions:
     """What to learn from, where to write, how long, and with how many processes of one thread.
 
-    `start` names a checkpoint of which the weights are taken over. With `resume`, learning goes on where `out` stands.
+    `start` names a checkpoint or a detector's ONNX file of which the weights are taken over; learning then looks twice
+    as often where that network errs. `keep_early` leaves its first layers as they are. With `resume`, learning goes on
+    where `out` stands.
     """
 
     data: Path
@@ -24,5 +26,6 @@ class TrainOptions:
     processes: int = 1
     resume: bool = False
     start: Path | None = None
+    keep_early: bool = False
     examined: int = 320
     schedule: Schedule = field(default_factory=Schedule)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from skills.detect.training.canvases import CanvasOptions
 
-__all__ = ["HIGHEST_RATE", "Budget", "Phase", "Schedule", "shuffled"]
+__all__ = ["HIGHEST_RATE", "Budget", "Phase", "Schedule", "at"]
 
 HIGHEST_RATE: Final = 3e-3
 _CHIPS: Final = CanvasOptions(128, 128, mosaic=0.0, focused=0.85, scales=(0.4, 1.5), changed=0.8)
@@ -76,8 +77,11 @@ class Schedule:
         return [phase for phase in self.phases if phase.begins <= progress][-1]
 
 
-def shuffled(seed: int, first: int, count: int, of: int) -> NDArray[np.int64]:
-    """The numbers `first` to `first + count` of an endless sequence in which every round holds each of `of` once."""
-    numbers = np.arange(first, first + count)
-    rounds = {int(k): np.random.default_rng([seed, int(k)]).permutation(of) for k in np.unique(numbers // of)}
-    return np.array([rounds[int(n // of)][n % of] for n in numbers], dtype=np.int64)
+def at(seed: int, number: int, of: int) -> int:
+    """The entry of a number in an endless sequence in which every round holds each of `of` once, in another order."""
+    return int(_order(seed, number // of, of)[number % of])
+
+
+@lru_cache(maxsize=8)
+def _order(seed: int, turn: int, of: int) -> NDArray[np.int64]:
+    return np.random.default_rng([seed, turn]).permutation(of)

@@ -15,16 +15,19 @@ from typing import Any, Final
 import cv2
 import torch
 
+from skills.detect.onnx_detector import DetectorOptions, load_detector
 from skills.detect.scoring import Score
 from skills.detect.training.batches import Feed
 from skills.detect.training.canvases import CanvasMaker
 from skills.detect.training.export import export
-from skills.detect.training.labels import TrainingDataError, category_names, digest_of, read_split
-from skills.detect.training.learner import Learner, read_checkpoint
+from skills.detect.training.labels import LearningPicture, TrainingDataError, category_names, digest_of, read_split
+from skills.detect.training.learner import ONNX, Learner
+from skills.detect.training.mining import LEAST_BELIEVED, hard_places, read_places, write_places
+from skills.detect.training.onnx_weights import settle
 from skills.detect.training.options import TrainOptions
 from skills.detect.training.peers import Peers, joined_peers
 from skills.detect.training.records import draw_curves
-from skills.detect.training.store import open_store
+from skills.detect.training.store import PictureStore, open_store
 from skills.detect.training.validate import Examination, examination, examine, offsets_by
 
 __all__ = ["CHECKPOINT", "MODEL", "Report", "TrainOptions", "train"]
@@ -32,10 +35,13 @@ __all__ = ["CHECKPOINT", "MODEL", "Report", "TrainOptions", "train"]
 CHECKPOINT: Final = "checkpoint.pt"
 MODEL: Final = "errand_detector.onnx"
 CURVES: Final = "curves.png"
+PICTURES: Final = "pictures"
+PLACES: Final = "hard_places.json"
 _NOTED_EVERY_STEPS: Final = 20
 _GO_ON: Final = "perhaps for want of memory; the same command with --resume goes on from its checkpoint"
 _EXAMINED_EVERY: Final = 0.1
 _CALIBRATED_BY: Final = 900
+_SETTLED_BY: Final = 24
 
 
 @dataclass(frozen=True)
@@ -57,9 +63,13 @@ def train(options: TrainOptions, told: Told) -> Path:
     options.out.mkdir(parents=True, exist_ok=True)
     pictures = read_split(options.data, "train")
     examination(options.data, "val", category_names(options.data))
-    open_store(options.out / "pictures", pictures)
-    if (begins := _beginning(options)) is not None:
-        read_checkpoint(begins)
+    begins = _beginning(options)
+    if begins is not None:
+        beginner = Learner.new(len(category_names(options.data)), options.seed, torch.device("cpu"))
+        _begin(beginner, options)
+    store = open_store(options.out / PICTURES, pictures)
+    if begins is not None and begins == options.start:
+        _look_for_errors(options, beginner, pictures, store)
     if torch.cuda.is_available() or options.processes == 1:
         _learn(0, 1, options, Path(), told)
     else:
@@ -114,8 +124,12 @@ def _learn(rank: int, count: int, options: TrainOptions, meeting: Path, told: To
     learner = Learner.new(len(names), options.seed, device)
     _begin(learner, options)
     pictures = read_split(options.data, "train")
-    store = open_store(options.out / "pictures", pictures)
-    feed = Feed(CanvasMaker(pictures, store), options.seed, rank, count)
+    store = open_store(options.out / PICTURES, pictures)
+    maker = CanvasMaker(pictures, store, read_places(options.out / PLACES))
+    _settle(learner, options, maker)
+    if options.keep_early:
+        learner.keep_early()
+    feed = Feed(maker, options.seed, rank, count)
     exam = examination(options.data, "val", names, options.examined)
     _Course(options, learner, peers, feed, exam, told).run()
 
@@ -132,6 +146,29 @@ def _begin(learner: Learner, options: TrainOptions) -> None:
         learner.start_from(begins)
     elif begins is not None:
         learner.restore(begins)
+
+
+def _settle(learner: Learner, options: TrainOptions, maker: CanvasMaker) -> None:
+    """Find statistics for the weights of an ONNX file; the same in all processes."""
+    begins = _beginning(options)
+    if begins is None or begins != options.start or begins.suffix != ONNX:
+        return
+    feed, phase = Feed(maker, options.seed, 0, 1), options.schedule.phase(0.0)
+    settle(
+        learner.network, (feed.batch(k * phase.batch, phase).pictures.to(learner.device) for k in range(_SETTLED_BY))
+    )
+    learner.average.network.load_state_dict(learner.network.state_dict())
+
+
+def _look_for_errors(
+    options: TrainOptions, beginner: Learner, pictures: Sequence[LearningPicture], store: PictureStore
+) -> None:
+    """Note where the network with which learning begins errs."""
+    file = options.out / MODEL
+    export_model(beginner, options, calibrated=False)
+    write_places(
+        options.out / PLACES, hard_places(load_detector(file, DetectorOptions(LEAST_BELIEVED)), pictures, store)
+    )
 
 
 @dataclass

@@ -33,11 +33,16 @@ class Examination:
 
 
 def examination(folder: Path, split: str, class_names: Sequence[str], most: int | None = None) -> Examination:
-    """The pictures of `train` or `val`, or about `most` of them, evenly chosen. Raises TrainingDataError."""
+    """The pictures of `train` or `val`, or about `most` of them, evenly chosen. Raises TrainingDataError.
+
+    Those of crowded scenes are left out, since in them more of what is seen is a thing than elsewhere.
+    """
     file = folder / f"{split}.json"
     try:
-        pictures = pictures_of_coco(json.loads(file.read_text(encoding="utf-8")), class_names)
-    except (OSError, ValueError) as error:
+        document = json.loads(file.read_text(encoding="utf-8"))
+        crowded = {str(image["file_name"]) for image in document["images"] if image.get("crowded")}
+        pictures = [one for one in pictures_of_coco(document, class_names) if one.file not in crowded]
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise TrainingDataError(f"{file}: cannot be used ({error})", mend="render the data set anew") from error
     step = 1 if most is None else max(1, len(pictures) // most)
     return Examination(folder, pictures[::step], class_names)

@@ -13,7 +13,7 @@ import pytest
 
 from plant.dataset import shards
 from plant.dataset.errors import DatasetError
-from plant.dataset.render import VIEWS_PER_SCENE, Shot, is_validation
+from plant.dataset.render import Shot, is_validation, views_in
 from plant.dataset.shards import Summary, render
 
 
@@ -21,7 +21,7 @@ def fake_scene(seed: int, index: int) -> list[Shot]:
     """A scene without a renderer: noise from seed and number, one label for each picture."""
     rng = np.random.default_rng([seed, index])
     shots = []
-    for number in range(VIEWS_PER_SCENE):
+    for number in range(views_in(index)):
         picture = rng.integers(0, 255, (24, 32, 3)).astype(np.uint8)
         facts = {"width": 32, "height": 24, "split": "val" if is_validation(index) else "train", "view": number}
         label = {"category_id": 1 + index % 9, "bbox": [1, 1, 9, 9], "ignore": 0, "instance": "hammer_001"}

@@ -207,6 +207,20 @@ def test_a_resumed_training_goes_on_to_the_bit(tmp_path: Path) -> None:
         assert all(torch.equal(one, other) for one, other in pairs)
 
 
+def test_layers_that_are_kept_stay_as_they_are_and_the_rest_learns() -> None:
+    learner = Learner.new(len(NAMES), 1, CPU)
+    learnt(learner, 3)
+    before = {name: value.clone() for name, value in learner.network.state_dict().items()}
+    learner.average.network.load_state_dict(learner.network.state_dict())
+    learner.keep_early()
+    found = learnt(learner, 40)
+    kept = ("backbone.stem.", "backbone.stage8.")
+    after = learner.network.state_dict()
+    assert all(torch.equal(before[name], after[name]) for name in before if name.startswith(kept))
+    assert not torch.equal(before["backbone.stage16.0.0.weight"], after["backbone.stage16.0.0.weight"])
+    assert np.mean(found[-5:]) < 0.5 * np.mean(found[:5])
+
+
 @pytest.mark.parametrize("content", [b"", b"no checkpoint"])
 def test_a_damaged_checkpoint_is_named(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "checkpoint.pt"

@@ -15,8 +15,10 @@ pytest.importorskip("onnx")
 from skills.detect.detector_file import load_model
 from skills.detect.training.canvases import CanvasOptions
 from skills.detect.training.labels import TrainingDataError
+from skills.detect.training.mining import read_places
 from skills.detect.training.schedule import Budget, Phase, Schedule
-from skills.detect.training.train import CHECKPOINT, MODEL, Report, TrainOptions, train
+from skills.detect.training.train import CHECKPOINT, MODEL, PLACES, Report, TrainOptions, train
+from skills.detect.training.validate import examination
 
 NAMES = ("beer", "coke")
 SMALL = Schedule(warm_up_steps=2, phases=(Phase(0.0, CanvasOptions(96, 64), 2),))
@@ -92,6 +94,31 @@ def test_weights_of_another_training_are_taken_over(options: TrainOptions, tmp_p
     told = list[Report]()
     train(replace(options, out=tmp_path / "next", start=options.out / CHECKPOINT), told.append)
     assert told[-1].steps == 4
+
+
+def test_learning_goes_on_from_an_onnx_file_and_looks_where_it_errs(options: TrainOptions, tmp_path: Path) -> None:
+    start = train(options, lambda _report: None)
+    told = list[Report]()
+    chosen = replace(options, out=tmp_path / "next", start=start, keep_early=True)
+    train(chosen, told.append)
+    assert told[-1].steps == 4
+    assert {place.picture for place in read_places(chosen.out / PLACES)} == {0, 1, 2, 3}
+
+
+@pytest.mark.parametrize("content", [b"", b"no network"])
+def test_an_onnx_file_that_is_damaged_is_named(options: TrainOptions, tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "old.onnx"
+    file.write_bytes(content)
+    with pytest.raises(TrainingDataError, match=r"old\.onnx"):
+        train(replace(options, start=file), lambda _report: None)
+
+
+def test_scores_are_shifted_by_pictures_that_are_not_crowded(options: TrainOptions) -> None:
+    document = json.loads((options.data / "train.json").read_text())
+    for image in document["images"][1:]:
+        image["crowded"] = True
+    (options.data / "train.json").write_text(json.dumps(document))
+    assert [one.file for one in examination(options.data, "train", NAMES).pictures] == ["train0.png"]
 
 
 def test_a_picture_that_is_damaged_is_named(options: TrainOptions) -> None:

@@ -15,7 +15,7 @@ from executive.cli.output import console_for, print_json, refusals
 from executive.errors import InputError
 from skills.detect.training.labels import TrainingDataError, read_split
 from skills.detect.training.options import TrainOptions
-from skills.detect.training.schedule import HIGHEST_RATE, Budget, Schedule
+from skills.detect.training.schedule import HIGHEST_RATE, REFINING_RATE, Budget, Schedule
 
 if TYPE_CHECKING:
     from skills.detect.training.train import Report
@@ -35,7 +35,15 @@ def train_command(
     ] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how often to see each picture.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all that is drawn by chance.")] = 1,
-    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = HIGHEST_RATE,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-6,
+            max=0.1,
+            help=f"The highest learning rate; {HIGHEST_RATE} unless said, and {REFINING_RATE} with --start.",
+            show_default=False,
+        ),
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
     start: Annotated[
@@ -62,7 +70,7 @@ def train_command(
             resume=resume,
             start=start,
             keep_early=keep_early,
-            schedule=Schedule.refining(rate) if start else Schedule(rate),
+            schedule=Schedule.refining(rate or REFINING_RATE) if start else Schedule(rate or HIGHEST_RATE),
         )
         model, figures = _trained(options, console)
     console.print(f"{model}: {_line(figures)}")

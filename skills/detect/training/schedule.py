@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from skills.detect.training.canvases import CanvasOptions
 
-__all__ = ["HIGHEST_RATE", "Budget", "Phase", "Schedule", "at"]
+__all__ = ["HIGHEST_RATE", "REFINING_RATE", "Budget", "Phase", "Schedule", "at"]
 
 HIGHEST_RATE: Final = 3e-3
+REFINING_RATE: Final = 8e-4
 _CHIPS: Final = CanvasOptions(128, 128, mosaic=0.0, focused=0.85, scales=(0.4, 1.5), changed=0.8)
 _WINDOWS: Final = CanvasOptions(256, 192, mosaic=0.3, scales=(0.4, 1.4), changed=0.7)
 _LARGER: Final = CanvasOptions(384, 320, mosaic=0.25, focused=0.75, scales=(0.5, 1.3), changed=0.6)
@@ -62,8 +63,11 @@ class Schedule:
     )
 
     @staticmethod
-    def refining(highest_rate: float = HIGHEST_RATE) -> Schedule:
-        """For weights that have been learnt already: the larger windows, then whole pictures."""
+    def refining(highest_rate: float = REFINING_RATE) -> Schedule:
+        """For weights that have been learnt already: the larger windows, then whole pictures.
+
+        At a rate of 2e-3 a tenth of an hour took a quarter of the mean average precision away; at 8e-4 it takes none.
+        """
         return Schedule(highest_rate, phases=(Phase(0.0, _LARGER, 8), Phase(0.6, _PICTURES, 4)))
 
     def rate(self, step: int, progress: float) -> float:

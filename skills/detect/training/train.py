@@ -184,10 +184,11 @@ class _Course:
     resting_since: float = field(default_factory=time.monotonic)
 
     def run(self) -> None:
-        """Learn until the time is over, then write the file."""
+        """Learn until the time is over, then write the file; or until the process that began it all is no more."""
+        starter = multiprocessing.parent_process()
         if self._done() >= 1.0:
             self._examine()
-        while (done := self._done()) < 1.0:
+        while (done := self._done()) < 1.0 and (starter is None or starter.is_alive()):
             self._step(done)
             if int(self._done() / _EXAMINED_EVERY) > int(done / _EXAMINED_EVERY):
                 self._examine()

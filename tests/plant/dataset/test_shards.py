@@ -34,7 +34,7 @@ def no_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shards, "render_scene", fake_scene)
 
 
-def run(out: Path, images: int = 50, seed: int = 4, progress: Callable[[int, int], None] | None = None) -> Summary:
+def run(out: Path, images: int = 130, seed: int = 4, progress: Callable[[int, int], None] | None = None) -> Summary:
     return render(out, images=images, seed=seed, jobs=1, progress=progress or (lambda done, total: None))
 
 
@@ -69,10 +69,16 @@ def test_a_run_that_was_broken_off_goes_on_to_the_same_set(tmp_path: Path) -> No
 def test_a_set_can_grow_and_keeps_its_first_pictures(tmp_path: Path) -> None:
     run(tmp_path / "set", images=20)
     before = json.loads((tmp_path / "set" / "train.json").read_text())
-    summary = run(tmp_path / "set", images=60)
+    summary = run(tmp_path / "set", images=150)
     after = json.loads((tmp_path / "set" / "train.json").read_text())
     assert after["images"][:20] == before["images"]
-    assert summary.images == {"train": 52, "val": 8}
+    assert summary.images == {"train": 142, "val": 8}
+
+
+def test_scenes_to_learn_from_are_seen_in_more_pictures_than_those_for_validation(tmp_path: Path) -> None:
+    run(tmp_path / "set", images=150)
+    scenes = tmp_path / "set" / "scenes"
+    assert [len(list((scenes / f"{k:06d}").glob("*.jpg"))) for k in (0, 4, 5, 6)] == [24, 24, 8, 24]
 
 
 def test_only_the_wished_number_of_pictures_is_listed(tmp_path: Path) -> None:
@@ -83,9 +89,9 @@ def test_only_the_wished_number_of_pictures_is_listed(tmp_path: Path) -> None:
 
 
 def test_progress_begins_with_what_is_there_already(tmp_path: Path) -> None:
-    run(tmp_path / "set", images=16)
+    run(tmp_path / "set", images=48)
     told: list[tuple[int, int]] = []
-    run(tmp_path / "set", images=32, progress=lambda done, total: told.append((done, total)))
+    run(tmp_path / "set", images=96, progress=lambda done, total: told.append((done, total)))
     assert told == [(2, 4), (3, 4), (4, 4)]
 
 
@@ -119,12 +125,12 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_a_damaged_scene_is_named_with_the_mend(tmp_path: Path) -> None:
-    run(tmp_path / "set", images=16)
+    run(tmp_path / "set", images=48)
     (tmp_path / "set" / "scenes" / "000001" / "shots.json").write_text("{")
     with pytest.raises(DatasetError, match=r"000001.*damaged.*remove .*000001"):
-        run(tmp_path / "set", images=16)
+        run(tmp_path / "set", images=48)
     shutil.rmtree(tmp_path / "set" / "scenes" / "000001")
-    assert sum(run(tmp_path / "set", images=16).images.values()) == 16
+    assert sum(run(tmp_path / "set", images=48).images.values()) == 48
 
 
 def test_a_file_in_the_place_of_the_folder_is_told(tmp_path: Path) -> None:
@@ -134,12 +140,12 @@ def test_a_file_in_the_place_of_the_folder_is_told(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_is_told_and_leaves_whole_scenes_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run(tmp_path / "set", images=8)
+    run(tmp_path / "set", images=24)
 
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(shards, "_write_shot", full)
     with pytest.raises(DatasetError, match="the disk is full; make room; the same command goes on"):
-        run(tmp_path / "set", images=16)
+        run(tmp_path / "set", images=48)
     assert [path.name for path in (tmp_path / "set" / "scenes").iterdir()] == ["000000"]

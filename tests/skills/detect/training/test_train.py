@@ -1,7 +1,12 @@
 """From a folder of pictures to the ONNX file; skipped without torch."""
 
+import contextlib
 import json
 import multiprocessing
+import os
+import select
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -65,6 +70,35 @@ def test_an_interrupted_training_leaves_no_process_behind(options: TrainOptions)
     with pytest.raises(KeyboardInterrupt):
         train(replace(options, processes=2, budget=Budget(seconds=3600.0)), interrupted)
     assert multiprocessing.active_children() == []
+
+
+def test_processes_end_when_the_one_that_began_them_was_killed(options: TrainOptions) -> None:
+    command = f"""
+from pathlib import Path
+from skills.detect.training.schedule import Budget
+from skills.detect.training.train import TrainOptions, train
+if __name__ == "__main__":
+    chosen = TrainOptions(Path({str(options.data)!r}), Path({str(options.out)!r}), Budget(seconds=3600.0), processes=2)
+    train(chosen, lambda report: print(report.steps, flush=True))
+"""
+    script = options.data / "learn.py"
+    script.write_text(command)
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, cwd=Path.cwd(), env=environment()) as began:
+        assert began.stdout is not None
+        assert int(began.stdout.readline()) > 0
+        children = Path(f"/proc/{began.pid}/task/{began.pid}/children").read_text().split()
+        learning = [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        began.kill()
+    assert len(learning) == 2
+    for pid in learning:
+        with contextlib.suppress(ProcessLookupError):
+            select.select([os.pidfd_open(pid)], [], [], 60.0)
+    assert not any(Path(f"/proc/{pid}").exists() for pid in learning)
+
+
+def environment() -> dict[str, str]:
+    """That of this process, with the sources in the path."""
+    return {**os.environ, "PYTHONPATH": str(Path.cwd())}
 
 
 def test_a_resumed_training_counts_what_it_has_seen(options: TrainOptions) -> None:

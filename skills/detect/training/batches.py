@@ -9,10 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from skills.detect.training.canvases import Canvas, CanvasMaker, CanvasOptions
+from skills.detect.training.canvases import Canvas, CanvasMaker
 from skills.detect.training.losses import TruthBatch
 from skills.detect.training.placing import Targets
-from skills.detect.training.schedule import Phase, at
+from skills.detect.training.schedule import Phase, shuffled
 
 __all__ = ["Batch", "Feed", "batch_of", "truth_of"]
 
@@ -37,17 +37,12 @@ class Feed:
     def batch(self, taken: int, phase: Phase) -> Batch:
         """The next batch of this process, when all have `taken` so many canvases together."""
         first = taken + self.rank * phase.batch
-        return batch_of([self._canvas(first + k, phase.canvas) for k in range(phase.batch)])
-
-    def _canvas(self, number: int, options: CanvasOptions) -> Canvas:
-        """The canvas of a number: where there are hard places, every other window is about one of them."""
-        random = np.random.default_rng([self.seed, number])
-        hard = 0 if options.whole else len(self.maker.places)
-        if hard and number % 2:
-            return self.maker.hard(at(self.seed, number // 2, hard), options, random)
-        return self.maker.make(
-            at(self.seed, number // 2 if hard else number, len(self.maker.pictures)), options, random
-        )
+        chosen = shuffled(self.seed, first, phase.batch, len(self.maker.pictures))
+        canvases = [
+            self.maker.make(int(index), phase.canvas, np.random.default_rng([self.seed, first + k]))
+            for k, index in enumerate(chosen)
+        ]
+        return batch_of(canvases)
 
 
 def batch_of(canvases: Sequence[Canvas]) -> Batch:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from skills.detect.letterbox import HEIGHT_PX, PADDING, WIDTH_PX
 from skills.detect.training.labels import Labels, LearningPicture
-from skills.detect.training.mining import HardPlace
 from skills.detect.training.photometry import as_seen_otherwise
 from skills.detect.training.placing import Cell, Targets, joined, placed, turning
 from skills.detect.training.store import PictureStore
@@ -63,45 +62,25 @@ class CanvasMaker:
 
     pictures: Sequence[LearningPicture]
     store: PictureStore
-    places: Sequence[HardPlace] = ()
 
-    def hard(self, number: int, options: CanvasOptions, random: np.random.Generator) -> Canvas:
-        """A canvas about the hard place of a number, perhaps beside three other windows."""
-        place = self.places[number]
-        return self.make(place.picture, options, random, about=_corners(place))
-
-    def make(
-        self, index: int, options: CanvasOptions, random: np.random.Generator, about: Floats | None = None
-    ) -> Canvas:
-        """A canvas that shows the picture `index`, perhaps beside three others.
-
-        A window is about the outline `about` (K, 2), where one is given, or about one of the picture's things.
-        """
+    def make(self, index: int, options: CanvasOptions, random: np.random.Generator) -> Canvas:
+        """A canvas that shows the picture `index`, perhaps beside three others."""
         canvas = np.full((options.height_px, options.width_px, 3), PADDING, dtype=np.uint8)
         several = random.random() < options.mosaic
         cells = _four(options, random) if several else [Cell(0, 0, options.width_px, options.height_px)]
         others = random.integers(0, len(self.pictures), len(cells) - 1).tolist()
-        shown = [(index, about), *((k, None) for k in others)]
-        parts = [self._fill(canvas, cell, one, options, random) for cell, one in zip(cells, shown, strict=True)]
+        parts = [self._fill(canvas, cell, k, options, random) for cell, k in zip(cells, [index, *others], strict=True)]
         if random.random() < options.changed:
             canvas = as_seen_otherwise(canvas, random)
         return Canvas(canvas, joined(parts))
 
     def _fill(
-        self,
-        canvas: Picture,
-        cell: Cell,
-        shown: tuple[int, Floats | None],
-        options: CanvasOptions,
-        random: np.random.Generator,
+        self, canvas: Picture, cell: Cell, index: int, options: CanvasOptions, random: np.random.Generator
     ) -> Targets:
-        """Draw one picture, by its number and the outline that it is to be about, into a cell; its labels there."""
-        index, about = shown
+        """Draw one picture into a cell; its labels there."""
         labels = self.pictures[index].labels
-        if options.whole:
-            affine = _whole(cell, options, random)
-        else:
-            affine = _window(_chosen(labels, options, random) if about is None else about, cell, options, random)
+        choose = _whole if options.whole else _window
+        affine = choose(labels, cell, options, random)
         _warp(self.store, index, affine, canvas, cell)
         return placed(labels, affine, cell)
 
@@ -113,14 +92,10 @@ def _four(options: CanvasOptions, random: np.random.Generator) -> list[Cell]:
     return [Cell(0, 0, x, y), Cell(x, 0, width, y), Cell(0, y, x, height), Cell(x, y, width, height)]
 
 
-def _corners(place: HardPlace) -> Floats:
-    x0, y0, x1, y1 = place.box
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=np.float32)
-
-
-def _window(thing: Floats | None, cell: Cell, options: CanvasOptions, random: np.random.Generator) -> Floats:
-    """A window about an outline, or anywhere, at a random scale at which it mostly fits."""
+def _window(labels: Labels, cell: Cell, options: CanvasOptions, random: np.random.Generator) -> Floats:
+    """A window about a thing, or anywhere, at a random scale at which the thing mostly fits."""
     scale = float(np.exp(random.uniform(*np.log(options.scales))))
+    thing = _chosen(labels, options, random)
     if thing is None:
         focus = _somewhere(random)
     else:
@@ -158,7 +133,7 @@ def _turn(random: np.random.Generator) -> float:
     return quarter + float(random.normal(0.0, 0.15))
 
 
-def _whole(cell: Cell, options: CanvasOptions, random: np.random.Generator) -> Floats:
+def _whole(_labels: Labels, cell: Cell, options: CanvasOptions, random: np.random.Generator) -> Floats:
     """The whole picture at about the size of the cell, hardly turned."""
     focus = np.array([WIDTH_PX / 2, HEIGHT_PX / 2], dtype=np.float32)
     fit = min(cell.size[0] / WIDTH_PX, cell.size[1] / HEIGHT_PX)

@@ -14,9 +14,8 @@ __all__ = ["TrainOptions"]
 class TrainOptions:
     """What to learn from, where to write, how long, and with how many processes of one thread.
 
-    `start` names a checkpoint or a detector's ONNX file of which the weights are taken over; learning then looks twice
-    as often where that network errs. `keep_early` leaves its first layers as they are. With `resume`, learning goes on
-    where `out` stands.
+    `start` names a checkpoint or a detector's ONNX file of which the weights are taken over. `keep_early` leaves the
+    first layers as they are. With `resume`, learning goes on where `out` stands.
     """
 
     data: Path

@@ -15,19 +15,17 @@ from typing import Any, Final
 import cv2
 import torch
 
-from skills.detect.onnx_detector import DetectorOptions, load_detector
 from skills.detect.scoring import Score
 from skills.detect.training.batches import Feed
 from skills.detect.training.canvases import CanvasMaker
 from skills.detect.training.export import export
-from skills.detect.training.labels import LearningPicture, TrainingDataError, category_names, digest_of, read_split
+from skills.detect.training.labels import TrainingDataError, category_names, digest_of, read_split
 from skills.detect.training.learner import ONNX, Learner
-from skills.detect.training.mining import LEAST_BELIEVED, hard_places, read_places, write_places
 from skills.detect.training.onnx_weights import settle
 from skills.detect.training.options import TrainOptions
 from skills.detect.training.peers import Peers, joined_peers
 from skills.detect.training.records import draw_curves
-from skills.detect.training.store import PictureStore, open_store
+from skills.detect.training.store import open_store
 from skills.detect.training.validate import Examination, examination, examine, offsets_by
 
 __all__ = ["CHECKPOINT", "MODEL", "Report", "TrainOptions", "train"]
@@ -36,7 +34,6 @@ CHECKPOINT: Final = "checkpoint.pt"
 MODEL: Final = "errand_detector.onnx"
 CURVES: Final = "curves.png"
 PICTURES: Final = "pictures"
-PLACES: Final = "hard_places.json"
 _NOTED_EVERY_STEPS: Final = 20
 _GO_ON: Final = "perhaps for want of memory; the same command with --resume goes on from its checkpoint"
 _EXAMINED_EVERY: Final = 0.1
@@ -63,13 +60,8 @@ def train(options: TrainOptions, told: Told) -> Path:
     options.out.mkdir(parents=True, exist_ok=True)
     pictures = read_split(options.data, "train")
     examination(options.data, "val", category_names(options.data))
-    begins = _beginning(options)
-    if begins is not None:
-        beginner = Learner.new(len(category_names(options.data)), options.seed, torch.device("cpu"))
-        _begin(beginner, options)
-    store = open_store(options.out / PICTURES, pictures)
-    if begins is not None and begins == options.start:
-        _look_for_errors(options, beginner, pictures, store)
+    _begin(Learner.new(len(category_names(options.data)), options.seed, torch.device("cpu")), options)
+    open_store(options.out / PICTURES, pictures)
     if torch.cuda.is_available() or options.processes == 1:
         _learn(0, 1, options, Path(), told)
     else:
@@ -125,7 +117,7 @@ def _learn(rank: int, count: int, options: TrainOptions, meeting: Path, told: To
     _begin(learner, options)
     pictures = read_split(options.data, "train")
     store = open_store(options.out / PICTURES, pictures)
-    maker = CanvasMaker(pictures, store, read_places(options.out / PLACES))
+    maker = CanvasMaker(pictures, store)
     _settle(learner, options, maker)
     if options.keep_early:
         learner.keep_early()
@@ -158,17 +150,6 @@ def _settle(learner: Learner, options: TrainOptions, maker: CanvasMaker) -> None
         learner.network, (feed.batch(k * phase.batch, phase).pictures.to(learner.device) for k in range(_SETTLED_BY))
     )
     learner.average.network.load_state_dict(learner.network.state_dict())
-
-
-def _look_for_errors(
-    options: TrainOptions, beginner: Learner, pictures: Sequence[LearningPicture], store: PictureStore
-) -> None:
-    """Note where the network with which learning begins errs."""
-    file = options.out / MODEL
-    export_model(beginner, options, calibrated=False)
-    write_places(
-        options.out / PLACES, hard_places(load_detector(file, DetectorOptions(LEAST_BELIEVED)), pictures, store)
-    )
 
 
 @dataclass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -148,3 +149,16 @@ def test_every_tenth_scene_holds_distractors_only() -> None:
     assert scene.things
     assert all(thing.model.class_id == 0 for thing in scene.things)
     assert scene.held is None or scene.held.model.class_id == 0
+
+
+def test_a_crowded_scene_holds_more_than_the_same_one_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("plant.dataset.compose.DISTRACTORS", ("mug",))
+    monkeypatch.setattr("plant.dataset.compose._any_instance", lambda _rng, family, _for_training: instance(family, 0))
+    held = dict[bool, Counter[str]]()
+    for share in (0.0, 1.0):
+        monkeypatch.setattr("plant.dataset.compose.CROWDED_SHARE", share)
+        scene = compose(np.random.default_rng(3), 0, for_training=True)
+        held[scene.crowded] = Counter(thing.model.family for thing in scene.things)
+    assert sum(held[True].values()) > 1.5 * sum(held[False].values())
+    assert set(held[True]) >= {"beer", "coke", "hammer", "screwdriver", "wrench", "cylinder", "cube", "mug"}
+    assert held[True]["person"] <= 1

@@ -7,7 +7,6 @@ import pytest
 from skills.detect.letterbox import HEIGHT_PX, PADDING, WIDTH_PX
 from skills.detect.training.canvases import Canvas, CanvasMaker, CanvasOptions
 from skills.detect.training.labels import Labels, LearningPicture
-from skills.detect.training.mining import HardPlace
 from skills.detect.training.store import PictureStore
 
 SEEDS = range(12)
@@ -72,8 +71,8 @@ def test_canvases_have_the_size_that_is_asked_for(maker: CanvasMaker) -> None:
 def test_boxes_are_within_the_canvas(maker: CanvasMaker) -> None:
     for seed in SEEDS:
         boxes = maker.make(0, CanvasOptions(mosaic=0.5), np.random.default_rng(seed)).targets.boxes
-        assert (boxes >= -1e-4).all()
-        assert (boxes <= (320.0001, 256.0001, 320.0001, 256.0001)).all()
+        assert (boxes >= 0).all()
+        assert (boxes <= (320, 256, 320, 256)).all()
 
 
 def test_the_same_random_source_gives_the_same_canvas(maker: CanvasMaker) -> None:
@@ -93,16 +92,3 @@ def test_beyond_a_picture_there_is_the_letterboxs_grey(maker: CanvasMaker, monke
     options = replace(CanvasOptions(640, 480, whole=True, mosaic=0.0), scales=(0.5, 0.5001))
     canvas = maker.make(0, options, np.random.default_rng(1))
     assert (canvas.picture[:3] == PADDING).all()
-
-
-def test_a_window_about_a_hard_place_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    plain(monkeypatch)
-    full = np.full((1, HEIGHT_PX, WIDTH_PX, 3), 60, dtype=np.uint8)
-    full[0, 400:440, 20:60] = 250
-    picture = LearningPicture(Path("none.jpg"), labels(500, 100, 560, 160))
-    maker = CanvasMaker([picture], PictureStore(full, full[:, ::2, ::2]), [HardPlace(0, (20, 400, 60, 440))])
-    options = CanvasOptions(128, 128, mosaic=0.0, scales=(1.0, 1.001))
-    for seed in SEEDS:
-        canvas = maker.hard(0, options, np.random.default_rng(seed))
-        assert (canvas.picture > 190).any(), seed
-        assert len(canvas.targets.boxes) == 0

@@ -1,6 +1,7 @@
+import numpy as np
 import pytest
 
-from skills.detect.training.schedule import Budget, Schedule, at
+from skills.detect.training.schedule import Budget, Schedule, shuffled
 
 
 def test_the_rate_rises_first_and_falls_to_the_last_share() -> None:
@@ -41,8 +42,9 @@ def test_progress_is_of_whatever_is_limited(pictures: int | None, seconds: float
     assert Budget(pictures, seconds).progress(50, 10.0) == pytest.approx(expected)
 
 
-def test_every_round_holds_each_entry_once_in_another_order() -> None:
-    rounds = [[at(seed=3, number=7 * turn + k, of=7) for k in range(7)] for turn in range(3)]
-    assert [sorted(one) for one in rounds] == [list(range(7))] * 3
-    assert rounds[0] != rounds[1]
-    assert rounds[0] != [at(seed=4, number=k, of=7) for k in range(7)]
+def test_every_round_holds_each_picture_once_wherever_it_is_begun() -> None:
+    whole = shuffled(seed=3, first=0, count=21, of=7)
+    assert [sorted(whole[k : k + 7].tolist()) for k in (0, 7, 14)] == [list(range(7))] * 3
+    assert whole[:7].tolist() != whole[7:14].tolist()
+    assert np.array_equal(shuffled(seed=3, first=5, count=6, of=7), whole[5:11])
+    assert not np.array_equal(shuffled(seed=4, first=0, count=21, of=7), whole)

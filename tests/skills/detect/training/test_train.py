@@ -1,6 +1,5 @@
 """From a folder of pictures to the ONNX file; skipped without torch."""
 
-import contextlib
 import json
 import multiprocessing
 import os
@@ -82,17 +81,28 @@ if __name__ == "__main__":
 """
     script = options.data / "learn.py"
     script.write_text(command)
-    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, cwd=Path.cwd(), env=environment()) as began:
+    with subprocess.Popen(
+        ["sh", "-c", f"trap '' INT; exec {sys.executable} {script}"],  # deaf to interrupts, as in a script's background
+        stdout=subprocess.PIPE,
+        cwd=Path.cwd(),
+        env=environment(),
+    ) as began:
         assert began.stdout is not None
         assert int(began.stdout.readline()) > 0
         children = Path(f"/proc/{began.pid}/task/{began.pid}/children").read_text().split()
         learning = [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
         began.kill()
     assert len(learning) == 2
-    for pid in learning:
-        with contextlib.suppress(ProcessLookupError):
-            select.select([os.pidfd_open(pid)], [], [], 60.0)
-    assert not any(Path(f"/proc/{pid}").exists() for pid in learning)
+    assert all(ends(pid, within_s=60.0) for pid in learning)
+
+
+def ends(pid: int, within_s: float) -> bool:
+    """Whether a process is over, or is in time."""
+    try:
+        handle = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return True
+    return bool(select.select([handle], [], [], within_s)[0])
 
 
 def environment() -> dict[str, str]:

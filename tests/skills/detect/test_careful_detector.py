@@ -19,9 +19,9 @@ VARIANTS = (Variant(), Variant(mirrored=True), Variant(scale=0.5))
 def looked(tmp_path, monkeypatch):
     model = load_detector(write_model(tmp_path / "tiny.onnx")).model
 
-    def look(*answers):
+    def look(*answers, variants=VARIANTS):
         monkeypatch.setattr(OnnxDetector, "detect", lambda self, pictures: [tuple(found) for found in answers])
-        return CarefulDetector(OnnxDetector(model), VARIANTS).detect_carefully(SEEN)
+        return CarefulDetector(OnnxDetector(model), variants).detect_carefully(SEEN)
 
     return look
 
@@ -62,6 +62,28 @@ def test_what_is_very_large_is_judged_where_it_is_smaller(looked):
     assert [(one.class_name, one.score) for one in found] == [("hammer", pytest.approx(0.8))]
 
 
+def test_a_look_at_a_part_that_shows_all_of_a_thing_counts(looked):
+    # the lower right quarter, twice as large: (400, 300, 440, 360) is (80, 60, 120, 120) of its 320 x 240 pixels
+    whole, part = [Detection("beer", 0.4, (400.0, 300.0, 440.0, 360.0))], [Detection("beer", 0.8, (80, 60, 120, 120))]
+    (found,) = looked(whole, part, variants=(Variant(), Variant(part=(0.5, 0.5, 1.0, 1.0))))
+    assert found.score == pytest.approx(0.6)
+    assert found.box == pytest.approx((400.0, 300.0, 440.0, 360.0))
+
+
+def test_what_a_part_cuts_off_is_judged_by_the_other_looks(looked):
+    # from 280 to 360 across, of which the part from 320 on shows the right half only
+    whole, half = [Detection("beer", 0.8, (280.0, 300.0, 360.0, 340.0))], [Detection("hammer", 0.9, (0, 60, 40, 100))]
+    (found,) = looked(whole, half, variants=(Variant(), Variant(part=(0.5, 0.5, 1.0, 1.0))))
+    assert (found.class_name, found.score, found.rivals) == ("beer", pytest.approx(0.8), ())
+
+
+def test_what_would_be_very_large_in_a_part_is_judged_by_the_other_looks(looked):
+    # 200 pixels long, and 400 in the quarter
+    whole, part = [Detection("beer", 0.8, (400.0, 300.0, 600.0, 360.0))], [Detection("hammer", 0.9, (80, 60, 280, 120))]
+    (found,) = looked(whole, part, variants=(Variant(), Variant(part=(0.5, 0.5, 1.0, 1.0))))
+    assert (found.class_name, found.score, found.rivals) == ("beer", pytest.approx(0.8), ())
+
+
 def test_two_things_of_a_class_stay_two(looked):
     other = (400.0, 300.0, 600.0, 400.0)
     found = looked(
@@ -76,7 +98,18 @@ def test_nothing_seen_is_nothing(looked):
     assert looked([], [], []) == ()
 
 
-@pytest.mark.parametrize("variant", [Variant(), Variant(True), Variant(scale=0.7), Variant(True, 0.5)], ids=str)
+@pytest.mark.parametrize(
+    "variant",
+    [
+        Variant(),
+        Variant(True),
+        Variant(scale=0.7),
+        Variant(True, 0.5),
+        Variant(part=(0.1, 0.05, 1.0, 0.9)),
+        Variant(True, 0.8, (0.1, 0.05, 1.0, 0.9)),
+    ],
+    ids=str,
+)
 @pytest.mark.parametrize("shape", [(480, 640, 3), (240, 320)], ids=["colour", "grey"])
 def test_a_box_of_a_variant_lies_where_the_thing_is_in_the_picture(variant, shape):
     picture = np.zeros(shape, dtype=np.uint8)
@@ -85,8 +118,16 @@ def test_a_box_of_a_variant_lies_where_the_thing_is_in_the_picture(variant, shap
     white = varied if varied.ndim == 2 else varied[..., 0]
     rows, columns = np.nonzero(white > 200)
     box = (float(columns.min()), float(rows.min()), float(columns.max() + 1), float(rows.max() + 1))
-    assert varied.shape == picture.shape
-    assert variant.back(box, shape[1]) == pytest.approx((100.0, 50.0, 300.0, 150.0), abs=3.0)
+    assert variant.back(box, shape) == pytest.approx((100.0, 50.0, 300.0, 150.0), abs=3.0)
+
+
+@pytest.mark.parametrize("variant", [Variant(), Variant(True), Variant(scale=0.35)], ids=str)
+def test_a_whole_picture_keeps_its_size(variant):
+    assert variant.of(np.zeros((240, 320, 3), dtype=np.uint8)).shape == (240, 320, 3)
+
+
+def test_a_part_of_a_picture_of_one_pixel_is_that_pixel():
+    assert Variant(part=(0.375, 0.375, 1.0, 1.0)).of(np.zeros((1, 1), dtype=np.uint8)).shape == (1, 1)
 
 
 def test_it_is_a_detector_that_looks_once_unless_asked(tmp_path):

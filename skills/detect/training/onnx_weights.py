@@ -31,7 +31,7 @@ def take_over(network: DetectorNetwork, file: Path) -> None:
     kept, offsets = _content(file)
     try:
         for name, module in network.named_modules():
-            if isinstance(module, nn.Sequential) and len(module) >= 2 and isinstance(module[1], nn.BatchNorm2d):
+            if isinstance(module, nn.Sequential) and _normalised(module):
                 _fill(module[0].weight, kept[f"{name}.0.weight"])
                 _pass_on(module[1], torch.from_numpy(kept[f"{name}.0.bias"]))
             elif isinstance(module, nn.Conv2d) and module.bias is not None:
@@ -73,7 +73,7 @@ def _pass_on(normalisation: nn.BatchNorm2d, bias: Tensor) -> None:
 
 @torch.no_grad()
 def settle(network: DetectorNetwork, batches: Iterable[Tensor]) -> None:
-    """Give each normalisation the statistics of batches (N, 3, H, W) and each filter the length 1.
+    """Give each normalisation the statistics of batches (N, 3, H, W) and each filter the length 1, after `take_over`.
 
     What the network says stays the same. Without it, learning would begin by forgetting: it normalises by the batch.
     """
@@ -102,18 +102,11 @@ def _normalised(unit: nn.Sequential) -> bool:
 
 
 def _normalise(convolution: nn.Conv2d, normalisation: nn.BatchNorm2d, mean: Tensor, variance: Tensor) -> None:
-    """Statistics of a convolution's output, and all else such that nothing changes."""
+    """Statistics of a convolution's output, and all else such that nothing changes: so far it added a bias only."""
     lengths = convolution.weight.flatten(1).norm(dim=1).clamp(min=1e-6)
     convolution.weight.div_(lengths[:, None, None, None])
     mean, variance = mean.float() / lengths, variance.float() / lengths.square()
-    spread = torch.sqrt(variance + normalisation.eps)
-    factor = lengths * spread
-    before = torch.sqrt(normalisation.running_var + normalisation.eps)
-    scale, bias = (
-        normalisation.weight / before,
-        normalisation.bias - normalisation.weight * normalisation.running_mean / before,
-    )
     normalisation.running_mean.copy_(mean)
     normalisation.running_var.copy_(variance)
-    normalisation.bias.copy_(bias + scale * lengths * mean)
-    normalisation.weight.copy_(scale * factor)
+    normalisation.weight.copy_(lengths * torch.sqrt(variance + normalisation.eps))
+    normalisation.bias.add_(lengths * mean)

@@ -4,9 +4,67 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from table_scene import COKE, scene
+from pydrake.math import RigidTransform, RotationMatrix
+from table_scene import CAMERA, COKE, TABLE, scene
 
-from skills.detect.seeing import is_dark
+from skills.arm.poses import camera_pose
+from skills.detect.seeing import detections_in, is_dark, on_its_head, seen_in_grey
+from skills.robot import FrameTree
+from skills.testing.detector import PlainColours
+
+COKES = PlainColours({"coke": COKE.colour})
+
+
+def rolled(roll_rad):
+    """The scene from a camera that is turned about its axis."""
+    X_WC = camera_pose(CAMERA, np.array([1.05, 0.0, TABLE.height_m]))
+    return scene([COKE], X_WC=X_WC @ RigidTransform(RotationMatrix.MakeZRotation(roll_rad), np.zeros(3)))
+
+
+class Recorder(PlainColours):
+    """Keeps the pictures that it is shown."""
+
+    def detect(self, pictures):
+        self.__dict__["shown"] = list(pictures)
+        return [() for _ in pictures]
+
+
+@pytest.mark.parametrize(
+    ("roll_deg", "turned"), [(0, False), (78, False), (-102, False), (172, True), (180, True), (-172, True)]
+)
+def test_a_picture_is_on_its_head_when_its_camera_hangs_upside_down(roll_deg, turned):
+    # Spot's cameras: left and back about 0, frontleft -78, frontright -102, right 172 degrees
+    assert on_its_head(rolled(np.radians(roll_deg))) is turned
+
+
+def test_a_picture_that_looks_straight_down_is_left_as_it_is():
+    down = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), [1.05, 0.0, 1.6])
+    image = rolled(0.0)
+    assert not on_its_head(replace(image, frames=FrameTree({"hand_camera": ("odom", down)})))
+
+
+def test_boxes_in_a_turned_picture_are_those_of_the_picture_as_it_was_taken():
+    image = rolled(np.pi)
+    (seen,) = detections_in(COKES, image)
+    (plain,) = COKES.detect([image.colour])[0]
+    assert seen.box == plain.box
+
+
+@pytest.mark.parametrize("roll_rad", [0.0, np.pi], ids=["upright", "on its head"])
+def test_the_detector_sees_the_world_upright(roll_rad):
+    detector, upright, image = Recorder(), rolled(0.0), rolled(roll_rad)
+    detections_in(detector, image)
+    (shown,) = detector.shown
+    rows = np.nonzero(np.all(shown == COKE.colour, axis=2))[0]
+    assert abs(rows.mean() - np.nonzero(np.all(upright.colour == COKE.colour, axis=2))[0].mean()) < 2.0
+    assert np.nonzero(np.all(image.colour == COKE.colour, axis=2))[0].size == rows.size
+
+
+def test_each_grey_picture_is_turned_as_it_needs_to_be():
+    detector, upright, head = Recorder(), rolled(0.0), rolled(np.pi)
+    assert seen_in_grey(detector, [upright, head]) == [(), ()]
+    assert np.array_equal(detector.shown[0], upright.grey)
+    assert np.array_equal(detector.shown[1], head.grey[::-1, ::-1])
 
 
 @pytest.mark.parametrize(("counts", "dark"), [(0, True), (4, True), (12, False), (255, False)])

@@ -63,8 +63,9 @@ class Track:
 
     @property
     def confirmed(self) -> bool:
-        """Seen from two places, and believed."""
-        return self.views >= 2 and self.belief >= CONFIRMED_BELIEF and self.classes[self.class_name] >= CONFIRMED_BELIEF
+        """Seen from two places, believed, and taken for the same when it was seen last."""
+        believed = self.belief >= CONFIRMED_BELIEF and self.classes[self.class_name] >= CONFIRMED_BELIEF
+        return self.views >= 2 and believed and self.latest.class_name == self.class_name
 
 
 class Tracks(Protocol):

@@ -106,6 +106,16 @@ def test_what_is_out_of_view_keeps_its_belief():
     assert (track.belief, track.missed) == (0.5, 0)
 
 
+def test_what_was_taken_for_something_else_when_last_seen_is_not_confirmed():
+    # twice surely a beer, then a coke: still likelier a beer
+    seen = [[sighting(name="beer", eye=LEFT)], [sighting(name="beer", eye=RIGHT)]]
+    doubt = [sighting(name="coke", score=0.55, eye=LEFT)]
+    (track,) = book_of(*seen, doubt).snapshot()
+    assert (track.class_name, track.confirmed) == ("beer", False)
+    (track,) = book_of(*seen, doubt, seen[0]).snapshot()
+    assert (track.class_name, track.confirmed) == ("beer", True)
+
+
 def test_a_track_that_was_confirmed_and_then_missed_is_no_longer_confirmed():
     seen = [[sighting(eye=LEFT)], [sighting(eye=RIGHT)]]
     assert book_of(*seen).snapshot()[0].confirmed

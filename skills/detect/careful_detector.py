@@ -28,8 +28,8 @@ _SAME_THING = 0.55
 _LEAST_SCORE = 0.05
 _LEAST_SIDE_PX, _MOST_SIDE_PX = 64.0, 240.0
 _MARGIN = 0.003
-WHOLE: Final = (0.0, 0.0, 1.0, 1.0)
-CORNERS: Final = (
+_WHOLE: Final = (0.0, 0.0, 1.0, 1.0)
+_CORNERS: Final = (
     (0.0, 0.0, 0.625, 0.625),
     (0.375, 0.0, 1.0, 0.625),
     (0.0, 0.375, 0.625, 1.0),
@@ -47,7 +47,7 @@ class Variant:
 
     mirrored: bool = False
     scale: float = 1.0
-    part: tuple[float, float, float, float] = WHOLE
+    part: tuple[float, float, float, float] = _WHOLE
 
     def of(self, picture: Picture) -> Picture:
         """The variant of a picture (H, W) or (H, W, 3); of the same size, if it is not a part."""
@@ -102,8 +102,8 @@ AS_IT_IS_AND_OTHERWISE: Final = (
     Variant(scale=0.7),
     Variant(True, 0.5),
     Variant(scale=0.35),
-    *(Variant(part=part) for part in CORNERS),
-    *(Variant(mirrored=True, part=part) for part in CORNERS),
+    *(Variant(part=part) for part in _CORNERS),
+    *(Variant(mirrored=True, part=part) for part in _CORNERS),
 )
 
 

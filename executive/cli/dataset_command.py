@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from executive.cli.output import console_for, print_json, refusals
+from executive.cli.refine_command import refine_command
 from executive.cli.score_command import score_command
 from executive.cli.train_command import train_command
 from executive.errors import InputError
@@ -32,6 +33,7 @@ def _group() -> None:
 
 dataset.command(name="score")(score_command)
 dataset.command(name="train")(train_command)
+dataset.command(name="refine")(refine_command)
 
 
 @dataset.command(name="render")

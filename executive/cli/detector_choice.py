@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.errors import InputError
-from skills.detect.detector_file import MODEL_FILE, ModelFileError
+from skills.detect.detector_file import MODEL_FILE
+from skills.detect.network_file import ModelFileError
 from skills.detect.onnx_detector import DetectorOptions, OnnxDetector, load_detector
 from skills.detection import Detection
 

@@ -8,12 +8,13 @@ from typing import Final
 import typer
 
 from executive.cli.detect_command import detect
+from executive.cli.refine_command import refine_command
 from executive.cli.score_command import score_command
 from executive.cli.train_command import train_command
 
 __all__ = ["main"]
 
-LIGHT: Final = (("detect",), ("dataset", "score"), ("dataset", "train"))
+LIGHT: Final = (("detect",), ("dataset", "score"), ("dataset", "train"), ("dataset", "refine"))
 
 
 def light_app() -> typer.Typer:
@@ -23,6 +24,7 @@ def light_app() -> typer.Typer:
     dataset = typer.Typer(name="dataset", help="Pictures with labels.")
     dataset.command(name="score")(score_command)
     dataset.command(name="train")(train_command)
+    dataset.command(name="refine")(refine_command)
     dataset.callback()(_group)
     app.add_typer(dataset)
     return app

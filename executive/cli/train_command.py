@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from executive.cli.output import console_for, print_json, refusals
-from executive.errors import InputError
-from skills.detect.training.labels import TrainingDataError, read_split
+from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, learnt, tell_learnt
+from executive.cli.output import console_for, refusals
 from skills.detect.training.options import TrainOptions
-from skills.detect.training.schedule import HIGHEST_RATE, REFINING_RATE, Budget, Schedule
-
-if TYPE_CHECKING:
-    from skills.detect.training.train import Report
+from skills.detect.training.schedule import HIGHEST_RATE, REFINING_RATE, Schedule
 
 __all__ = ["train_command"]
 
-NEEDED: Final = ("torch", "onnx")
-RENDER: Final = "make one: errand dataset render --out DIR --images 8000"
 UNLESS_SAID_MINUTES: Final = 240.0
 
 
@@ -58,13 +51,13 @@ def train_command(
     """Train the detector and export it, with checkpoints and curves on the way."""
     console = console_for(as_json)
     with refusals():
-        _check_folders(data, out, resume)
-        _check_time(minutes, epochs)
-        _check_libraries()
+        check_folders(data, out, resume)
+        check_time(minutes, epochs)
+        check_libraries()
         options = TrainOptions(
             data,
             out,
-            _budget(data, minutes, epochs),
+            budget_of(data, minutes, epochs, unless_said_minutes=UNLESS_SAID_MINUTES),
             seed=seed,
             processes=jobs or os.cpu_count() or 1,
             resume=resume,
@@ -73,75 +66,11 @@ def train_command(
             schedule=Schedule.refining(rate or REFINING_RATE) if start else Schedule(rate or HIGHEST_RATE),
         )
         model, figures = _trained(options, console)
-    console.print(f"{model}: {_line(figures)}")
-    if as_json:
-        print_json({"model": str(model), "figures": figures})
-
-
-def _check_folders(data: Path, out: Path, resume: bool) -> None:
-    """Raises InputError."""
-    for name in ("train.json", "val.json"):
-        if not (data / name).is_file():
-            raise InputError(f"{data / name}: there is no such file of a data set", mend=RENDER)
-    if (out / "checkpoint.pt").exists() and not resume:
-        raise InputError(f"{out}: holds a training already", mend="go on with it by --resume, or name another --out")
-
-
-def _check_time(minutes: float | None, epochs: int | None) -> None:
-    """Raises InputError."""
-    if minutes is not None and epochs is not None:
-        raise InputError("--minutes and --epochs are both given", mend="give one of them")
-
-
-def _check_libraries() -> None:
-    """Raises InputError."""
-    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
-    if missing:
-        raise InputError(f"training needs {' and '.join(missing)}", mend="pip install '.[train]'")
+    tell_learnt(console, model, figures, as_json=as_json)
 
 
 def _trained(options: TrainOptions, console: Console) -> tuple[Path, dict[str, float]]:
     """The ONNX file and its figures. Raises InputError."""
     from skills.detect.training.train import train
 
-    figures = dict[str, float]()
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
-        task = bar.add_task("learning", total=1.0)
-
-        def told(report: Report) -> None:
-            new_percent = int(100 * report.progress) > int(100 * bar.tasks[task].completed)
-            bar.update(task, completed=report.progress, description=_told(report))
-            if new_percent and not console.is_terminal:
-                console.print(f"{report.progress:4.0%}  step {report.steps}, {_told(report)}")
-            if report.figures is not None:
-                figures.update(report.figures)
-                console.print(f"{report.progress:4.0%}  {_line(report.figures)}")
-
-        try:
-            return train(options, told), figures
-        except TrainingDataError as error:
-            raise InputError(error.message, mend=error.mend) from error
-        except OSError as error:
-            raise InputError(
-                f"{options.out}: cannot be written ({error})", mend="name another folder, or make room"
-            ) from error
-
-
-def _budget(data: Path, minutes: float | None, epochs: int | None) -> Budget:
-    """Raises InputError."""
-    if epochs is None:
-        return Budget(seconds=60.0 * (UNLESS_SAID_MINUTES if minutes is None else minutes))
-    try:
-        return Budget(pictures=epochs * len(read_split(data, "train")))
-    except TrainingDataError as error:
-        raise InputError(error.message, mend=error.mend) from error
-
-
-def _told(report: Report) -> str:
-    scores, boxes = report.losses
-    return f"learning, {report.pictures_per_s:.0f}/s, losses {scores:.2f} {boxes:.2f}"
-
-
-def _line(figures: dict[str, float]) -> str:
-    return ", ".join(f"{name} {value:.3f}" for name, value in figures.items())
+    return learnt(partial(train, options), options.out, console)

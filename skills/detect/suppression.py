@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skills.detection import Detection
 
-__all__ = ["Candidates", "SuppressionOptions", "candidates_of", "rivals_of", "suppress", "told"]
+__all__ = ["Candidates", "SuppressionOptions", "apart", "candidates_of", "rivals_of", "suppress", "told"]
 
 Floats = NDArray[np.float32]
 
@@ -74,12 +74,21 @@ def suppress(candidates: Candidates, options: SuppressionOptions) -> Candidates:
     """
     if not len(candidates):
         return candidates
-    replaced = _replaced_by(candidates, options)
-    alive = np.ones(len(candidates), dtype=bool)
-    for k in range(len(candidates)):
+    return candidates.at(_standing(_replaced_by(candidates, options))[: options.most_kept])
+
+
+def apart(boxes: Floats, overlap: float) -> NDArray[np.int64]:
+    """Rows of boxes (N, 4), the surest first, that share no more than `overlap` with a surer one that stays."""
+    return _standing(_overlaps(boxes, boxes) > overlap)
+
+
+def _standing(replaced: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Rows that stay, when each that stays takes away those later ones (N, N) that it replaces."""
+    alive = np.ones(len(replaced), dtype=bool)
+    for k in range(len(replaced)):
         if alive[k]:
             alive[k + 1 :] &= ~replaced[k, k + 1 :]
-    return candidates.at(np.flatnonzero(alive)[: options.most_kept])
+    return np.flatnonzero(alive)
 
 
 def _replaced_by(candidates: Candidates, options: SuppressionOptions) -> NDArray[np.bool_]:

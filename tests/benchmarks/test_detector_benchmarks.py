@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from skills.detect.detector_file import THREADS
+from skills.detect.network_file import THREADS
 from skills.detect.onnx_detector import load_detector
 
 PICTURES_PER_SECOND = 60

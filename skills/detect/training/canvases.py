@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +24,6 @@ __all__ = ["Canvas", "CanvasMaker", "CanvasOptions"]
 
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
-_HALF_BELOW: Final = 0.7
 _FITS: Final = 0.9
 _RIGHT_ANGLE: Final = np.pi / 2
 
@@ -150,10 +148,4 @@ def _warp(store: PictureStore, index: int, affine: Floats, canvas: Picture, cell
     """Draw a stored picture into a cell of the canvas under an affine map of pixel edges."""
     local = affine.astype(np.float64)
     local[:, 2] -= (cell.x0, cell.y0)
-    picture = store.full[index]
-    if np.sqrt(abs(np.linalg.det(local[:, :2]))) < _HALF_BELOW:
-        picture, local = store.half[index], local @ np.diag([2.0, 2.0, 1.0])
-    local[:, 2] += local[:, :2] @ (0.5, 0.5) - 0.5
-    canvas[cell.y0 : cell.y1, cell.x0 : cell.x1] = cv2.warpAffine(
-        picture, local, cell.size, flags=cv2.INTER_LINEAR, borderValue=(PADDING, PADDING, PADDING)
-    )
+    canvas[cell.y0 : cell.y1, cell.x0 : cell.x1] = store.scales(index).cut(local, cell.size)

@@ -8,18 +8,21 @@ import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import onnx
 import torch
 from torch import Tensor, nn
 
-from skills.detect.detector_file import FORMAT, sealed
+from skills.detect.detector_file import FORMAT
 from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX
-from skills.detect.training.network import DetectorNetwork
+from skills.detect.network_file import sealed
+from skills.detect.training.network import Backbone, DetectorNetwork
 
-__all__ = ["Exportable", "export", "fused"]
+__all__ = ["Exportable", "export", "fused", "take_bytes", "write_onnx"]
 
 _OPSET = 17
+Network = TypeVar("Network", bound=nn.Module)
 
 
 class Exportable(nn.Module):
@@ -30,9 +33,7 @@ class Exportable(nn.Module):
         self.network = fused(network)
         if score_offsets is not None:
             _shift(self.network, score_offsets)
-        first = next(module for module in self.network.modules() if isinstance(module, nn.Conv2d))
-        with torch.no_grad():
-            first.weight.mul_(1.0 / 255.0)
+        take_bytes(self.network.backbone)
 
     def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
         """Boxes and scores. The first convolution takes values from 0 to 255, its weights being so much smaller."""
@@ -41,14 +42,20 @@ class Exportable(nn.Module):
 
 
 @torch.no_grad()
+def take_bytes(backbone: Backbone) -> None:
+    """Let the first convolution take values from 0 to 255."""
+    backbone.stem[0][0].weight.mul_(1.0 / 255.0)
+
+
+@torch.no_grad()
 def _shift(network: DetectorNetwork, offsets: Sequence[float]) -> None:
     for head in network.heads:
         head.scores.bias.add_(torch.tensor(offsets))
 
 
-def fused(network: DetectorNetwork) -> DetectorNetwork:
+def fused(network: Network) -> Network:
     """A copy for use only, with every normalisation taken into the convolution before it."""
-    made: DetectorNetwork = copy.deepcopy(network).cpu().float().eval()
+    made: Network = copy.deepcopy(network).cpu().float().eval()
     for module in made.modules():
         if isinstance(module, nn.Sequential) and len(module) >= 2 and isinstance(module[1], nn.BatchNorm2d):
             convolution = module[0]
@@ -71,31 +78,35 @@ def export(
     `score_offsets` are added to the logits of each class.
     """
     model = Exportable(network, score_offsets).eval()
-    example = torch.zeros((1, HEIGHT_PX, WIDTH_PX, 3), dtype=torch.uint8)
+    example = {"images": torch.zeros((1, HEIGHT_PX, WIDTH_PX, 3), dtype=torch.uint8)}
+    write_onnx(model, example, file, {"format": FORMAT, "class_names": json.dumps(list(class_names)), **facts})
+
+
+def write_onnx(model: nn.Module, example: Mapping[str, Tensor], file: Path, facts: Mapping[str, str]) -> None:
+    """Write the ONNX file of a model that makes boxes and scores, each of N rows, of inputs by name of N rows."""
     with torch.no_grad():
-        shapes = [tuple(output.shape) for output in model(example)]
+        shapes = [tuple(output.shape) for output in model(*example.values())]
     with tempfile.TemporaryDirectory() as folder:
         raw = Path(folder) / "raw.onnx"
         _trace(model, example, raw)
-        told = {"format": FORMAT, "class_names": json.dumps(list(class_names)), **facts}
-        content = _described(onnx.load(raw), shapes, told)
+        content = _described(onnx.load(raw), shapes, facts)
     fresh = file.with_name(f".{file.name}.new")
     fresh.write_bytes(sealed(content))
     fresh.replace(file)
 
 
-def _trace(model: Exportable, example: Tensor, file: Path) -> None:
+def _trace(model: nn.Module, example: Mapping[str, Tensor], file: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         torch.onnx.export(
             model,
-            (example,),
+            tuple(example.values()),
             str(file),
             dynamo=False,
             opset_version=_OPSET,
-            input_names=["images"],
+            input_names=list(example),
             output_names=["boxes", "scores"],
-            dynamic_axes={name: {0: "N"} for name in ("images", "boxes", "scores")},
+            dynamic_axes={name: {0: "N"} for name in (*example, "boxes", "scores")},
         )
 
 

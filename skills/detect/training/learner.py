@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -14,18 +15,20 @@ from skills.detect.training.averaging import WeightAverage
 from skills.detect.training.batches import Batch
 from skills.detect.training.export import fused
 from skills.detect.training.labels import TrainingDataError
-from skills.detect.training.losses import LossOptions, TruthBatch, losses
+from skills.detect.training.losses import Losses, LossOptions, TruthBatch, losses
 from skills.detect.training.muon import Muon
 from skills.detect.training.network import Backbone, DetectorNetwork, cells
 from skills.detect.training.onnx_weights import take_over
 from skills.detect.training.peers import Peers
 from skills.detect.training.records import Course
 
-__all__ = ["Learner", "Progress", "read_checkpoint"]
+__all__ = ["Learner", "LearningState", "Progress", "optimisers_of", "read_checkpoint"]
 
 FORMAT = 1
 ONNX = ".onnx"
 _LONGEST_STEP = 10.0
+_WITHOUT = "begin anew without it"
+Network = TypeVar("Network", bound=nn.Module)
 
 
 @dataclass
@@ -38,38 +41,25 @@ class Progress:
 
 
 @dataclass
-class Learner:
-    """All that changes while learning.
+class LearningState(Generic[Network]):
+    """All that changes while learning, whatever the network."""
 
-    `early` is what makes the features at stride 8 when they are no longer learnt (`keep_early`).
-    """
-
-    network: DetectorNetwork
+    network: Network
     average: WeightAverage
     optimisers: tuple[torch.optim.Optimizer, ...]
     device: torch.device
-    loss: LossOptions = field(default_factory=LossOptions)
     progress: Progress = field(default_factory=Progress)
     course: Course = field(default_factory=Course)
-    early: Backbone | None = None
 
-    @staticmethod
-    def new(classes: int, seed: int, device: torch.device) -> Learner:
-        """A network that has learnt nothing yet."""
-        torch.manual_seed(seed)
-        network = DetectorNetwork(classes).to(device, memory_format=torch.channels_last)
-        return Learner(network, WeightAverage(network), optimisers_of(network), device)
-
-    def step(self, batch: Batch, rate: float, peers: Peers, clock: float) -> tuple[float, float, float]:
-        """Learn from one batch: score loss, box loss, and the first process's clock."""
+    def take_step(
+        self, losses_now: Callable[[], Losses], rate: float, peers: Peers, clock: float
+    ) -> tuple[float, float, float]:
+        """Learn from what `losses_now` says: score loss, box loss, and the first process's clock."""
         for optimiser in self.optimisers:
             for group in optimiser.param_groups:
                 group["lr"] = rate
         self.network.train()
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=quick_in_bfloat16(self.device)):
-            logits, boxes = self._answers(batch.pictures.to(self.device))
-        middles = cells(batch.pictures.shape[2], batch.pictures.shape[3])[0].to(self.device)
-        found = losses(logits, boxes, middles, _moved(batch.truth, self.device), self.loss)
+        found = losses_now()
         self.network.zero_grad(set_to_none=True)
         found.total.backward()
         clock = peers.mean_gradients(self.network, clock)
@@ -79,21 +69,9 @@ class Learner:
         self.average.follow(self.network)
         return float(found.scores.detach()), float(found.boxes.detach()), clock
 
-    def _answers(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        if self.early is None:
-            logits, boxes = self.network(pictures)
-            return logits, boxes
-        with torch.no_grad():
-            at8 = self.early.early(pictures)
-        return self.network.from_early(at8)
-
-    def keep_early(self) -> None:
-        """Learn no longer what makes the features at stride 8, and compute them without normalisation from now on."""
-        backbone = self.network.backbone
-        for part in (backbone.stem, backbone.stage8):
-            part.requires_grad_(False)
-        made = fused(self.average.network).backbone.requires_grad_(False)
-        self.early = made.to(self.device, memory_format=torch.channels_last)
+    def quick(self) -> torch.autocast:
+        """Within it the network reckons with 16 bits, where that saves time."""
+        return torch.autocast(self.device.type, torch.bfloat16, enabled=quick_in_bfloat16(self.device))
 
     def save(self, file: Path) -> None:
         """Write everything; whole or not at all."""
@@ -112,12 +90,60 @@ class Learner:
     def restore(self, file: Path) -> None:
         """Go on where a file left off. Raises TrainingDataError."""
         state = read_checkpoint(file)
-        self.network.load_state_dict(state["network"])
+        try:
+            self.network.load_state_dict(state["network"])
+        except RuntimeError as error:
+            raise TrainingDataError(f"{file}: is a checkpoint of another network", mend=_WITHOUT) from error
         self.average.restore(state["average"])
         for optimiser, kept in zip(self.optimisers, state["optimisers"], strict=True):
             optimiser.load_state_dict(kept)
         self.progress = Progress(**state["progress"])
         self.course = Course.of(state["course"])
+
+
+@dataclass
+class Learner(LearningState[DetectorNetwork]):
+    """All that changes while the detector's first network learns.
+
+    `early` is what makes the features at stride 8 when they are no longer learnt (`keep_early`).
+    """
+
+    loss: LossOptions = field(default_factory=LossOptions)
+    early: Backbone | None = None
+
+    @staticmethod
+    def new(classes: int, seed: int, device: torch.device) -> Learner:
+        """A network that has learnt nothing yet."""
+        torch.manual_seed(seed)
+        network = DetectorNetwork(classes).to(device, memory_format=torch.channels_last)
+        last = [layer for head in network.heads for layer in (head.scores, head.sides)]
+        return Learner(network, WeightAverage(network), optimisers_of(network, last), device)
+
+    def step(self, batch: Batch, rate: float, peers: Peers, clock: float) -> tuple[float, float, float]:
+        """Learn from one batch: score loss, box loss, and the first process's clock."""
+        return self.take_step(lambda: self._losses(batch), rate, peers, clock)
+
+    def _losses(self, batch: Batch) -> Losses:
+        with self.quick():
+            logits, boxes = self._answers(batch.pictures.to(self.device))
+        middles = cells(batch.pictures.shape[2], batch.pictures.shape[3])[0].to(self.device)
+        return losses(logits, boxes, middles, _moved(batch.truth, self.device), self.loss)
+
+    def _answers(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        if self.early is None:
+            logits, boxes = self.network(pictures)
+            return logits, boxes
+        with torch.no_grad():
+            at8 = self.early.early(pictures)
+        return self.network.from_early(at8)
+
+    def keep_early(self) -> None:
+        """Learn no longer what makes the features at stride 8, and compute them without normalisation from now on."""
+        backbone = self.network.backbone
+        for part in (backbone.stem, backbone.stage8):
+            part.requires_grad_(False)
+        made = fused(self.average.network).backbone.requires_grad_(False)
+        self.early = made.to(self.device, memory_format=torch.channels_last)
 
     def start_from(self, file: Path) -> None:
         """Take over the weights of an ONNX file, or a checkpoint's averaged ones; all else begins anew.
@@ -131,10 +157,10 @@ class Learner:
         self.average.network.load_state_dict(self.network.state_dict())
 
 
-def optimisers_of(network: DetectorNetwork) -> tuple[torch.optim.Optimizer, ...]:
-    """Muon for the weights of convolutions, AdamW (Loshchilov and Hutter, 2019) for the rest and the last layers."""
-    last = {id(weight) for head in network.heads for layer in (head.scores, head.sides) for weight in [layer.weight]}
-    weights = [weight for weight in network.parameters() if weight.ndim == 4 and id(weight) not in last]
+def optimisers_of(network: nn.Module, last: Iterable[nn.Module]) -> tuple[torch.optim.Optimizer, ...]:
+    """Muon for the weights of convolutions, AdamW (Loshchilov and Hutter, 2019) for the rest and the `last` layers."""
+    left_out = {id(weight) for layer in last for weight in layer.parameters()}
+    weights = [weight for weight in network.parameters() if weight.ndim == 4 and id(weight) not in left_out]
     chosen = {id(weight) for weight in weights}
     others = [weight for weight in network.parameters() if id(weight) not in chosen]
     return Muon(weights, lr=1e-3), torch.optim.AdamW(others, lr=1e-3, betas=(0.9, 0.99), weight_decay=0.0)
@@ -152,7 +178,7 @@ def _moved(truth: TruthBatch, device: torch.device) -> TruthBatch:
 
 def read_checkpoint(file: Path) -> dict[str, Any]:
     """The state in a file. Raises TrainingDataError."""
-    mend = "begin anew without it"
+    mend = _WITHOUT
     try:
         state = torch.load(file, map_location="cpu", weights_only=True)
     except (OSError, RuntimeError, ValueError, EOFError, pickle.UnpicklingError) as error:

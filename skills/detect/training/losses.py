@@ -10,7 +10,7 @@ from torch import Tensor
 
 from skills.detect.training.assign import Assigned, AssignOptions, assign
 
-__all__ = ["LossOptions", "Losses", "TruthBatch", "complete_overlap", "losses"]
+__all__ = ["LossOptions", "Losses", "TruthBatch", "complete_overlap", "losses", "overlap"]
 
 _TINY = 1e-7
 
@@ -80,15 +80,23 @@ def complete_overlap(first: Tensor, second: Tensor) -> Tensor:
 
     After Zheng et al., "Distance-IoU Loss" (2020).
     """
-    low, high = torch.maximum(first[:, :2], second[:, :2]), torch.minimum(first[:, 2:], second[:, 2:])
-    shared = (high - low).clamp(min=0).prod(dim=1)
-    size1, size2 = (first[:, 2:] - first[:, :2]).clamp(min=_TINY), (second[:, 2:] - second[:, :2]).clamp(min=_TINY)
-    overlap = shared / (size1.prod(dim=1) + size2.prod(dim=1) - shared + _TINY)
+    shared, size1, size2 = overlap(first, second), _sizes(first), _sizes(second)
     around = torch.maximum(first[:, 2:], second[:, 2:]) - torch.minimum(first[:, :2], second[:, :2])
     apart = (first[:, :2] + first[:, 2:] - second[:, :2] - second[:, 2:]).square().sum(dim=1) / 4
     away = apart / (around.square().sum(dim=1) + _TINY)
     angles = torch.atan(size2[:, 0] / size2[:, 1]) - torch.atan(size1[:, 0] / size1[:, 1])
     shape = 4 / math.pi**2 * angles.square()
     with torch.no_grad():
-        weight = shape / (1.0 - overlap + shape + _TINY)
-    return overlap - away - weight * shape
+        weight = shape / (1.0 - shared + shape + _TINY)
+    return shared - away - weight * shape
+
+
+def overlap(first: Tensor, second: Tensor) -> Tensor:
+    """Shared area over the area of both together (M,), of boxes (M, 4)."""
+    low, high = torch.maximum(first[:, :2], second[:, :2]), torch.minimum(first[:, 2:], second[:, 2:])
+    shared = (high - low).clamp(min=0).prod(dim=1)
+    return shared / (_sizes(first).prod(dim=1) + _sizes(second).prod(dim=1) - shared + _TINY)
+
+
+def _sizes(boxes: Tensor) -> Tensor:
+    return (boxes[:, 2:] - boxes[:, :2]).clamp(min=_TINY)

@@ -12,7 +12,8 @@ import onnx
 import torch
 from torch import Tensor, nn
 
-from skills.detect.detector_file import ModelFileError, load_model
+from skills.detect.detector_file import load_model
+from skills.detect.network_file import ModelFileError
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.network import DetectorNetwork
 
@@ -47,7 +48,7 @@ def take_over(network: DetectorNetwork, file: Path) -> None:
 def _content(file: Path) -> tuple[dict[str, Any], list[float]]:
     """Arrays by the names that they have in the network, and by how much each class's score was shifted."""
     try:
-        classes = len(load_model(file).class_names)
+        classes = len(load_model(file, second=False).class_names)
     except ModelFileError as error:
         raise TrainingDataError(f"{file}: {error.message}", mend="begin anew without it") from error
     model = onnx.load(file)

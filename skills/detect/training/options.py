@@ -7,7 +7,7 @@ from pathlib import Path
 
 from skills.detect.training.schedule import Budget, Schedule
 
-__all__ = ["TrainOptions"]
+__all__ = ["RefineOptions", "TrainOptions"]
 
 
 @dataclass(frozen=True)
@@ -27,4 +27,20 @@ class TrainOptions:
     start: Path | None = None
     keep_early: bool = False
     examined: int = 320
+    schedule: Schedule = field(default_factory=Schedule)
+
+
+@dataclass(frozen=True)
+class RefineOptions:
+    """The same for the second network, which belongs to the first one's file `model`."""
+
+    data: Path
+    model: Path
+    out: Path
+    budget: Budget
+    seed: int = 1
+    processes: int = 1
+    resume: bool = False
+    examined: int = 320
+    batch: int = 64
     schedule: Schedule = field(default_factory=Schedule)

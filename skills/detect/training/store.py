@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX, fill_letterbox
+from skills.detect.scales import Scales, halved
 from skills.detect.training.labels import LearningPicture, TrainingDataError
 
 __all__ = ["PictureStore", "open_store", "read_picture"]
@@ -29,6 +30,10 @@ class PictureStore:
 
     full: Picture
     half: Picture
+
+    def scales(self, index: int) -> Scales:
+        """The picture of a number."""
+        return Scales(self.full[index], self.half[index])
 
 
 def read_picture(file: Path) -> Picture:
@@ -64,4 +69,4 @@ def _mapped(folder: Path, count: int, mode: str) -> PictureStore:
 def _fill(store: PictureStore, pictures: Sequence[LearningPicture]) -> None:
     for k, picture in enumerate(pictures):
         store.full[k] = read_picture(picture.file)
-        store.half[k] = cv2.resize(store.full[k], (WIDTH_PX // 2, HEIGHT_PX // 2), interpolation=cv2.INTER_AREA)
+        store.half[k] = halved(store.full[k])

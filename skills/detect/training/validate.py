@@ -11,7 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.detect.onnx_detector import DetectorOptions, load_detector
+from skills.detect.detector_file import load_model
+from skills.detect.onnx_detector import DetectorOptions, OnnxDetector
 from skills.detect.scoring import Score, score
 from skills.detect.scoring_labels import LabelledPicture, pictures_of_coco
 from skills.detect.training.calibrate import score_offsets
@@ -48,18 +49,18 @@ def examination(folder: Path, split: str, class_names: Sequence[str], most: int 
     return Examination(folder, pictures[::step], class_names)
 
 
-def examine(model: Path, exam: Examination) -> Score:
-    """The figures of an ONNX file."""
-    return score(exam.pictures, _found(model, exam), exam.class_names)
+def examine(model: Path, exam: Examination, *, second: bool) -> Score:
+    """The figures of an ONNX file, with the second network beside it or without."""
+    return score(exam.pictures, _found(model, exam, second), exam.class_names)
 
 
-def offsets_by(model: Path, exam: Examination) -> tuple[float, ...]:
+def offsets_by(model: Path, exam: Examination, *, second: bool) -> tuple[float, ...]:
     """What to add to the logits of each class, by the pictures of an examination."""
-    return score_offsets(exam.pictures, _found(model, exam), exam.class_names)
+    return score_offsets(exam.pictures, _found(model, exam, second), exam.class_names)
 
 
-def _found(model: Path, exam: Examination) -> list[tuple[Detection, ...]]:
-    detector = load_detector(model, DetectorOptions(threshold=LEAST_SCORE))
+def _found(model: Path, exam: Examination, second: bool) -> list[tuple[Detection, ...]]:
+    detector = OnnxDetector(load_model(model, second=second), DetectorOptions(threshold=LEAST_SCORE))
     return [detector.detect([_read(exam.folder / picture.file)])[0] for picture in exam.pictures]
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from executive.cli import train_command
+from executive.cli import learning
 from executive.cli.entry import light_app
 
 
@@ -22,7 +22,7 @@ def data(tmp_path: Path) -> Path:
 
 
 def test_without_torch_the_extra_is_named(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(train_command.importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setattr(learning.importlib.util, "find_spec", lambda _name: None)
     result = run("--data", str(data), "--out", str(tmp_path / "out"))
     assert result.exit_code == 2
     assert "torch and onnx" in result.stderr

@@ -1,9 +1,10 @@
 """The network's file: what is refused, and how it is told."""
 
 import pytest
-from tiny_detector import CLASSES, model_bytes, write_model
+from tiny_detector import CLASSES, model_bytes, second_bytes, write_model, write_pair
 
-from skills.detect.detector_file import ModelFileError, load_model, sealed
+from skills.detect.detector_file import load_model
+from skills.detect.network_file import ModelFileError, sealed
 
 
 def refused(file):
@@ -23,7 +24,7 @@ def test_a_sealed_file_is_loaded(tmp_path):
     file.write_bytes(sealed(model_bytes()))
     model = load_model(file)
     assert model.class_names == CLASSES
-    assert len(model.session.get_modelmeta().custom_metadata_map["sha256"]) == 64
+    assert len(model.first.session.get_modelmeta().custom_metadata_map["sha256"]) == 64
 
 
 def test_a_sealed_file_with_one_other_byte_is_damaged(tmp_path):
@@ -65,3 +66,41 @@ def test_class_names_must_be_told(tmp_path, names):
 @pytest.mark.parametrize("changes", [{"output": "logits"}, {"size": (640, 640)}, {"names": '["beer"]'}])
 def test_other_inputs_or_outputs_are_refused(tmp_path, changes):
     assert "other inputs or outputs" in refused(write_model(tmp_path / "model.onnx", **changes))
+
+
+def second_refused(file):
+    with pytest.raises(ModelFileError) as error:
+        load_model(file)
+    assert str(error.value).startswith(f"{file.with_name('model_regions.onnx')}: ")
+    assert "errand dataset refine --data DIR --out DIR" in str(error.value)
+    return error.value.message
+
+
+def test_a_second_network_beside_the_first_is_loaded_unless_it_is_unwanted(tmp_path):
+    file = write_pair(tmp_path / "model.onnx")
+    assert load_model(file).second is not None
+    assert load_model(file, second=False).second is None
+    assert load_model(write_model(tmp_path / "alone.onnx")).second is None
+
+
+def test_a_second_network_of_another_first_one_is_refused(tmp_path):
+    assert "belongs to another network than model.onnx" in second_refused(
+        write_pair(tmp_path / "model.onnx", told="0" * 64)
+    )
+
+
+def test_a_second_network_of_other_classes_is_refused(tmp_path):
+    assert "belongs to another" in second_refused(write_pair(tmp_path / "model.onnx", classes=("beer", "coke", "cube")))
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"), [({"form": "errand-regions-9"}, "errand-regions-9"), ({"size": 64}, "other inputs or outputs")]
+)
+def test_a_second_network_of_another_form_is_refused(tmp_path, changes, told):
+    assert told in second_refused(write_pair(tmp_path / "model.onnx", **changes))
+
+
+def test_a_damaged_second_network_is_named(tmp_path):
+    file = write_model(tmp_path / "model.onnx")
+    (tmp_path / "model_regions.onnx").write_bytes(second_bytes(file.read_bytes())[:-100])
+    assert "damaged" in second_refused(file)

@@ -4,9 +4,9 @@ import threading
 
 import numpy as np
 import pytest
-from tiny_detector import CLASSES, picture_of, write_model
+from tiny_detector import CLASSES, picture_of, write_model, write_pair
 
-from skills.detect.detector_file import ModelFileError
+from skills.detect.network_file import ModelFileError
 from skills.detect.onnx_detector import DetectorOptions, load_detector
 from skills.detection import Detection
 
@@ -113,3 +113,43 @@ def test_threads_that_share_it_find_the_same(detector):
 def test_the_detector_of_a_missing_file_says_so(tmp_path):
     with pytest.raises(ModelFileError, match=r"missing\.onnx: there is no such model"):
         load_detector(tmp_path / "missing.onnx")
+
+
+@pytest.fixture(scope="module")
+def looks_again(tmp_path_factory):
+    """Its second network tells by the share of red in what it is shown how surely that is a beer."""
+    return load_detector(write_pair(tmp_path_factory.mktemp("pair") / "tiny.onnx"))
+
+
+def reddened(picture, box):
+    u0, v0, u1, v1 = box
+    picture[v0:v1, u0:u1, 0] = 255
+    return picture
+
+
+def test_a_second_network_judges_what_the_first_one_is_not_sure_of(looks_again):
+    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 200))), (50, 50, 250, 250))
+    (found,) = looks_again.detect([picture])
+    assert [(one.class_name, round(one.score, 2)) for one in found] == [("beer", 1.0)]
+
+
+def test_a_second_network_tells_where_it_is_exactly(looks_again):
+    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 150))), (0, 2, 300, 300))
+    (found,) = looks_again.detect([picture])
+    assert found[0].box == pytest.approx((105.0, 102.5, 195.0, 147.5), abs=0.01)
+
+
+def test_a_second_network_takes_back_what_the_first_one_is_sure_of(looks_again):
+    assert looks_again.detect([picture_of(HAMMER)]) == [()]
+
+
+def test_where_the_first_network_sees_nothing_the_second_one_is_not_asked(looks_again):
+    assert looks_again.detect([reddened(picture_of(), (50, 50, 250, 250))]) == [()]
+
+
+def test_with_a_second_network_one_picture_gives_the_same_as_several(looks_again):
+    pictures = [
+        reddened(picture_of(("hammer", 0.2, (100, 100, 200, 200))), (50, 50, 250, 250)),
+        reddened(picture_of(("coke", 0.3, (300, 200, 400, 400))), (250, 150, 450, 450)),
+    ]
+    assert looks_again.detect(pictures) == [looks_again.detect([one])[0] for one in pictures]

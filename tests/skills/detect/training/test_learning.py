@@ -165,7 +165,7 @@ def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
     model = load_model(file)
     assert model.class_names == NAMES
     images = np.random.default_rng(0).integers(0, 256, (2, 480, 640, 3), dtype=np.uint8)
-    boxes, scores = model.session.run(["boxes", "scores"], {"images": images})
+    boxes, scores = model.first.session.run(["boxes", "scores"], {"images": images})
     with torch.no_grad():
         logits, expected = network(torch.from_numpy(images).permute(0, 3, 1, 2).float() / 255)
     assert np.abs(boxes - expected.numpy()).max() < 0.01

@@ -1,0 +1,75 @@
+"""`errand dataset refine`: a second network learns to judge what the detector's first one finds."""
+
+from __future__ import annotations
+
+import os
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+from rich.console import Console
+
+from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, learnt, tell_learnt
+from executive.cli.output import console_for, refusals
+from executive.errors import InputError
+from skills.detect.detector_file import MODEL_FILE
+from skills.detect.training.options import RefineOptions
+from skills.detect.training.schedule import REGIONS_RATE, Schedule
+
+__all__ = ["refine_command"]
+
+UNLESS_SAID_MINUTES: Final = 90.0
+
+
+def refine_command(
+    data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
+    out: Annotated[Path, typer.Option(help="Folder for checkpoints, curves and both ONNX files.")],
+    model: Annotated[
+        Path | None, typer.Option(help="The first network's file; else the one of Errand.", show_default=False)
+    ] = None,
+    minutes: Annotated[
+        float | None,
+        typer.Option(min=0.01, help="How long to learn; an hour and a half unless said.", show_default=False),
+    ] = None,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how many chips for each picture.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all that is drawn by chance.")] = 1,
+    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = REGIONS_RATE,
+    jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
+) -> None:
+    """Train the second network, which looks again at each place that the first one finds, and export it."""
+    console = console_for(as_json)
+    with refusals():
+        check_folders(data, out, resume)
+        check_time(minutes, epochs)
+        check_libraries()
+        first = _first(model)
+        options = RefineOptions(
+            data,
+            first,
+            out,
+            budget_of(data, minutes, epochs, unless_said_minutes=UNLESS_SAID_MINUTES),
+            seed=seed,
+            processes=jobs or os.cpu_count() or 1,
+            resume=resume,
+            schedule=Schedule(rate),
+        )
+        file, figures = _refined(options, console)
+    tell_learnt(console, file, figures, as_json=as_json)
+
+
+def _first(model: Path | None) -> Path:
+    """Raises InputError."""
+    file = model or MODEL_FILE
+    if not file.is_file():
+        raise InputError("there is no such file", mend="name a detector's ONNX file with --model", file=file)
+    return file
+
+
+def _refined(options: RefineOptions, console: Console) -> tuple[Path, dict[str, float]]:
+    """The ONNX file and its figures. Raises InputError."""
+    from skills.detect.training.refine import refine
+
+    return learnt(partial(refine, options), options.out, console)

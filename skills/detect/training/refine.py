@@ -1,0 +1,145 @@
+"""The second network learns to judge the places that the first one finds, from a data set's folder to the ONNX file."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import torch
+
+from skills.detect.detector_file import load_model, regions_file
+from skills.detect.network_file import ModelFileError
+from skills.detect.training.labels import LearningPicture, TrainingDataError, category_names, digest_of, read_split
+from skills.detect.training.loop import Loop, Stepped, figures_of
+from skills.detect.training.options import RefineOptions
+from skills.detect.training.peers import Peers
+from skills.detect.training.records import draw_curves
+from skills.detect.training.region_chips import RegionFeed
+from skills.detect.training.region_export import export_regions
+from skills.detect.training.region_learner import RegionLearner
+from skills.detect.training.region_table import RegionTable, table_of
+from skills.detect.training.store import PictureStore, open_store
+from skills.detect.training.together import Told, learn_together
+from skills.detect.training.train import CHECKPOINT, CURVES, MODEL, PICTURES
+from skills.detect.training.validate import Examination, examination, examine, offsets_by
+
+__all__ = ["refine"]
+
+TABLE: Final = "regions.npz"
+_CALIBRATED_BY: Final = 900
+_SETTLED_BY: Final = 24
+
+
+def refine(options: RefineOptions, told: Told) -> Path:
+    """Learn, and give the second network's ONNX file, beside a copy of the first one's. Raises TrainingDataError."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    pictures = read_split(options.data, "train")
+    names = category_names(options.data)
+    examination(options.data, "val", names)
+    first = _first_beside(options)
+    store = open_store(options.out / PICTURES, pictures)
+    if not options.resume or not (options.out / TABLE).is_file():
+        _look_at_all(options, names, pictures, store)
+    learn_together(partial(_learn, options), options.processes, options.out, told)
+    return regions_file(first)
+
+
+def _first_beside(options: RefineOptions) -> Path:
+    """The first network's file in the folder that is written to."""
+    file = options.out / MODEL
+    try:
+        if not file.is_file() or not options.model.samefile(file):
+            shutil.copyfile(options.model, file)
+    except OSError as error:
+        raise TrainingDataError(
+            f"{options.model}: cannot be copied ({error.strerror})", mend="name a detector's ONNX file with --model"
+        ) from error
+    return file
+
+
+def _look_at_all(
+    options: RefineOptions, names: tuple[str, ...], pictures: tuple[LearningPicture, ...], store: PictureStore
+) -> None:
+    """Write down what the first network finds. Raises TrainingDataError."""
+    try:
+        model = load_model(options.out / MODEL, second=False)
+    except ModelFileError as error:
+        raise TrainingDataError(f"{options.model}: {error.message}", mend=error.mend) from error
+    if model.class_names != names:
+        raise TrainingDataError(
+            f"{options.model}: knows other classes than {options.data}", mend="render the data anew"
+        )
+    table = table_of(model, pictures, store)
+    if not (table.classes >= 0).any() or not (table.classes < 0).any():
+        raise TrainingDataError(
+            f"{options.model}: finds nothing to tell apart in {options.data}", mend="train it for longer first"
+        )
+    table.save(options.out / TABLE)
+
+
+def _learn(options: RefineOptions, peers: Peers, device: torch.device, told: Told) -> None:
+    """One process's part in learning."""
+    names = category_names(options.data)
+    learner = RegionLearner.new(len(names), options.seed, device)
+    store = open_store(options.out / PICTURES, read_split(options.data, "train"))
+    table = RegionTable.read(options.out / TABLE)
+    checkpoint = options.out / CHECKPOINT
+    if options.resume and checkpoint.is_file():
+        learner.restore(checkpoint)
+    else:
+        feed = RegionFeed(table, store, options.seed, 0, 1)
+        size = options.batch
+        learner.start_from(options.out / MODEL, (feed.batch(k * size, size).chips for k in range(_SETTLED_BY)))
+    feed = RegionFeed(table, store, options.seed, peers.rank, peers.count)
+    exam = examination(options.data, "val", names, options.examined)
+    Loop(_Regions(options, learner, peers, feed, exam), options.budget, peers, told).run()
+
+
+@dataclass(frozen=True)
+class _Regions:
+    """Learning from chips about regions."""
+
+    options: RefineOptions
+    state: RegionLearner
+    peers: Peers
+    feed: RegionFeed
+    exam: Examination
+
+    def step(self, done: float, clock: float) -> Stepped:
+        """Learn from one batch."""
+        progress, options = self.state.progress, self.options
+        batch = self.feed.batch(progress.taken, options.batch)
+        rate = options.schedule.rate(progress.steps, done)
+        scores, boxes, clock = self.state.step(batch, rate, self.peers, clock)
+        return Stepped(options.batch * self.peers.count, scores, boxes, rate, clock)
+
+    def written(self, *, last: bool) -> dict[str, float]:
+        """Write checkpoint, ONNX file and curves, and give the figures of some held-out pictures."""
+        out, learner, progress = self.options.out, self.state, self.state.progress
+        export_refined(learner, self.options, calibrated=last)
+        figures = figures_of(examine(out / MODEL, self.exam, second=True))
+        done = self.options.budget.progress(progress.taken, progress.seconds)
+        learner.course.exams.append({"progress": done, **figures})
+        draw_curves(learner.course, out / CURVES)
+        learner.save(out / CHECKPOINT)
+        return figures
+
+
+def export_refined(learner: RegionLearner, options: RefineOptions, *, calibrated: bool) -> None:
+    """Write the averaged network's ONNX file; calibrated by pictures that were learnt from."""
+    first, names = options.out / MODEL, category_names(options.data)
+    file, network = regions_file(first), learner.average.network
+    facts = {
+        "seed": str(options.seed),
+        "data": digest_of(options.data),
+        "first": load_model(first, second=False).first.digest,
+    }
+    export_regions(network, file, class_names=names, facts=facts)
+    if calibrated:
+        offsets = offsets_by(first, examination(options.data, "train", names, _CALIBRATED_BY), second=True)
+        told = {**facts, "score_offsets": json.dumps([round(value, 4) for value in offsets])}
+        export_regions(network, file, class_names=names, facts=told, score_offsets=offsets)

@@ -1,0 +1,97 @@
+"""What the first network takes for things in the pictures that are learnt from, and what is really there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.detect.detector_file import DetectorModel
+from skills.detect.regions import RegionOptions, regions_of
+from skills.detect.training.labels import Labels, LearningPicture
+from skills.detect.training.store import PictureStore
+
+__all__ = ["NEAR", "RegionTable", "table_of"]
+
+NEAR: Final = 0.3
+_WITHIN_IGNORED: Final = 0.6
+_LOOKED_AT: Final = RegionOptions(most=20)
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class RegionTable:
+    """R regions: picture's number (R,), box (R, 4) in the letterbox, first logits (R, K), and the thing there.
+
+    `classes` (R,) are those of the things with which regions share NEAR or more, or -1; `wanted` (R, 4) are the things'
+    boxes, and the region's own where there is no thing.
+    """
+
+    pictures: NDArray[np.int64]
+    boxes: Floats
+    logits: Floats
+    wanted: Floats
+    classes: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.pictures)
+
+    def save(self, file: Path) -> None:
+        """Write it; whole or not at all."""
+        fresh = file.with_name(f".{file.name}.new.npz")
+        np.savez(fresh, **vars(self))
+        fresh.replace(file)
+
+    @staticmethod
+    def read(file: Path) -> RegionTable:
+        """Read what was written."""
+        with np.load(file) as kept:
+            return RegionTable(**{name: kept[name] for name in RegionTable.__dataclass_fields__})
+
+
+def table_of(model: DetectorModel, pictures: Sequence[LearningPicture], store: PictureStore) -> RegionTable:
+    """The regions of all pictures. Those on what is to be ignored are left out."""
+    rows = [_rows(model, store, number, picture.labels) for number, picture in enumerate(pictures)]
+    names = RegionTable.__dataclass_fields__
+    return RegionTable(**{name: np.concatenate([vars(row)[name] for row in rows]) for name in names})
+
+
+def _rows(model: DetectorModel, store: PictureStore, number: int, labels: Labels) -> RegionTable:
+    """The regions of one picture."""
+    boxes, scores = model.first.single.run(["boxes", "scores"], {"images": store.full[number][None]})
+    regions = regions_of(boxes[0], scores[0], _LOOKED_AT)
+    things = label_boxes(labels)
+    shared, inside = shares(regions.boxes, things)
+    left_out = ((shared >= NEAR) | (inside >= _WITHIN_IGNORED)) & labels.ignored[None, :]
+    counting = np.where(labels.ignored[None, :], 0.0, shared)
+    best = counting.max(axis=1, initial=0.0)
+    near = best >= NEAR
+    kept = near | ~left_out.any(axis=1)
+    wanted, classes = regions.boxes.copy(), np.full(len(regions), -1)
+    if near.any():
+        chosen = counting.argmax(axis=1)[near]
+        wanted[near], classes[near] = things[chosen], labels.classes[chosen]
+    return RegionTable(
+        np.full(int(kept.sum()), number), regions.boxes[kept], regions.logits[kept], wanted[kept], classes[kept]
+    )
+
+
+def label_boxes(labels: Labels) -> Floats:
+    """The boxes (N, 4) of labels' outlines."""
+    boxes = [np.concatenate([outline.min(axis=0), outline.max(axis=0)]) for outline in labels.outlines]
+    return np.array(boxes, dtype=np.float32).reshape(-1, 4)
+
+
+def shares(boxes: Floats, things: Floats) -> tuple[Floats, Floats]:
+    """Shared area over the area of both, and over that of the box, (R, G)."""
+    low = np.maximum(boxes[:, None, :2], things[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], things[None, :, 2:])
+    shared = np.clip(high - low, 0.0, None).prod(axis=2)
+    areas, others = ((ones[:, 2:] - ones[:, :2]).prod(axis=1) for ones in (boxes, things))
+    both = np.maximum(areas[:, None] + others[None, :] - shared, 1e-6)
+    return shared / both, shared / np.maximum(areas[:, None], 1e-6)

@@ -1,0 +1,207 @@
+"""The parts of the second network's training; skipped without torch."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_detector import CLASSES, picture_of, write_model
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("onnx")
+
+from skills.detect.detector_file import load_model, regions_file  # noqa: E402
+from skills.detect.regions import CHIP_PX  # noqa: E402
+from skills.detect.scales import halved  # noqa: E402
+from skills.detect.training.export import export  # noqa: E402
+from skills.detect.training.labels import Labels, LearningPicture, TrainingDataError  # noqa: E402
+from skills.detect.training.network import DetectorNetwork  # noqa: E402
+from skills.detect.training.peers import Peers  # noqa: E402
+from skills.detect.training.region_chips import RegionFeed  # noqa: E402
+from skills.detect.training.region_export import export_regions  # noqa: E402
+from skills.detect.training.region_learner import RegionLearner  # noqa: E402
+from skills.detect.training.region_losses import region_losses  # noqa: E402
+from skills.detect.training.region_network import RegionNetwork, covered, moved  # noqa: E402
+from skills.detect.training.region_table import RegionTable, table_of  # noqa: E402
+from skills.detect.training.store import PictureStore  # noqa: E402
+
+ALONE = Peers(0, 1)
+CPU = torch.device("cpu")
+THING, FAR = (100, 100, 200, 200), (300, 300, 400, 400)
+
+
+def store_of(*pictures: np.ndarray) -> PictureStore:
+    return PictureStore(np.stack(pictures), np.stack([halved(picture) for picture in pictures]))
+
+
+def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> LearningPicture:
+    corners = [np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)], np.float32) for u0, v0, u1, v1 in boxes]
+    count = len(corners)
+    labels = Labels(tuple(corners), np.arange(count), np.ones(count, np.float32), np.full(count, ignored))
+    return LearningPicture(Path("none"), labels)
+
+
+def table(file: Path, picture: LearningPicture, *things: tuple[str, float, tuple[float, ...]]) -> RegionTable:
+    return table_of(load_model(write_model(file)), [picture], store_of(picture_of(*things)))
+
+
+def test_a_place_on_a_thing_wants_its_class_and_box_and_another_nothing(tmp_path: Path) -> None:
+    found = table(tmp_path / "m.onnx", labelled(THING), ("coke", 0.6, (110, 100, 200, 200)), ("coke", 0.5, FAR))
+    assert found.classes.tolist() == [0, -1]
+    assert found.wanted.tolist() == [list(THING), list(FAR)]
+    assert found.boxes.tolist() == [[110, 100, 200, 200], list(FAR)]
+    assert found.pictures.tolist() == [0, 0]
+
+
+# share of the thing's box that the place takes   0.36 of 100 x 100 -> near, 0.25 -> not near
+@pytest.mark.parametrize(("side", "near"), [(60, True), (50, False)])
+def test_a_place_is_on_a_thing_from_three_tenths_of_it_on(tmp_path: Path, side: int, near: bool) -> None:
+    found = table(tmp_path / "m.onnx", labelled(THING), ("beer", 0.6, (100, 100, 100 + side, 100 + side)))
+    assert (found.classes.tolist() == [0]) is near
+
+
+def test_what_is_to_be_ignored_teaches_nothing(tmp_path: Path) -> None:
+    part = ("beer", 0.5, (120, 120, 150, 150))
+    found = table(tmp_path / "m.onnx", labelled(THING, ignored=True), ("beer", 0.6, THING), part, ("coke", 0.4, FAR))
+    assert found.boxes.tolist() == [list(FAR)]
+
+
+def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
+    found = table(tmp_path / "m.onnx", labelled(THING), ("coke", 0.6, THING))
+    found.save(tmp_path / "table.npz")
+    again = RegionTable.read(tmp_path / "table.npz")
+    assert all(np.array_equal(getattr(found, name), getattr(again, name)) for name in vars(found))
+
+
+@pytest.fixture
+def feed() -> RegionFeed:
+    """A bright thing in one of two dark pictures, and as many places on it as elsewhere."""
+    dark = np.full((480, 640, 3), 40, np.uint8)
+    bright = dark.copy()
+    bright[100:200, 100:200] = 220
+    rows = 8
+    on = np.arange(rows) % 2 == 0
+    boxes = np.where(on[:, None], THING, FAR).astype(np.float32)
+    logits = np.zeros((rows, len(CLASSES)), np.float32)
+    classes = np.where(on, 1, -1)
+    return RegionFeed(RegionTable(np.where(on, 0, 1), boxes, logits, boxes, classes), store_of(bright, dark), 5, 0, 1)
+
+
+def test_half_of_a_batch_is_about_things(feed: RegionFeed) -> None:
+    batch = feed.batch(0, 8)
+    assert (batch.classes >= 0).sum() == 4
+    assert batch.chips.shape == (8, 3, CHIP_PX, CHIP_PX)
+
+
+def test_the_boxes_of_a_chip_are_where_the_thing_is_however_it_was_turned(feed: RegionFeed) -> None:
+    for start in range(0, 64, 8):
+        batch = feed.batch(start, 8)
+        for chip, box in zip(batch.chips[:4], batch.wanted[:4], strict=True):
+            inside = torch.zeros(CHIP_PX, CHIP_PX, dtype=torch.bool)
+            u0, v0, u1, v1 = (round(float(value)) for value in box)
+            inside[max(v0, 0) : v1, max(u0, 0) : u1] = True
+            assert chip.mean(0)[inside].mean() > chip.mean(0)[~inside].mean() + 0.1
+
+
+def test_the_same_seed_gives_the_same_chips_and_each_process_others(feed: RegionFeed) -> None:
+    again = RegionFeed(feed.table, feed.store, 5, 0, 1).batch(8, 8)
+    other = RegionFeed(feed.table, feed.store, 5, 1, 2).batch(0, 8)
+    assert torch.equal(feed.batch(8, 8).chips, again.chips)
+    assert torch.equal(again.chips, other.chips)
+    assert not torch.equal(feed.batch(0, 8).chips, again.chips)
+
+
+def test_a_fresh_network_says_what_the_first_one_said() -> None:
+    network = RegionNetwork(3).eval()
+    boxes, first = torch.tensor([[22.0, 40.0, 106.0, 88.0]]), torch.tensor([[1.0, -2.0, 0.5]])
+    with torch.no_grad():
+        logits, found = network(torch.rand(1, 3, CHIP_PX, CHIP_PX), boxes, first)
+    assert torch.allclose(logits, first)
+    assert torch.allclose(found, boxes)
+
+
+def test_cells_tell_the_share_that_a_box_covers() -> None:
+    share = covered(torch.tensor([[4.0, 8.0, 24.0, 20.0]]))[0, 0]
+    assert share[1, :4].tolist() == [0.5, 1.0, 1.0, 0.0]
+    assert share[2, 1] == 0.5
+    assert float(share.sum()) * 64 == pytest.approx(20 * 12)
+
+
+def test_sides_move_and_stretch_a_box() -> None:
+    half = float(np.log(0.5))
+    found = moved(torch.tensor([[10.0, 10.0, 30.0, 50.0]]), torch.tensor([[0.5, 0.0, half, 0.0]]))
+    assert found[0].tolist() == pytest.approx([25.0, 10.0, 35.0, 50.0])
+
+
+def test_scores_want_to_be_as_high_as_the_box_is_good() -> None:
+    wanted, classes = torch.tensor([[0.0, 0.0, 10.0, 10.0]]), torch.tensor([1])
+    half = torch.tensor([[0.0, 0.0, 10.0, 5.0]])
+    told = {score: region_losses(torch.tensor([[-9.0, score]]), half, wanted, classes) for score in (-2.0, 0.0, 2.0)}
+    assert told[0.0].scores < min(told[-2.0].scores, told[2.0].scores)
+    assert told[0.0].boxes > region_losses(torch.tensor([[-9.0, 0.0]]), wanted, wanted, classes).boxes
+
+
+def test_nothing_at_a_place_wants_low_scores_and_no_box() -> None:
+    box, none = torch.tensor([[0.0, 0.0, 10.0, 10.0]]), torch.tensor([-1])
+    low, high = (region_losses(torch.full((1, 2), score), box, box + 5, none) for score in (-5.0, 5.0))
+    assert low.scores < high.scores
+    assert low.boxes == high.boxes == 0.0
+
+
+def test_chips_are_learnt_by_heart(feed: RegionFeed) -> None:
+    learner = RegionLearner.new(len(CLASSES), 1, CPU)
+    batch = feed.batch(0, 8)
+    found = [learner.step(batch, 2e-3, ALONE, float(k))[0] for k in range(40)]
+    assert np.mean(found[-5:]) < 0.25 * np.mean(found[:5])
+
+
+def unsettled(classes: int) -> RegionNetwork:
+    torch.manual_seed(3)
+    network = RegionNetwork(classes)
+    for module in network.modules():
+        if isinstance(module, torch.nn.BatchNorm2d):
+            module.running_mean.normal_(0.0, 0.1)
+            module.running_var.uniform_(0.5, 2.0)
+        if isinstance(module, torch.nn.Linear):
+            torch.nn.init.normal_(module.weight, 0.0, 0.05)
+    return network.eval()
+
+
+def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
+    first = write_model(tmp_path / "m.onnx")
+    facts = {"first": load_model(first).first.digest}
+    network = unsettled(len(CLASSES))
+    export_regions(network, regions_file(first), class_names=CLASSES, facts=facts, score_offsets=(0.5, 0.0, -0.5))
+    random = np.random.default_rng(0)
+    chips = random.integers(0, 256, (3, CHIP_PX, CHIP_PX, 3), dtype=np.uint8)
+    boxes = np.array([[22, 40, 106, 88], [30, 22, 80, 106], [40, 40, 90, 90]], np.float32)
+    logits = random.normal(0, 2, (3, len(CLASSES))).astype(np.float32)
+    second = load_model(first).second
+    assert second is not None
+    given = {"chips": chips, "regions": boxes, "logits": logits}
+    found, scores = second.session.run(["boxes", "scores"], given)
+    with torch.no_grad():
+        expected, moved_to = network(
+            torch.from_numpy(chips).permute(0, 3, 1, 2).float() / 255, torch.from_numpy(boxes), torch.from_numpy(logits)
+        )
+    shifted = (expected + torch.tensor([0.5, 0.0, -0.5])).sigmoid()
+    assert np.abs(found - moved_to.numpy()).max() < 0.01
+    assert np.abs(scores - shifted.numpy()).max() < 1e-3
+
+
+def test_learning_begins_with_the_first_networks_backbone(tmp_path: Path) -> None:
+    torch.manual_seed(1)
+    first, file = DetectorNetwork(len(CLASSES)).eval(), tmp_path / "m.onnx"
+    export(first, file, class_names=CLASSES, facts={})
+    learner, chips = RegionLearner.new(len(CLASSES), 2, CPU), torch.rand(4, 3, CHIP_PX, CHIP_PX)
+    learner.start_from(file, [chips])
+    with torch.no_grad():
+        mine, theirs = learner.network.eval().backbone(chips), first.backbone(chips)
+    assert all(torch.allclose(one, other, atol=1e-3) for one, other in zip(mine, theirs, strict=True))
+
+
+def test_a_checkpoint_of_the_other_network_is_named(tmp_path: Path) -> None:
+    from skills.detect.training.learner import Learner
+
+    Learner.new(len(CLASSES), 1, CPU).save(tmp_path / "checkpoint.pt")
+    with pytest.raises(TrainingDataError, match="another network"):
+        RegionLearner.new(len(CLASSES), 1, CPU).restore(tmp_path / "checkpoint.pt")

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from random_networks import random_network
 from tiny_detector import CLASSES, picture_of, write_model
 
 torch = pytest.importorskip("torch")
@@ -14,7 +15,6 @@ from skills.detect.regions import CHIP_PX  # noqa: E402
 from skills.detect.scales import halved  # noqa: E402
 from skills.detect.training.export import export  # noqa: E402
 from skills.detect.training.labels import Labels, LearningPicture, TrainingDataError  # noqa: E402
-from skills.detect.training.network import DetectorNetwork  # noqa: E402
 from skills.detect.training.peers import Peers  # noqa: E402
 from skills.detect.training.region_chips import RegionFeed  # noqa: E402
 from skills.detect.training.region_export import export_regions  # noqa: E402
@@ -189,8 +189,7 @@ def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
 
 
 def test_learning_begins_with_the_first_networks_backbone(tmp_path: Path) -> None:
-    torch.manual_seed(1)
-    first, file = DetectorNetwork(len(CLASSES)).eval(), tmp_path / "m.onnx"
+    first, file = random_network(1, len(CLASSES)), tmp_path / "m.onnx"
     export(first, file, class_names=CLASSES, facts={})
     learner, chips = RegionLearner.new(len(CLASSES), 2, CPU), torch.rand(4, 3, CHIP_PX, CHIP_PX)
     learner.start_from(file, [chips])

@@ -115,6 +115,7 @@ def _described(model: onnx.ModelProto, shapes: Sequence[Sequence[int]], facts: M
     for port, sizes in zip(model.graph.output, shapes, strict=True):
         for axis, size in enumerate(sizes[1:], start=1):
             port.type.tensor_type.shape.dim[axis].dim_value = size
+    _shorten_names(model.graph)
     del model.metadata_props[:]
     for key, value in facts.items():
         model.metadata_props.add(key=key, value=value)
@@ -122,3 +123,16 @@ def _described(model: onnx.ModelProto, shapes: Sequence[Sequence[int]], facts: M
     onnx.checker.check_model(model)
     content: bytes = model.SerializeToString(deterministic=True)
     return content
+
+
+def _shorten_names(graph: onnx.GraphProto) -> None:
+    """Numbers in place of the long names of what is passed on within the network, and nodes without names."""
+    kept = {port.name for port in graph.output}
+    short: dict[str, str] = {}
+    for node in graph.node:
+        node.name = ""
+        for name in (name for name in node.output if name not in kept):
+            short[name] = f"v{len(short)}"
+    for node in graph.node:
+        for names in (node.input, node.output):
+            names[:] = [short.get(name, name) for name in names]

@@ -188,7 +188,10 @@ class DetectorNetwork(nn.Module):
 
     def from_early(self, at8: Tensor) -> tuple[Tensor, Tensor]:
         """The same of what the backbone's early part makes of pictures."""
-        levels = self.neck(self.backbone.late(at8))
+        return self.from_levels(self.neck(self.backbone.late(at8)))
+
+    def from_levels(self, levels: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        """The same of the neck's three levels."""
         logits, boxes = [], []
         for head, level, stride in zip(self.heads, levels, STRIDES, strict=True):
             scores, sides = head(level)

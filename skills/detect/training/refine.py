@@ -90,6 +90,7 @@ def _learn(options: RefineOptions, peers: Peers, device: torch.device, told: Tol
     checkpoint = options.out / CHECKPOINT
     if options.resume and checkpoint.is_file():
         learner.restore(checkpoint)
+        learner.keep_early()
     else:
         feed = RegionFeed(table, store, options.seed, 0, 1)
         size = options.batch

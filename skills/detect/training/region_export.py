@@ -23,7 +23,7 @@ class ExportableRegions(nn.Module):
     def __init__(self, network: RegionNetwork, score_offsets: Sequence[float] | None = None) -> None:
         super().__init__()
         self.network = fused(network)
-        take_bytes(self.network.backbone)
+        take_bytes(self.network.detector.backbone)
         if score_offsets is not None:
             with torch.no_grad():
                 self.network.scores.bias.add_(torch.tensor(score_offsets))

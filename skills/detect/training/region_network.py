@@ -1,77 +1,89 @@
 """The second network: what is in a chip about a place that the first network found, and where exactly.
 
-It has the first one's backbone and begins with its weights. It is told the first one's logits and adds to them, so
-that it begins with the first one's opinion.
+It is the first network once more, with weights of its own that begin with the first one's, on a chip: of all its cells
+the one counts that is surest of a box about the place's. What all of its coarsest level knows is added, and the
+first one's opinion, so that it begins with both.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor, nn
 
 from skills.detect.regions import CHIP_PX
-from skills.detect.training.network import Backbone, ConvUnit, CrossStage, Widths
+from skills.detect.training.network import ConvUnit, DetectorNetwork, Widths
 
-__all__ = ["RegionNetwork", "RegionWidths"]
+__all__ = ["RegionNetwork"]
 
 _CELLS_8, _CELLS_32 = CHIP_PX // 8, CHIP_PX // 32
+_SQUEEZED, _JOINED = 32, 128
 _MOST_LOGIT = 8.0
 _MOST_GROWTH = 1.5
-
-
-@dataclass(frozen=True)
-class RegionWidths:
-    """Channels of the backbone, of the two levels behind it, and of the layers that join all cells."""
-
-    backbone: Widths = field(default_factory=Widths)
-    at16: int = 128
-    at32: int = 192
-    squeezed: int = 32
-    joined: int = 160
+_SIDES_SCALE = 0.1
+_TINY = 1e-6
 
 
 class RegionNetwork(nn.Module):
     """Chips (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them and first logits (N, K) to logits and better boxes."""
 
-    def __init__(self, classes: int, widths: RegionWidths | None = None) -> None:
+    def __init__(self, classes: int, widths: Widths | None = None) -> None:
         super().__init__()
-        widths = widths or RegionWidths()
-        one, two, three = widths.backbone.levels
+        widths = widths or Widths()
         self.classes = classes
-        self.backbone = Backbone(widths.backbone)
-        self.place8 = nn.Conv2d(1, one, 1, bias=False)
-        self.place16 = nn.Conv2d(1, widths.at16, 1, bias=False)
-        self.narrow32 = ConvUnit(three, two)
-        self.enlarge = nn.Upsample(scale_factor=2, mode="nearest")
-        self.mix16 = CrossStage(two + two, widths.at16, 2)
-        self.halve16 = ConvUnit(widths.at16, widths.at16, 3, 2)
-        self.mix32 = CrossStage(widths.at16 + three, widths.at32, 2)
-        self.squeeze = ConvUnit(widths.at32, widths.squeezed)
-        self.join = nn.Linear(widths.squeezed * _CELLS_32 * _CELLS_32 + classes + 4, widths.joined)
-        self.drop = nn.Dropout(0.1)
-        self.scores = nn.Linear(widths.joined, classes)
-        self.sides = nn.Linear(widths.joined, 4)
-        self.trust = nn.Parameter(torch.ones(classes))
+        self.detector = DetectorNetwork(classes, widths)
+        self.place = nn.Conv2d(1, widths.levels[0], 1, bias=False)
+        self.squeeze = ConvUnit(widths.neck[2], _SQUEEZED)
+        self.join = nn.Sequential(
+            nn.Linear(_SQUEEZED * _CELLS_32 * _CELLS_32 + 2 * (classes + 4), _JOINED, bias=False),
+            nn.BatchNorm1d(_JOINED, eps=1e-3, momentum=0.03),
+            nn.ReLU(),
+            nn.Dropout(0.1),
+        )
+        self.scores = nn.Linear(_JOINED, classes)
+        self.sides = nn.Linear(_JOINED, 4)
+        self.trust = nn.Parameter(torch.full((2, classes), 0.5))
+        self.nearer = nn.Parameter(torch.full((4,), 0.5))
         for last in (self.scores, self.sides):
             nn.init.zeros_(last.weight)
             nn.init.zeros_(last.bias)
-        nn.init.zeros_(self.place8.weight)
-        nn.init.zeros_(self.place16.weight)
+        nn.init.zeros_(self.place.weight)
 
     def forward(self, chips: Tensor, boxes: Tensor, first_logits: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, K) and boxes (N, 4) as x0 y0 x1 y1 in pixels of the chip."""
+        return self.from_early(self.detector.backbone.early(chips), boxes, first_logits)
+
+    def from_early(self, at8: Tensor, boxes: Tensor, first_logits: Tensor) -> tuple[Tensor, Tensor]:
+        """The same of what the backbone's early part makes of chips."""
         first_logits = first_logits.clamp(-_MOST_LOGIT, _MOST_LOGIT)
-        place = covered(boxes)
-        at8 = self.backbone.early(chips) + self.place8(place)
-        _, at16, at32 = self.backbone.late(at8)
-        joined = torch.cat([self.enlarge(self.narrow32(at32)), at16], dim=1)
-        at16 = self.mix16(joined) + self.place16(nn.functional.avg_pool2d(place, 2))
-        at32 = self.mix32(torch.cat([self.halve16(at16), at32], dim=1))
-        told = torch.cat([self.squeeze(at32).flatten(1), first_logits, boxes / CHIP_PX], dim=1)
-        known = self.drop(nn.functional.relu(self.join(told)))
-        return self.trust * first_logits + self.scores(known), moved(boxes, self.sides(known))
+        levels = self.detector.neck(self.detector.backbone.late(at8 + self.place(covered(boxes))))
+        seen_logits, seen_boxes = surest_about(boxes, *self.detector.from_levels(levels))
+        seen_logits = seen_logits.clamp(-_MOST_LOGIT, _MOST_LOGIT)
+        told = [self.squeeze(levels[2]).flatten(1), first_logits, seen_logits, boxes / CHIP_PX, seen_boxes / CHIP_PX]
+        known = self.join(torch.cat(told, dim=1))
+        logits = self.trust[0] * first_logits + self.trust[1] * seen_logits + self.scores(known)
+        nearer = boxes + self.nearer * (seen_boxes - boxes)
+        return logits, moved(nearer, _SIDES_SCALE * self.sides(known).float())
+
+
+def surest_about(boxes: Tensor, logits: Tensor, found: Tensor) -> tuple[Tensor, Tensor]:
+    """Logits (N, K) and box (N, 4) of the cell whose score times its overlap with a box (N, 4) is highest.
+
+    Of all cells' logits (N, A, K) and boxes `found` (N, A, 4).
+    """
+    with torch.no_grad():
+        fit = logits.float().amax(dim=2).sigmoid() * shared(boxes[:, None], found)
+        best = fit.argmax(dim=1)[:, None, None]
+    surest = logits.gather(1, best.expand(-1, 1, logits.shape[2]))[:, 0]
+    return surest, found.gather(1, best.expand(-1, 1, 4))[:, 0]
+
+
+def shared(first: Tensor, second: Tensor) -> Tensor:
+    """Shared area over the area of both together, of boxes (..., 4)."""
+    low, high = torch.maximum(first[..., :2], second[..., :2]), torch.minimum(first[..., 2:], second[..., 2:])
+    size = (high - low).clamp(min=0.0)
+    area = size[..., 0] * size[..., 1]
+    areas = [(one[..., 2] - one[..., 0]) * (one[..., 3] - one[..., 1]) for one in (first, second)]
+    return area / (areas[0] + areas[1] - area + _TINY)
 
 
 def covered(boxes: Tensor) -> Tensor:
@@ -85,7 +97,6 @@ def covered(boxes: Tensor) -> Tensor:
 
 def moved(boxes: Tensor, sides: Tensor) -> Tensor:
     """Boxes (N, 4) with middles moved by shares of their sizes, and sizes changed by factors of which `sides` tells."""
-    sides = sides.float()
     middle, size = (boxes[:, :2] + boxes[:, 2:]) / 2, boxes[:, 2:] - boxes[:, :2]
     middle = middle + sides[:, :2] * size
     half = size * sides[:, 2:].clamp(-_MOST_GROWTH, _MOST_GROWTH).exp() / 2

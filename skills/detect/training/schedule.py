@@ -16,7 +16,7 @@ __all__ = ["HIGHEST_RATE", "REFINING_RATE", "REGIONS_RATE", "Budget", "Phase", "
 
 HIGHEST_RATE: Final = 3e-3
 REFINING_RATE: Final = 8e-4
-REGIONS_RATE: Final = 2e-3
+REGIONS_RATE: Final = 1e-3
 _CHIPS: Final = CanvasOptions(128, 128, mosaic=0.0, focused=0.85, scales=(0.4, 1.5), changed=0.8)
 _WINDOWS: Final = CanvasOptions(256, 192, mosaic=0.3, scales=(0.4, 1.4), changed=0.7)
 _LARGER: Final = CanvasOptions(384, 320, mosaic=0.25, focused=0.75, scales=(0.5, 1.3), changed=0.6)

@@ -20,7 +20,7 @@ from skills.detect.training.region_chips import RegionFeed  # noqa: E402
 from skills.detect.training.region_export import export_regions  # noqa: E402
 from skills.detect.training.region_learner import RegionLearner  # noqa: E402
 from skills.detect.training.region_losses import region_losses  # noqa: E402
-from skills.detect.training.region_network import RegionNetwork, covered, moved  # noqa: E402
+from skills.detect.training.region_network import RegionNetwork, covered, moved, surest_about  # noqa: E402
 from skills.detect.training.region_table import RegionTable, table_of  # noqa: E402
 from skills.detect.training.store import PictureStore  # noqa: E402
 
@@ -110,13 +110,31 @@ def test_the_same_seed_gives_the_same_chips_and_each_process_others(feed: Region
     assert not torch.equal(feed.batch(0, 8).chips, again.chips)
 
 
-def test_a_fresh_network_says_what_the_first_one_said() -> None:
+def test_a_fresh_network_says_the_mean_of_what_the_first_one_said_and_sees_in_the_chip() -> None:
     network = RegionNetwork(3).eval()
-    boxes, first = torch.tensor([[22.0, 40.0, 106.0, 88.0]]), torch.tensor([[1.0, -2.0, 0.5]])
+    chips, boxes, first = (
+        torch.rand(1, 3, CHIP_PX, CHIP_PX),
+        torch.tensor([[22.0, 40.0, 106.0, 88.0]]),
+        torch.ones(1, 3),
+    )
     with torch.no_grad():
-        logits, found = network(torch.rand(1, 3, CHIP_PX, CHIP_PX), boxes, first)
-    assert torch.allclose(logits, first)
-    assert torch.allclose(found, boxes)
+        logits, found = network(chips, boxes, first)
+        seen, seen_boxes = surest_about(boxes, *network.detector(chips))
+    assert torch.allclose(logits, (first + seen) / 2, atol=1e-4)
+    assert torch.allclose(found, (boxes + seen_boxes) / 2, atol=1e-3)
+
+
+# cell                  score  overlap  product
+# on the box             0.5    1.0      0.5
+# surer, half beside     0.7    1/3      0.23   surest of those that share less
+# surest, elsewhere      0.9    0        0
+def test_the_cell_counts_that_is_surest_of_a_box_about_the_places() -> None:
+    place = torch.tensor([[0.0, 0.0, 10.0, 10.0]])
+    found = torch.tensor([[[50.0, 50.0, 60.0, 60.0], [5.0, 0.0, 15.0, 10.0], [0.0, 0.0, 10.0, 10.0]]])
+    logits = torch.tensor([0.9, 0.7, 0.5]).logit()[None, :, None]
+    seen, box = surest_about(place, logits, found)
+    assert seen.sigmoid().item() == pytest.approx(0.5)
+    assert box.tolist() == [[0.0, 0.0, 10.0, 10.0]]
 
 
 def test_cells_tell_the_share_that_a_box_covers() -> None:
@@ -151,7 +169,7 @@ def test_chips_are_learnt_by_heart(feed: RegionFeed) -> None:
     learner = RegionLearner.new(len(CLASSES), 1, CPU)
     batch = feed.batch(0, 8)
     found = [learner.step(batch, 2e-3, ALONE, float(k))[0] for k in range(40)]
-    assert np.mean(found[-5:]) < 0.25 * np.mean(found[:5])
+    assert np.mean(found[-5:]) < 0.5 * np.mean(found[:5])
 
 
 def unsettled(classes: int) -> RegionNetwork:
@@ -188,14 +206,21 @@ def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
     assert np.abs(scores - shifted.numpy()).max() < 1e-3
 
 
-def test_learning_begins_with_the_first_networks_backbone(tmp_path: Path) -> None:
+def test_learning_begins_with_the_first_networks_weights_and_keeps_its_early_layers(
+    tmp_path: Path, feed: RegionFeed
+) -> None:
     first, file = random_network(1, len(CLASSES)), tmp_path / "m.onnx"
     export(first, file, class_names=CLASSES, facts={})
-    learner, chips = RegionLearner.new(len(CLASSES), 2, CPU), torch.rand(4, 3, CHIP_PX, CHIP_PX)
-    learner.start_from(file, [chips])
+    batch, learner = feed.batch(0, 8), RegionLearner.new(len(CLASSES), 2, CPU)
+    learner.start_from(file, [batch.chips])
     with torch.no_grad():
-        mine, theirs = learner.network.eval().backbone(chips), first.backbone(chips)
-    assert all(torch.allclose(one, other, atol=1e-3) for one, other in zip(mine, theirs, strict=True))
+        for mine, theirs in zip(learner.network.detector.eval()(batch.chips), first(batch.chips), strict=True):
+            assert torch.allclose(mine, theirs, atol=1e-2)
+    before = {name: value.clone() for name, value in learner.network.state_dict().items()}
+    learner.step(batch, 1e-3, ALONE, 0.0)
+    after, kept = learner.network.state_dict(), ("detector.backbone.stem.", "detector.backbone.stage8.")
+    assert all(torch.equal(before[name], after[name]) for name in before if name.startswith(kept))
+    assert not torch.equal(before["detector.neck.down8.mix.0.weight"], after["detector.neck.down8.mix.0.weight"])
 
 
 def test_a_checkpoint_of_the_other_network_is_named(tmp_path: Path) -> None:

@@ -9,9 +9,18 @@ VENV := .venv
 BIN := $(VENV)/bin
 # What the wheels need beyond Python: libraries of Drake, and software rendering through EGL for the cameras.
 DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
+# Voices that speak to the tests of speech; without them those are skipped.
+VOICES := flite espeak-ng
 JOBS ?= 2
 
-.PHONY: env demo test fast check bench format debian clean
+missing = for package in $(1); do dpkg -s $$package >/dev/null 2>&1 || printf ' %s' $$package; done
+define install
+{ if [ "$$(id -u)" = 0 ]; then run=; else run=sudo; fi; \
+	echo "installing Debian packages:$(1)"; \
+	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $(1) >/dev/null; }
+endef
+
+.PHONY: env demo test fast check bench format debian voices clean
 
 env: $(VENV)/.ready
 
@@ -23,19 +32,20 @@ $(VENV)/.ready: pyproject.toml constraints.txt | debian
 	@touch $@
 
 debian:
-	@missing=; \
-	for package in $(DEBIAN); do dpkg -s $$package >/dev/null 2>&1 || missing="$$missing $$package"; done; \
+	@missing="$$($(call missing,$(DEBIAN)))"; \
 	$(PYTHON) -c 'import ensurepip' 2>/dev/null || missing="$$missing python3.11-venv"; \
 	if [ -z "$$missing" ]; then exit 0; fi; \
-	if [ "$$(id -u)" = 0 ]; then run=; elif command -v sudo >/dev/null; then run=sudo; \
-	else echo "Errand needs these Debian packages; as root: apt-get install$$missing"; exit 1; fi; \
-	echo "installing Debian packages:$$missing"; \
-	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $$missing >/dev/null
+	$(call install,$$missing) || { echo "Errand needs these Debian packages; as root: apt-get install$$missing"; exit 1; }
+
+voices:
+	@missing="$$($(call missing,$(VOICES)))"; \
+	if [ -z "$$missing" ]; then exit 0; fi; \
+	$(call install,$$missing) || echo "tests with synthetic voices will be skipped; as root: apt-get install$$missing"
 
 demo: env
 	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
 
-test: env
+test: env voices
 	$(BIN)/pytest -n $(JOBS) --dist worksteal --ignore=tests/benchmarks
 
 fast: env

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-__all__ = ["AssignOptions", "Assigned", "assign", "paired_overlaps"]
+from skills.detect.training.overlaps import overlap
+
+__all__ = ["AssignOptions", "Assigned", "assign"]
 
 _TINY = 1e-9
 
@@ -55,7 +57,7 @@ def assign(
     present (N, G), which is false for rows that only fill up.
     """
     inside = _inside(middles, truth, options.least_side_px) & present[..., None]
-    overlaps = paired_overlaps(truth, boxes)
+    overlaps = overlap(truth[:, :, None], boxes[:, None])
     asked = scores.gather(2, classes[:, None, :].expand(-1, scores.shape[1], -1)).transpose(1, 2)
     metric = asked.pow(options.score_power) * (overlaps + 1e-4).pow(options.overlap_power)
     metric = metric * (inside & ~ignored[..., None])
@@ -88,13 +90,3 @@ def _quality(metric: Tensor, overlaps: Tensor) -> Tensor:
     highest = metric.amax(dim=2, keepdim=True)
     best = overlaps.amax(dim=2, keepdim=True)
     return (metric / (highest + _TINY) * best).amax(dim=1)
-
-
-def paired_overlaps(first: Tensor, second: Tensor) -> Tensor:
-    """Shared area over the area of both together, (N, G, A), of boxes (N, G, 4) and (N, A, 4)."""
-    low = torch.maximum(first[:, :, None, :2], second[:, None, :, :2])
-    high = torch.minimum(first[:, :, None, 2:], second[:, None, :, 2:])
-    shared = (high - low).clamp(min=0).prod(dim=-1)
-    areas = (first[..., 2:] - first[..., :2]).prod(dim=-1)[:, :, None]
-    others = (second[..., 2:] - second[..., :2]).prod(dim=-1)[:, None, :]
-    return shared / (areas + others - shared + _TINY)

@@ -9,8 +9,9 @@ import torch
 from torch import Tensor
 
 from skills.detect.training.assign import Assigned, AssignOptions, assign
+from skills.detect.training.overlaps import overlap, sizes
 
-__all__ = ["LossOptions", "Losses", "TruthBatch", "complete_overlap", "losses", "overlap"]
+__all__ = ["LossOptions", "Losses", "TruthBatch", "complete_overlap", "losses"]
 
 _TINY = 1e-7
 
@@ -80,7 +81,7 @@ def complete_overlap(first: Tensor, second: Tensor) -> Tensor:
 
     After Zheng et al., "Distance-IoU Loss" (2020).
     """
-    shared, size1, size2 = overlap(first, second), _sizes(first), _sizes(second)
+    shared, size1, size2 = overlap(first, second), sizes(first), sizes(second)
     around = torch.maximum(first[:, 2:], second[:, 2:]) - torch.minimum(first[:, :2], second[:, :2])
     apart = (first[:, :2] + first[:, 2:] - second[:, :2] - second[:, 2:]).square().sum(dim=1) / 4
     away = apart / (around.square().sum(dim=1) + _TINY)
@@ -89,14 +90,3 @@ def complete_overlap(first: Tensor, second: Tensor) -> Tensor:
     with torch.no_grad():
         weight = shape / (1.0 - shared + shape + _TINY)
     return shared - away - weight * shape
-
-
-def overlap(first: Tensor, second: Tensor) -> Tensor:
-    """Shared area over the area of both together (M,), of boxes (M, 4)."""
-    low, high = torch.maximum(first[:, :2], second[:, :2]), torch.minimum(first[:, 2:], second[:, 2:])
-    shared = (high - low).clamp(min=0).prod(dim=1)
-    return shared / (_sizes(first).prod(dim=1) + _sizes(second).prod(dim=1) - shared + _TINY)
-
-
-def _sizes(boxes: Tensor) -> Tensor:
-    return (boxes[:, 2:] - boxes[:, :2]).clamp(min=_TINY)

@@ -49,10 +49,10 @@ def refine(options: RefineOptions, told: Told) -> Path:
 
 
 def _first_beside(options: RefineOptions) -> Path:
-    """The first network's file in the folder that is written to."""
+    """The first network's file in the folder that is written to; what is gone on with keeps the one that it had."""
     file = options.out / MODEL
     try:
-        if not file.is_file() or not options.model.samefile(file):
+        if not file.is_file() or not (options.resume or options.model.samefile(file)):
             shutil.copyfile(options.model, file)
     except OSError as error:
         raise TrainingDataError(

@@ -34,7 +34,7 @@ class RegionLearner(LearningState[RegionNetwork]):
 
     @staticmethod
     def new(classes: int, seed: int, device: torch.device) -> RegionLearner:
-        """A network that has learnt nothing yet, and adds nothing to what the first one says."""
+        """A network that has learnt nothing yet."""
         torch.manual_seed(seed)
         network = RegionNetwork(classes).to(device, memory_format=torch.channels_last)
         last = [network.place, *(layer for head in network.detector.heads for layer in (head.scores, head.sides))]

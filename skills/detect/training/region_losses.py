@@ -7,7 +7,8 @@ from typing import Final
 import torch
 from torch import Tensor
 
-from skills.detect.training.losses import Losses, complete_overlap, overlap
+from skills.detect.training.losses import Losses, complete_overlap
+from skills.detect.training.overlaps import overlap
 
 __all__ = ["region_losses"]
 

@@ -12,6 +12,7 @@ from torch import Tensor, nn
 
 from skills.detect.regions import CHIP_PX
 from skills.detect.training.network import ConvUnit, DetectorNetwork, Widths
+from skills.detect.training.overlaps import overlap
 
 __all__ = ["RegionNetwork"]
 
@@ -20,7 +21,6 @@ _SQUEEZED, _JOINED = 32, 128
 _MOST_LOGIT = 8.0
 _MOST_GROWTH = 1.5
 _SIDES_SCALE = 0.1
-_TINY = 1e-6
 
 
 class RegionNetwork(nn.Module):
@@ -71,19 +71,10 @@ def surest_about(boxes: Tensor, logits: Tensor, found: Tensor) -> tuple[Tensor, 
     Of all cells' logits (N, A, K) and boxes `found` (N, A, 4).
     """
     with torch.no_grad():
-        fit = logits.float().amax(dim=2).sigmoid() * shared(boxes[:, None], found)
+        fit = logits.float().amax(dim=2).sigmoid() * overlap(boxes[:, None], found)
         best = fit.argmax(dim=1)[:, None, None]
     surest = logits.gather(1, best.expand(-1, 1, logits.shape[2]))[:, 0]
     return surest, found.gather(1, best.expand(-1, 1, 4))[:, 0]
-
-
-def shared(first: Tensor, second: Tensor) -> Tensor:
-    """Shared area over the area of both together, of boxes (..., 4)."""
-    low, high = torch.maximum(first[..., :2], second[..., :2]), torch.minimum(first[..., 2:], second[..., 2:])
-    size = (high - low).clamp(min=0.0)
-    area = size[..., 0] * size[..., 1]
-    areas = [(one[..., 2] - one[..., 0]) * (one[..., 3] - one[..., 1]) for one in (first, second)]
-    return area / (areas[0] + areas[1] - area + _TINY)
 
 
 def covered(boxes: Tensor) -> Tensor:

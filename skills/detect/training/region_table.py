@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from skills.detect.detector_file import DetectorModel
 from skills.detect.regions import RegionOptions, regions_of
+from skills.detect.scoring_matching import overlaps
 from skills.detect.training.labels import Labels, LearningPicture
 from skills.detect.training.store import PictureStore
 
@@ -63,10 +64,11 @@ def table_of(model: DetectorModel, pictures: Sequence[LearningPicture], store: P
 
 def _rows(model: DetectorModel, store: PictureStore, number: int, labels: Labels) -> RegionTable:
     """The regions of one picture."""
-    boxes, scores = model.first.single.run(["boxes", "scores"], {"images": store.full[number][None]})
-    regions = regions_of(boxes[0], scores[0], _LOOKED_AT)
+    found, scores = model.first.single.run(["boxes", "scores"], {"images": store.full[number][None]})
+    regions = regions_of(found[0], scores[0], _LOOKED_AT)
     things = label_boxes(labels)
-    shared, inside = shares(regions.boxes, things)
+    boxes, none, all_of_them = regions.boxes.astype(np.float64), np.zeros(len(labels), bool), np.ones(len(labels), bool)
+    shared, inside = (overlaps(boxes, things.astype(np.float64), crowd) for crowd in (none, all_of_them))
     left_out = ((shared >= NEAR) | (inside >= _WITHIN_IGNORED)) & labels.ignored[None, :]
     counting = np.where(labels.ignored[None, :], 0.0, shared)
     best = counting.max(axis=1, initial=0.0)
@@ -85,13 +87,3 @@ def label_boxes(labels: Labels) -> Floats:
     """The boxes (N, 4) of labels' outlines."""
     boxes = [np.concatenate([outline.min(axis=0), outline.max(axis=0)]) for outline in labels.outlines]
     return np.array(boxes, dtype=np.float32).reshape(-1, 4)
-
-
-def shares(boxes: Floats, things: Floats) -> tuple[Floats, Floats]:
-    """Shared area over the area of both, and over that of the box, (R, G)."""
-    low = np.maximum(boxes[:, None, :2], things[None, :, :2])
-    high = np.minimum(boxes[:, None, 2:], things[None, :, 2:])
-    shared = np.clip(high - low, 0.0, None).prod(axis=2)
-    areas, others = ((ones[:, 2:] - ones[:, :2]).prod(axis=1) for ones in (boxes, things))
-    both = np.maximum(areas[:, None] + others[None, :] - shared, 1e-6)
-    return shared / both, shared / np.maximum(areas[:, None], 1e-6)

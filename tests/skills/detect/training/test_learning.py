@@ -9,7 +9,7 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
 from skills.detect.detector_file import load_model  # noqa: E402
-from skills.detect.training.assign import AssignOptions, assign, paired_overlaps  # noqa: E402
+from skills.detect.training.assign import AssignOptions, assign  # noqa: E402
 from skills.detect.training.averaging import WeightAverage  # noqa: E402
 from skills.detect.training.batches import batch_of, truth_of  # noqa: E402
 from skills.detect.training.canvases import Canvas  # noqa: E402
@@ -19,6 +19,7 @@ from skills.detect.training.learner import Learner  # noqa: E402
 from skills.detect.training.losses import LossOptions, complete_overlap, losses  # noqa: E402
 from skills.detect.training.muon import orthogonal  # noqa: E402
 from skills.detect.training.network import DetectorNetwork, cells  # noqa: E402
+from skills.detect.training.overlaps import overlap  # noqa: E402
 from skills.detect.training.peers import Peers  # noqa: E402
 from skills.detect.training.placing import Targets  # noqa: E402
 
@@ -81,7 +82,7 @@ def test_cells_that_fit_a_thing_best_answer_for_it() -> None:
     found = assigned(scores, boxes, middles, targets((20, 20, 36, 36), classes=(1,)))
     answering = torch.nonzero(found.things[0] == 0).flatten()
     assert 1 <= len(answering) <= 4
-    overlaps = paired_overlaps(torch.tensor([[[20.0, 20, 36, 36]]]), boxes)[0, 0]
+    overlaps = overlap(torch.tensor([20.0, 20, 36, 36]), boxes)[0]
     assert overlaps[answering].min() >= overlaps.topk(6).values[-1]
     assert found.quality[0].max() == pytest.approx(float(overlaps[answering].max()), abs=1e-4)
     assert (found.quality[0][found.things[0] < 0] == 0).all()

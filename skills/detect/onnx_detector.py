@@ -67,8 +67,9 @@ class OnnxDetector:
         boxes, scores = session(self.model.first).run(["boxes", "scores"], {"images": image[None]})
         boxes, scores = boxes[0], scores[0]
         if self.model.second is not None:
-            regions = regions_of(boxes, scores, self.options.regions)
-            boxes, scores = looked_again(session(self.model.second), image, regions)
+            options = self.options.regions
+            regions = regions_of(boxes, scores, options)
+            boxes, scores = looked_again(session(self.model.second), image, regions, mirrored=options.mirrored)
         return self._detections(boxes, scores, placed)
 
     def _detections(self, boxes: Floats, scores: Floats, placed: Letterbox) -> tuple[Detection, ...]:

@@ -29,13 +29,15 @@ class RegionOptions:
     """Which boxes are places to look at again.
 
     Of the `most_candidates` surest boxes of whatever class, with at least `least_score`, those that overlap a surer
-    one by no more than `same`; `most` of them.
+    one by no more than `same`; `most` of them. At each, the second network looks also at its mirror image where
+    `mirrored` says so.
     """
 
-    least_score: float = 0.01
+    least_score: float = 0.02
     same: float = 0.6
-    most: int = 12
+    most: int = 8
     most_candidates: int = 250
+    mirrored: bool = True
 
 
 @dataclass(frozen=True)
@@ -68,15 +70,16 @@ def logits_of(scores: Floats) -> Floats:
     return np.asarray(np.log(sound / (1.0 - sound)), dtype=np.float32)
 
 
-def chip_map(box: NDArray[np.floating]) -> Floats:
+def chip_map(box: NDArray[np.floating], *, mirrored: bool = False) -> Floats:
     """The affine map (2, 3) of the letterbox that brings a box (4,) to its chip, in which it takes about two thirds.
 
-    What is very small is shown smaller.
+    What is very small is shown smaller. A chip may be `mirrored` from left to right.
     """
     u0, v0, u1, v1 = (float(value) for value in box)
     scale = THING_PX / max(u1 - u0, v1 - v0, LEAST_SIDE_PX)
-    middle = np.array([u0 + u1, v0 + v1]) / 2
-    return np.concatenate([np.eye(2) * scale, (CHIP_PX / 2 - scale * middle)[:, None]], axis=1).astype(np.float32)
+    linear = np.diag([-scale if mirrored else scale, scale])
+    shift = CHIP_PX / 2 - linear @ (np.array([u0 + u1, v0 + v1]) / 2)
+    return np.concatenate([linear, shift[:, None]], axis=1).astype(np.float32)
 
 
 def mapped(boxes: NDArray[np.floating], affine: NDArray[np.floating]) -> Floats:

@@ -84,11 +84,17 @@ def picture_of(*things, size=(480, 640), classes=CLASSES):
     return picture
 
 
-def second_bytes(first: bytes, *, classes=CLASSES, form="errand-regions-1", told=None, size=128) -> bytes:
-    """A second network: boxes a tenth smaller than the regions; the first class's score is the share of red."""
+def second_bytes(
+    first: bytes, *, classes=CLASSES, form="errand-regions-1", told=None, size=128, left_only=False
+) -> bytes:
+    """A second network: boxes a tenth smaller than the regions; the first class's score is the share of red.
+
+    With `left_only` it looks at the left half of the chip alone.
+    """
     rows = ["N", len(classes)]
     nodes = [
-        helper.make_node("Cast", ["chips"], ["values"], to=TensorProto.FLOAT),
+        helper.make_node("Slice", ["chips", "from", "to", "columns"], ["part"]),
+        helper.make_node("Cast", ["part"], ["values"], to=TensorProto.FLOAT),
         helper.make_node("ReduceMean", ["values"], ["means"], axes=[1, 2], keepdims=0),
         helper.make_node("MatMul", ["means", "red"], ["seen"]),
         helper.make_node("Mul", ["logits", "nothing"], ["unheard"]),
@@ -99,6 +105,9 @@ def second_bytes(first: bytes, *, classes=CLASSES, form="errand-regions-1", told
     red[0, 0] = 1 / 255
     keep, take = np.eye(4), np.eye(4)[[2, 3, 0, 1]]
     constants = {
+        "from": np.array([0], np.int64),
+        "to": np.array([size // 2 if left_only else size], np.int64),
+        "columns": np.array([2], np.int64),
         "red": red,
         "nothing": np.array(0.0, np.float32),
         "smaller": (0.95 * keep + 0.05 * take).astype(np.float32),

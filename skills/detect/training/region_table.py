@@ -20,7 +20,7 @@ __all__ = ["NEAR", "RegionTable", "table_of"]
 
 NEAR: Final = 0.3
 _WITHIN_IGNORED: Final = 0.6
-_LOOKED_AT: Final = RegionOptions(most=20)
+_LOOKED_AT: Final = RegionOptions(least_score=0.01, most=20)
 
 Floats = NDArray[np.float32]
 

@@ -8,6 +8,7 @@ from tiny_detector import CLASSES, picture_of, write_model, write_pair
 
 from skills.detect.network_file import ModelFileError
 from skills.detect.onnx_detector import DetectorOptions, load_detector
+from skills.detect.regions import RegionOptions
 from skills.detection import Detection
 
 HAMMER = ("hammer", 0.9, (100, 50, 200, 80))
@@ -137,6 +138,17 @@ def test_a_second_network_tells_where_it_is_exactly(looks_again):
     picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 150))), (0, 2, 300, 300))
     (found,) = looks_again.detect([picture])
     assert found[0].box == pytest.approx((105.0, 102.5, 195.0, 147.5), abs=0.01)
+
+
+def test_a_chip_and_its_mirror_image_are_judged_together(tmp_path):
+    """A second network that takes the left half of a chip alone for a beer says half of it with both."""
+    file = write_pair(tmp_path / "tiny.onnx", left_only=True)
+    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (0, 2, 150, 400))
+    scores = {
+        mirrored: load_detector(file, DetectorOptions(0.05, regions=RegionOptions(mirrored=mirrored))).detect([picture])
+        for mirrored in (False, True)
+    }
+    assert [round(found[0][0].score, 1) for found in scores.values()] == [1.0, 0.5]
 
 
 def test_a_second_network_takes_back_what_the_first_one_is_sure_of(looks_again):

@@ -20,7 +20,7 @@ def test_boxes_of_any_class_on_one_place_become_one_with_the_surest_ones_opinion
 
 
 def test_the_unsure_and_the_empty_are_no_places():
-    assert len(found((WHOLE, (0.005, 0.002)), (EMPTY, (0.9, 0.0)), ((0, 0, float("nan"), 5), (0.9, 0.0)))) == 0
+    assert len(found((WHOLE, (0.015, 0.002)), (EMPTY, (0.9, 0.0)), ((0, 0, float("nan"), 5), (0.9, 0.0)))) == 0
 
 
 def test_no_more_than_so_many_places_are_looked_at():
@@ -40,6 +40,11 @@ def test_a_place_is_in_the_middle_of_its_chip_and_fills_two_thirds_of_it(box, ex
     chip = chip_map(np.array(box, np.float32))
     assert mapped(np.array([box]), chip)[0].tolist() == pytest.approx(expected, abs=1e-3)
     assert CHIP_PX == 128
+
+
+def test_a_mirrored_chip_shows_the_left_at_the_right():
+    chip = chip_map(np.array((100, 100, 184, 184), np.float32), mirrored=True)
+    assert mapped(np.array([(100, 100, 110, 184)]), chip)[0].tolist() == pytest.approx((96, 22, 106, 106), abs=1e-3)
 
 
 def test_boxes_under_a_turn_hold_their_corners():

@@ -33,7 +33,7 @@ class RegionOptions:
     `mirrored` says so.
     """
 
-    least_score: float = 0.02
+    least_score: float = 0.03
     same: float = 0.6
     most: int = 8
     most_candidates: int = 250

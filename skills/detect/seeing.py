@@ -1,6 +1,6 @@
 """Pictures looked through as a detector knows the world: those that stand on their heads are turned first.
 
-Spot's right camera hangs upside down. Turned, it shows the learned detector 91 % of its people instead of 74 %.
+Spot's right camera hangs upside down. Turned, it shows the detector's first network 91 % of its people instead of 74 %.
 """
 
 from __future__ import annotations

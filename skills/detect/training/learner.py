@@ -22,7 +22,7 @@ from skills.detect.training.onnx_weights import take_over
 from skills.detect.training.peers import Peers
 from skills.detect.training.records import Course
 
-__all__ = ["Learner", "LearningState", "Progress", "optimisers_of", "read_checkpoint"]
+__all__ = ["Learner", "LearningState", "Progress", "optimisers_of", "read_checkpoint", "without_learning_early"]
 
 FORMAT = 1
 ONNX = ".onnx"
@@ -139,11 +139,7 @@ class Learner(LearningState[DetectorNetwork]):
 
     def keep_early(self) -> None:
         """Learn no longer what makes the features at stride 8, and compute them without normalisation from now on."""
-        backbone = self.network.backbone
-        for part in (backbone.stem, backbone.stage8):
-            part.requires_grad_(False)
-        made = fused(self.average.network).backbone.requires_grad_(False)
-        self.early = made.to(self.device, memory_format=torch.channels_last)
+        self.early = without_learning_early(self.network.backbone, self.average.network.backbone, self.device)
 
     def start_from(self, file: Path) -> None:
         """Take over the weights of an ONNX file, or a checkpoint's averaged ones; all else begins anew.
@@ -155,6 +151,14 @@ class Learner(LearningState[DetectorNetwork]):
         else:
             self.network.load_state_dict(read_checkpoint(file)["average"]["network"])
         self.average.network.load_state_dict(self.network.state_dict())
+
+
+def without_learning_early(backbone: Backbone, average: Backbone, device: torch.device) -> Backbone:
+    """Learn a backbone's layers up to stride 8 no longer; the averaged one, without normalisation, to use for them."""
+    for part in (backbone.stem, backbone.stage8):
+        part.requires_grad_(False)
+    made: Backbone = fused(average).requires_grad_(False).to(device, memory_format=torch.channels_last)
+    return made
 
 
 def optimisers_of(network: nn.Module, last: Iterable[nn.Module]) -> tuple[torch.optim.Optimizer, ...]:

@@ -5,16 +5,20 @@ from __future__ import annotations
 import multiprocessing
 import time
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Final, Protocol
 
 from skills.detect.scoring import Score
 from skills.detect.training.learner import LearningState
 from skills.detect.training.peers import Peers
+from skills.detect.training.records import draw_curves
 from skills.detect.training.schedule import Budget
 from skills.detect.training.together import Report, Told
 
-__all__ = ["Lesson", "Loop", "Stepped", "figures_of"]
+__all__ = ["CHECKPOINT", "Lesson", "Loop", "Stepped", "figures_of"]
 
+CHECKPOINT: Final = "checkpoint.pt"
+CURVES: Final = "curves.png"
 _NOTED_EVERY_STEPS: Final = 20
 _EXAMINED_EVERY: Final = 0.1
 
@@ -41,7 +45,7 @@ class Lesson(Protocol):
         """Learn from one batch, with a share of the time done and so many seconds on this process's clock."""
 
     def written(self, *, last: bool) -> dict[str, float]:
-        """Write checkpoint, ONNX file and curves, and give the figures of some held-out pictures."""
+        """Write the ONNX file, and give its figures of some held-out pictures."""
 
 
 @dataclass
@@ -51,6 +55,7 @@ class Loop:
     lesson: Lesson
     budget: Budget
     peers: Peers
+    out: Path
     told: Told
     resting_since: float = field(default_factory=time.monotonic)
 
@@ -82,13 +87,16 @@ class Loop:
             self.told(Report(done, state.progress.steps, speed, (made.scores, made.boxes)))
 
     def _examine(self) -> None:
-        """Write what there is, and tell how good it is."""
+        """Write what there is, with checkpoint and curves, and tell how good it is."""
         state = self.lesson.state
         self.peers.mean_statistics(state.network)
         self.peers.mean_statistics(state.average.network)
         if self.peers.first:
             done = self._done()
             figures = self.lesson.written(last=done >= 1.0)
+            state.course.exams.append({"progress": done, **figures})
+            draw_curves(state.course, self.out / CURVES)
+            state.save(self.out / CHECKPOINT)
             self.told(Report(done, state.progress.steps, 0.0, (0.0, 0.0), figures))
         self.peers.wait()
         self.resting_since = time.monotonic()

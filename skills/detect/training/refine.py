@@ -14,17 +14,16 @@ import torch
 from skills.detect.detector_file import load_model, regions_file
 from skills.detect.network_file import ModelFileError
 from skills.detect.training.labels import LearningPicture, TrainingDataError, category_names, digest_of, read_split
-from skills.detect.training.loop import Loop, Stepped, figures_of
+from skills.detect.training.loop import CHECKPOINT, Loop, Stepped, figures_of
 from skills.detect.training.options import RefineOptions
 from skills.detect.training.peers import Peers
-from skills.detect.training.records import draw_curves
 from skills.detect.training.region_chips import RegionFeed
 from skills.detect.training.region_export import export_regions
 from skills.detect.training.region_learner import RegionLearner
 from skills.detect.training.region_table import RegionTable, table_of
 from skills.detect.training.store import PictureStore, open_store
 from skills.detect.training.together import Told, learn_together
-from skills.detect.training.train import CHECKPOINT, CURVES, MODEL, PICTURES
+from skills.detect.training.train import MODEL, PICTURES
 from skills.detect.training.validate import Examination, examination, examine, offsets_by
 
 __all__ = ["refine"]
@@ -97,7 +96,7 @@ def _learn(options: RefineOptions, peers: Peers, device: torch.device, told: Tol
         learner.start_from(options.out / MODEL, (feed.batch(k * size, size).chips for k in range(_SETTLED_BY)))
     feed = RegionFeed(table, store, options.seed, peers.rank, peers.count)
     exam = examination(options.data, "val", names, options.examined)
-    Loop(_Regions(options, learner, peers, feed, exam), options.budget, peers, told).run()
+    Loop(_Regions(options, learner, peers, feed, exam), options.budget, peers, options.out, told).run()
 
 
 @dataclass(frozen=True)
@@ -119,15 +118,9 @@ class _Regions:
         return Stepped(options.batch * self.peers.count, scores, boxes, rate, clock)
 
     def written(self, *, last: bool) -> dict[str, float]:
-        """Write checkpoint, ONNX file and curves, and give the figures of some held-out pictures."""
-        out, learner, progress = self.options.out, self.state, self.state.progress
-        export_refined(learner, self.options, calibrated=last)
-        figures = figures_of(examine(out / MODEL, self.exam, second=True))
-        done = self.options.budget.progress(progress.taken, progress.seconds)
-        learner.course.exams.append({"progress": done, **figures})
-        draw_curves(learner.course, out / CURVES)
-        learner.save(out / CHECKPOINT)
-        return figures
+        """Write the ONNX file, and give its figures of some held-out pictures."""
+        export_refined(self.state, self.options, calibrated=last)
+        return figures_of(examine(self.options.out / MODEL, self.exam, second=True))
 
 
 def export_refined(learner: RegionLearner, options: RefineOptions, *, calibrated: bool) -> None:

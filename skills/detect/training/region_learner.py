@@ -10,8 +10,7 @@ import torch
 from torch import Tensor
 
 from skills.detect.training.averaging import WeightAverage
-from skills.detect.training.export import fused
-from skills.detect.training.learner import LearningState, optimisers_of
+from skills.detect.training.learner import LearningState, optimisers_of, without_learning_early
 from skills.detect.training.losses import Losses
 from skills.detect.training.network import Backbone, DetectorNetwork
 from skills.detect.training.onnx_weights import settle, take_over
@@ -54,11 +53,8 @@ class RegionLearner(LearningState[RegionNetwork]):
 
     def keep_early(self) -> None:
         """Learn no longer what makes the features at stride 8: two fifths of the time of each step."""
-        backbone = self.network.detector.backbone
-        for part in (backbone.stem, backbone.stage8):
-            part.requires_grad_(False)
-        made = fused(self.average.network).detector.backbone.requires_grad_(False)
-        self.early = made.to(self.device, memory_format=torch.channels_last)
+        mine, average = self.network.detector.backbone, self.average.network.detector.backbone
+        self.early = without_learning_early(mine, average, self.device)
 
     def step(self, batch: RegionBatch, rate: float, peers: Peers, clock: float) -> tuple[float, float, float]:
         """Learn from one batch: score loss, box loss, and the first process's clock."""

@@ -15,20 +15,17 @@ from skills.detect.training.canvases import CanvasMaker
 from skills.detect.training.export import export
 from skills.detect.training.labels import category_names, digest_of, read_split
 from skills.detect.training.learner import ONNX, Learner
-from skills.detect.training.loop import Loop, Stepped, figures_of
+from skills.detect.training.loop import CHECKPOINT, Loop, Stepped, figures_of
 from skills.detect.training.onnx_weights import settle
 from skills.detect.training.options import TrainOptions
 from skills.detect.training.peers import Peers
-from skills.detect.training.records import draw_curves
 from skills.detect.training.store import open_store
 from skills.detect.training.together import Report, Told, learn_together
 from skills.detect.training.validate import Examination, examination, examine, offsets_by
 
-__all__ = ["CHECKPOINT", "MODEL", "Report", "TrainOptions", "train"]
+__all__ = ["MODEL", "Report", "TrainOptions", "train"]
 
-CHECKPOINT: Final = "checkpoint.pt"
 MODEL: Final = "errand_detector.onnx"
-CURVES: Final = "curves.png"
 PICTURES: Final = "pictures"
 _CALIBRATED_BY: Final = 900
 _SETTLED_BY: Final = 24
@@ -58,7 +55,7 @@ def _learn(options: TrainOptions, peers: Peers, device: torch.device, told: Told
         learner.keep_early()
     feed = Feed(maker, options.seed, peers.rank, peers.count)
     exam = examination(options.data, "val", names, options.examined)
-    Loop(_Canvases(options, learner, peers, feed, exam), options.budget, peers, told).run()
+    Loop(_Canvases(options, learner, peers, feed, exam), options.budget, peers, options.out, told).run()
 
 
 def _beginning(options: TrainOptions) -> Path | None:
@@ -107,17 +104,9 @@ class _Canvases:
         return Stepped(phase.batch * self.peers.count, scores, boxes, rate, clock)
 
     def written(self, *, last: bool) -> dict[str, float]:
-        """Write checkpoint, ONNX file and curves, and give the figures of some held-out pictures."""
-        out, learner = self.options.out, self.state
-        export_model(learner, self.options, calibrated=last)
-        figures = figures_of(examine(out / MODEL, self.exam, second=False))
-        learner.course.exams.append({"progress": self._done(), **figures})
-        draw_curves(learner.course, out / CURVES)
-        learner.save(out / CHECKPOINT)
-        return figures
-
-    def _done(self) -> float:
-        return self.options.budget.progress(self.state.progress.taken, self.state.progress.seconds)
+        """Write the ONNX file, and give its figures of some held-out pictures."""
+        export_model(self.state, self.options, calibrated=last)
+        return figures_of(examine(self.options.out / MODEL, self.exam, second=False))
 
 
 def export_model(learner: Learner, options: TrainOptions, *, calibrated: bool) -> None:

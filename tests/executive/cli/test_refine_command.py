@@ -21,13 +21,6 @@ def data(tmp_path: Path) -> Path:
     return folder
 
 
-def test_without_torch_the_extra_is_named(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(learning.importlib.util, "find_spec", lambda _name: None)
-    result = run("--data", str(data), "--out", str(tmp_path / "out"))
-    assert result.exit_code == 2
-    assert "pip install '.[train]'" in result.stderr
-
-
 def test_a_first_network_that_is_not_there_is_named(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -37,9 +30,3 @@ def test_a_first_network_that_is_not_there_is_named(
     assert result.exit_code == 2
     assert "missing.onnx" in result.stderr
     assert "--model" in result.stderr
-
-
-def test_a_folder_that_is_no_data_set_is_named(tmp_path: Path) -> None:
-    result = run("--data", str(tmp_path), "--out", str(tmp_path / "out"))
-    assert result.exit_code == 2
-    assert "errand dataset render" in result.stderr

@@ -16,11 +16,12 @@ pytest.importorskip("onnx")
 from skills.detect.detector_file import load_model, regions_file
 from skills.detect.onnx_detector import OnnxDetector
 from skills.detect.training.labels import TrainingDataError
+from skills.detect.training.loop import CHECKPOINT
 from skills.detect.training.options import RefineOptions
 from skills.detect.training.refine import TABLE, refine
 from skills.detect.training.schedule import Budget, Schedule
 from skills.detect.training.together import Report
-from skills.detect.training.train import CHECKPOINT, MODEL
+from skills.detect.training.train import MODEL
 
 
 def write_split(folder: Path, split: str, count: int, names: tuple[str, ...] = CLASSES) -> None:

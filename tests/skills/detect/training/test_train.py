@@ -19,8 +19,9 @@ pytest.importorskip("onnx")
 from skills.detect.detector_file import load_model
 from skills.detect.training.canvases import CanvasOptions
 from skills.detect.training.labels import TrainingDataError
+from skills.detect.training.loop import CHECKPOINT
 from skills.detect.training.schedule import Budget, Phase, Schedule
-from skills.detect.training.train import CHECKPOINT, MODEL, Report, TrainOptions, train
+from skills.detect.training.train import MODEL, Report, TrainOptions, train
 from skills.detect.training.validate import examination
 
 NAMES = ("beer", "coke")

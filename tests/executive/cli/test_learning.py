@@ -8,8 +8,14 @@ from executive.cli import learning
 from executive.cli.entry import light_app
 
 
+@pytest.fixture(params=["train", "refine"])
+def command(request: pytest.FixtureRequest) -> str:
+    """Each of the commands that train a network."""
+    return str(request.param)
+
+
 def run(*words: str) -> Result:
-    return CliRunner().invoke(light_app(), ["dataset", "train", *words])
+    return CliRunner().invoke(light_app(), ["dataset", *words])
 
 
 @pytest.fixture
@@ -21,30 +27,32 @@ def data(tmp_path: Path) -> Path:
     return folder
 
 
-def test_without_torch_the_extra_is_named(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_torch_the_extra_is_named(
+    command: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(learning.importlib.util, "find_spec", lambda _name: None)
-    result = run("--data", str(data), "--out", str(tmp_path / "out"))
+    result = run(command, "--data", str(data), "--out", str(tmp_path / "out"))
     assert result.exit_code == 2
     assert "torch and onnx" in result.stderr
     assert "pip install '.[train]'" in result.stderr
 
 
-def test_a_folder_that_is_no_data_set_is_named(tmp_path: Path) -> None:
-    result = run("--data", str(tmp_path), "--out", str(tmp_path / "out"))
+def test_a_folder_that_is_no_data_set_is_named(command: str, tmp_path: Path) -> None:
+    result = run(command, "--data", str(tmp_path), "--out", str(tmp_path / "out"))
     assert result.exit_code == 2
     assert "train.json" in result.stderr
     assert "errand dataset render" in result.stderr
 
 
-def test_minutes_and_epochs_together_are_refused(data: Path, tmp_path: Path) -> None:
-    result = run("--data", str(data), "--out", str(tmp_path / "out"), "--minutes", "1", "--epochs", "1")
+def test_minutes_and_epochs_together_are_refused(command: str, data: Path, tmp_path: Path) -> None:
+    result = run(command, "--data", str(data), "--out", str(tmp_path / "out"), "--minutes", "1", "--epochs", "1")
     assert result.exit_code == 2
     assert "--minutes and --epochs" in result.stderr
 
 
-def test_a_training_that_is_there_already_is_not_overwritten(data: Path, tmp_path: Path) -> None:
+def test_a_training_that_is_there_already_is_not_overwritten(command: str, data: Path, tmp_path: Path) -> None:
     (tmp_path / "checkpoint.pt").write_bytes(b"kept")
-    result = run("--data", str(data), "--out", str(tmp_path))
+    result = run(command, "--data", str(data), "--out", str(tmp_path))
     assert result.exit_code == 2
     assert "--resume" in result.stderr
     assert (tmp_path / "checkpoint.pt").read_bytes() == b"kept"

@@ -37,6 +37,10 @@ def refine_command(
     rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = REGIONS_RATE,
     jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
+    start: Annotated[
+        Path | None,
+        typer.Option(help="A checkpoint of another training of the second network; its weights are taken over."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
     """Train the second network, which looks again at each place that the first one finds, and export it."""
@@ -54,6 +58,7 @@ def refine_command(
             seed=seed,
             processes=jobs or os.cpu_count() or 1,
             resume=resume,
+            start=start,
             schedule=Schedule(rate),
         )
         file, figures = _refined(options, console)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -90,15 +90,23 @@ class LearningState(Generic[Network]):
     def restore(self, file: Path) -> None:
         """Go on where a file left off. Raises TrainingDataError."""
         state = read_checkpoint(file)
-        try:
-            self.network.load_state_dict(state["network"])
-        except RuntimeError as error:
-            raise TrainingDataError(f"{file}: is a checkpoint of another network", mend=_WITHOUT) from error
+        self._take(state["network"], file)
         self.average.restore(state["average"])
         for optimiser, kept in zip(self.optimisers, state["optimisers"], strict=True):
             optimiser.load_state_dict(kept)
         self.progress = Progress(**state["progress"])
         self.course = Course.of(state["course"])
+
+    def start_from_checkpoint(self, file: Path) -> None:
+        """Take over a checkpoint's averaged weights; all else begins anew. Raises TrainingDataError."""
+        self._take(read_checkpoint(file)["average"]["network"], file)
+        self.average.network.load_state_dict(self.network.state_dict())
+
+    def _take(self, weights: Mapping[str, Any], file: Path) -> None:
+        try:
+            self.network.load_state_dict(weights)
+        except RuntimeError as error:
+            raise TrainingDataError(f"{file}: is a checkpoint of another network", mend=_WITHOUT) from error
 
 
 @dataclass
@@ -148,9 +156,9 @@ class Learner(LearningState[DetectorNetwork]):
         """
         if file.suffix == ONNX:
             take_over(self.network, file)
+            self.average.network.load_state_dict(self.network.state_dict())
         else:
-            self.network.load_state_dict(read_checkpoint(file)["average"]["network"])
-        self.average.network.load_state_dict(self.network.state_dict())
+            self.start_from_checkpoint(file)
 
 
 def without_learning_early(backbone: Backbone, average: Backbone, device: torch.device) -> Backbone:

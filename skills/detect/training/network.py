@@ -22,11 +22,15 @@ FIRST_SCORE: Final = 0.003
 
 @dataclass(frozen=True)
 class Widths:
-    """Channels after each halving of the picture, of the neck's levels and of the heads; depth of each block."""
+    """Channels after each halving of the picture, of the neck's levels and of the heads; depth of each block.
+
+    `residuals` are how many residual blocks of the full width follow at strides 16 and 32.
+    """
 
     stem: tuple[int, int] = (16, 32)
     levels: tuple[int, int, int] = (48, 96, 192)
     depths: tuple[int, int, int] = (2, 2, 2)
+    residuals: tuple[int, int] = (0, 0)
     neck: tuple[int, int, int] = (48, 64, 96)
     neck_depth: int = 1
     head_scores: int = 48
@@ -77,6 +81,26 @@ class CrossStage(nn.Module):
         return mixed
 
 
+class Residual(nn.Module):
+    """Two 3x3 convolutions added to the input, which it passes on unchanged until it has learnt something.
+
+    After He et al., "Deep Residual Learning" (2015); that the last normalisation begins at nought, after Goyal et al.,
+    "Accurate, Large Minibatch SGD" (2017).
+    """
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.first = ConvUnit(channels, channels, 3)
+        self.second = nn.Sequential(
+            nn.Conv2d(channels, channels, 3, 1, 1, bias=False), nn.BatchNorm2d(channels, eps=1e-3, momentum=0.03)
+        )
+        nn.init.zeros_(self.second[1].weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(N, C, H, W) to the same shape."""
+        return nn.functional.relu(x + self.second(self.first(x)))
+
+
 class PooledContext(nn.Module):
     """The highest values within 5, 9 and 13 cells beside the cell's own."""
 
@@ -105,9 +129,15 @@ class Backbone(nn.Module):
         depths = widths.depths
         self.stem = nn.Sequential(ConvUnit(3, first, 3, 2), ConvUnit(first, second, 3, 2))
         self.stage8 = nn.Sequential(ConvUnit(second, one, 3, 2), CrossStage(one, one, depths[0]))
-        self.stage16 = nn.Sequential(ConvUnit(one, two, 3, 2), CrossStage(two, two, depths[1]))
+        more16, more32 = widths.residuals
+        self.stage16 = nn.Sequential(
+            ConvUnit(one, two, 3, 2), CrossStage(two, two, depths[1]), *(Residual(two) for _ in range(more16))
+        )
         self.stage32 = nn.Sequential(
-            ConvUnit(two, three, 3, 2), CrossStage(three, three, depths[2]), PooledContext(three)
+            ConvUnit(two, three, 3, 2),
+            CrossStage(three, three, depths[2]),
+            PooledContext(three),
+            *(Residual(three) for _ in range(more32)),
         )
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -32,7 +32,10 @@ class TrainOptions:
 
 @dataclass(frozen=True)
 class RefineOptions:
-    """The same for the second network, which belongs to the first one's file `model`."""
+    """The same for the second network, which belongs to the first one's file `model`.
+
+    `start` names a checkpoint of such a training, of which the weights are taken over.
+    """
 
     data: Path
     model: Path
@@ -41,6 +44,7 @@ class RefineOptions:
     seed: int = 1
     processes: int = 1
     resume: bool = False
+    start: Path | None = None
     examined: int = 320
     batch: int = 64
     schedule: Schedule = field(default_factory=Schedule)

@@ -86,17 +86,23 @@ def _learn(options: RefineOptions, peers: Peers, device: torch.device, told: Tol
     learner = RegionLearner.new(len(names), options.seed, device)
     store = open_store(options.out / PICTURES, read_split(options.data, "train"))
     table = RegionTable.read(options.out / TABLE)
-    checkpoint = options.out / CHECKPOINT
-    if options.resume and checkpoint.is_file():
-        learner.restore(checkpoint)
-        learner.keep_early()
-    else:
-        feed = RegionFeed(table, store, options.seed, 0, 1)
-        size = options.batch
-        learner.start_from(options.out / MODEL, (feed.batch(k * size, size).chips for k in range(_SETTLED_BY)))
+    _begin(learner, options, RegionFeed(table, store, options.seed, 0, 1))
     feed = RegionFeed(table, store, options.seed, peers.rank, peers.count)
     exam = examination(options.data, "val", names, options.examined)
     Loop(_Regions(options, learner, peers, feed, exam), options.budget, peers, options.out, told).run()
+
+
+def _begin(learner: RegionLearner, options: RefineOptions, feed: RegionFeed) -> None:
+    """Give the learner the weights that it begins with; the same in all processes. Raises TrainingDataError."""
+    checkpoint, size = options.out / CHECKPOINT, options.batch
+    if options.resume and checkpoint.is_file():
+        learner.restore(checkpoint)
+        learner.keep_early()
+    elif options.start is not None:
+        learner.start_from_checkpoint(options.start)
+        learner.keep_early()
+    else:
+        learner.start_from(options.out / MODEL, (feed.batch(k * size, size).chips for k in range(_SETTLED_BY)))
 
 
 @dataclass(frozen=True)

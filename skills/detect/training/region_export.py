@@ -52,4 +52,5 @@ def export_regions(
         "regions": torch.full((2, 4), float(CHIP_PX)) * torch.tensor([0.2, 0.2, 0.8, 0.8]),
         "logits": torch.zeros((2, len(class_names))),
     }
-    write_onnx(model, example, file, {"format": REGIONS_FORMAT, "class_names": json.dumps(list(class_names)), **facts})
+    told = {"format": REGIONS_FORMAT, "class_names": json.dumps(list(class_names)), **facts}
+    write_onnx(model, example, file, told, compact=True)

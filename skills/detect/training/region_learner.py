@@ -42,12 +42,12 @@ class RegionLearner(LearningState[RegionNetwork]):
     def start_from(self, first: Path, chips: Iterable[Tensor]) -> None:
         """Take over the weights of the first network's ONNX file, with statistics of chips (N, 3, 128, 128).
 
-        Raises TrainingDataError.
+        What the first network has not, stays as it is. Raises TrainingDataError.
         """
         detector = DetectorNetwork(self.network.classes)
         take_over(detector, first)
         settle(detector, chips)
-        self.network.detector.load_state_dict(detector.state_dict())
+        self.network.detector.load_state_dict(detector.state_dict(), strict=False)
         self.average.network.load_state_dict(self.network.state_dict())
         self.keep_early()
 

@@ -2,7 +2,8 @@
 
 It is the first network once more, with weights of its own that begin with the first one's, on a chip: of all its cells
 the one counts that is surest of a box about the place's. What all of its coarsest level knows is added, and the
-first one's opinion, so that it begins with both.
+first one's opinion, so that it begins with both. On the coarser levels it has more layers than the first, which add
+nothing at the beginning: on a chip they cost little.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from skills.detect.training.overlaps import overlap
 
 __all__ = ["RegionNetwork"]
 
+_WIDTHS = Widths(residuals=(3, 2))
 _CELLS_8, _CELLS_32 = CHIP_PX // 8, CHIP_PX // 32
 _SQUEEZED, _JOINED = 32, 128
 _MOST_LOGIT = 8.0
@@ -26,9 +28,8 @@ _SIDES_SCALE = 0.1
 class RegionNetwork(nn.Module):
     """Chips (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them and first logits (N, K) to logits and better boxes."""
 
-    def __init__(self, classes: int, widths: Widths | None = None) -> None:
+    def __init__(self, classes: int, widths: Widths = _WIDTHS) -> None:
         super().__init__()
-        widths = widths or Widths()
         self.classes = classes
         self.detector = DetectorNetwork(classes, widths)
         self.place = nn.Conv2d(1, widths.levels[0], 1, bias=False)

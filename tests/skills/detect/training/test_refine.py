@@ -10,18 +10,19 @@ import pytest
 from random_networks import random_network
 from tiny_detector import CLASSES, picture_of, write_model
 
-pytest.importorskip("torch")
+torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
-from skills.detect.detector_file import load_model, regions_file
-from skills.detect.onnx_detector import OnnxDetector
-from skills.detect.training.labels import TrainingDataError
-from skills.detect.training.loop import CHECKPOINT
-from skills.detect.training.options import RefineOptions
-from skills.detect.training.refine import TABLE, refine
-from skills.detect.training.schedule import Budget, Schedule
-from skills.detect.training.together import Report
-from skills.detect.training.train import MODEL
+from skills.detect.detector_file import load_model, regions_file  # noqa: E402
+from skills.detect.onnx_detector import OnnxDetector  # noqa: E402
+from skills.detect.training.labels import TrainingDataError  # noqa: E402
+from skills.detect.training.learner import read_checkpoint  # noqa: E402
+from skills.detect.training.loop import CHECKPOINT  # noqa: E402
+from skills.detect.training.options import RefineOptions  # noqa: E402
+from skills.detect.training.refine import TABLE, refine  # noqa: E402
+from skills.detect.training.schedule import Budget, Schedule  # noqa: E402
+from skills.detect.training.together import Report  # noqa: E402
+from skills.detect.training.train import MODEL  # noqa: E402
 
 
 def write_split(folder: Path, split: str, count: int, names: tuple[str, ...] = CLASSES) -> None:
@@ -80,6 +81,17 @@ def test_it_goes_on_where_it_stood(options: RefineOptions) -> None:
     told = list[Report]()
     refine(replace(options, budget=Budget(pictures=16), resume=True), told.append)
     assert [report.steps for report in told if report.figures is not None] == [3, 4]
+
+
+def test_weights_of_another_training_are_taken_over(options: RefineOptions, tmp_path: Path) -> None:
+    refine(options, lambda _: None)
+    budget, start = Budget(pictures=4), options.out / CHECKPOINT
+    refine(replace(options, out=tmp_path / "next", budget=budget, start=start, schedule=Schedule(0.0)), lambda _: None)
+    before, after = (read_checkpoint(out / CHECKPOINT) for out in (options.out, tmp_path / "next"))
+    assert after["progress"]["steps"] == 1
+    weight = "scores.weight"
+    assert before["average"]["network"][weight].abs().max() > 0
+    assert torch.equal(before["average"]["network"][weight], after["network"][weight])
 
 
 def test_a_network_of_other_classes_is_refused(options: RefineOptions) -> None:

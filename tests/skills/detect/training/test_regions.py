@@ -1,5 +1,6 @@
 """The parts of the second network's training; skipped without torch."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from skills.detect.regions import CHIP_PX  # noqa: E402
 from skills.detect.scales import halved  # noqa: E402
 from skills.detect.training.export import export  # noqa: E402
 from skills.detect.training.labels import Labels, LearningPicture, TrainingDataError  # noqa: E402
+from skills.detect.training.learner import Learner  # noqa: E402
+from skills.detect.training.network import Residual  # noqa: E402
 from skills.detect.training.peers import Peers  # noqa: E402
 from skills.detect.training.region_chips import RegionFeed  # noqa: E402
 from skills.detect.training.region_export import export_regions  # noqa: E402
@@ -124,6 +127,13 @@ def test_a_fresh_network_says_the_mean_of_what_the_first_one_said_and_sees_in_th
     assert torch.allclose(found, (boxes + seen_boxes) / 2, atol=1e-3)
 
 
+def test_a_residual_block_says_nothing_until_it_has_learnt() -> None:
+    block, given = Residual(4).train(), torch.rand(2, 4, 8, 8)
+    assert torch.equal(block(given), given)
+    block(given).square().sum().backward()
+    assert block.second[1].weight.grad.abs().min() > 0
+
+
 # cell                  score  overlap  product
 # on the box             0.5    1.0      0.5
 # surer, half beside     0.7    1/3      0.23   surest of those that share less
@@ -179,6 +189,7 @@ def unsettled(classes: int) -> RegionNetwork:
         if isinstance(module, torch.nn.BatchNorm2d):
             module.running_mean.normal_(0.0, 0.1)
             module.running_var.uniform_(0.5, 2.0)
+            torch.nn.init.uniform_(module.weight, 0.5, 1.5)
         if isinstance(module, torch.nn.Linear):
             torch.nn.init.normal_(module.weight, 0.0, 0.05)
     return network.eval()
@@ -223,9 +234,17 @@ def test_learning_begins_with_the_first_networks_weights_and_keeps_its_early_lay
     assert not torch.equal(before["detector.neck.down8.mix.0.weight"], after["detector.neck.down8.mix.0.weight"])
 
 
-def test_a_checkpoint_of_the_other_network_is_named(tmp_path: Path) -> None:
-    from skills.detect.training.learner import Learner
+def test_the_second_networks_file_holds_its_weights_in_16_bits(tmp_path: Path) -> None:
+    network = unsettled(len(CLASSES))
+    export_regions(network, tmp_path / "r.onnx", class_names=CLASSES, facts={})
+    weights = sum(weight.numel() for weight in network.parameters())
+    assert 2 * weights < (tmp_path / "r.onnx").stat().st_size < 2.2 * weights
 
+
+@pytest.mark.parametrize("go_on", [RegionLearner.restore, RegionLearner.start_from_checkpoint])
+def test_a_checkpoint_of_the_other_network_is_named(
+    tmp_path: Path, go_on: Callable[[RegionLearner, Path], None]
+) -> None:
     Learner.new(len(CLASSES), 1, CPU).save(tmp_path / "checkpoint.pt")
     with pytest.raises(TrainingDataError, match="another network"):
-        RegionLearner.new(len(CLASSES), 1, CPU).restore(tmp_path / "checkpoint.pt")
+        go_on(RegionLearner.new(len(CLASSES), 1, CPU), tmp_path / "checkpoint.pt")

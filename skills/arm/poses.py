@@ -61,6 +61,13 @@ def close_stations(p_BS: FloatArray, p_BT: FloatArray, shift_rad: float = 0.0) -
     ]
 
 
+def stations_beside(p_BC: FloatArray, p_BT: FloatArray, aside_m: float = 0.06) -> list[FloatArray]:
+    """Camera places beside and above p_BC, as seen when looking from there at p_BT."""
+    ahead = (p_BT - p_BC)[:2] / max(float(np.linalg.norm((p_BT - p_BC)[:2])), 1e-6)
+    left = np.array([-ahead[1], ahead[0], 0.0])
+    return [p_BC + aside_m * step for step in (left, -left, _UP, left - _UP, -left - _UP)]
+
+
 def carry_configuration(scene: ArmScene, R_BH: RotationMatrix, q_near_rad: FloatArray) -> FloatArray:
     """Arm angles that hold the hand low over the body, the thing as upright as in R_BH, turned to the front.
 

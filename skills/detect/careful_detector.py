@@ -111,8 +111,11 @@ AS_IT_IS_AND_OTHERWISE: Final = (
 class LooksCarefully(Protocol):
     """A detector that can take more time for one picture."""
 
-    def detect_carefully(self, picture: Picture) -> tuple[Detection, ...]:
-        """What is in a picture, the surest first. Raises ValueError for what is no picture."""
+    def detect_carefully(self, picture: Picture, least_score: float | None = None) -> tuple[Detection, ...]:
+        """What is in a picture, the surest first, from the detector's usual score on, or from `least_score` on.
+
+        Raises ValueError for what is no picture.
+        """
 
 
 @dataclass(frozen=True)
@@ -131,16 +134,20 @@ class CarefulDetector:
         """What is in each picture at one look."""
         return self.detector.detect(pictures)
 
-    def detect_carefully(self, picture: Picture) -> tuple[Detection, ...]:
-        """What the looks at a picture agree on. Raises ValueError for what is no picture."""
+    def detect_carefully(self, picture: Picture, least_score: float | None = None) -> tuple[Detection, ...]:
+        """What the looks at a picture agree on, from the threshold or from `least_score` on.
+
+        Raises ValueError for what is no picture.
+        """
         check_picture(picture)
         options = self.detector.options
+        threshold = options.threshold if least_score is None else least_score
         sensitive = OnnxDetector(
             self.detector.model, replace(options, threshold=_LEAST_SCORE, rival_threshold=_LEAST_SCORE)
         )
         looks = sensitive.detect([variant.of(picture) for variant in self.variants])
-        fused = self._fused(looks, picture.shape).from_score(min(options.threshold, options.rival_threshold))
-        return told(fused, self.class_names, options.threshold, options.suppression)
+        fused = self._fused(looks, picture.shape).from_score(min(threshold, options.rival_threshold))
+        return told(fused, self.class_names, threshold, options.suppression)
 
     def _fused(self, looks: Sequence[Sequence[Detection]], shape: Sequence[int]) -> Candidates:
         """One candidate for each thing and class."""

@@ -1,6 +1,7 @@
 """Pictures looked through as a detector knows the world: those that stand on their heads are turned first.
 
 Spot's right camera hangs upside down. Turned, it shows the detector's first network 91 % of its people instead of 74 %.
+What is dim is made brighter, as a camera's automatic exposure would.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,28 +18,29 @@ from skills.api import Detection, Detector
 from skills.detect.careful_detector import LooksCarefully
 from skills.robot import Image
 
-__all__ = ["DETECTION_LATENCY_S", "detections_in", "is_dark", "on_its_head", "seen_in_grey"]
+__all__ = ["DETECTION_LATENCY_S", "brightened", "detections_in", "is_dark", "on_its_head", "seen_in_grey"]
 
 DETECTION_LATENCY_S: Final = 0.3
 """Thirteen looks at a picture, and where the things are, on two processor cores."""
 _DARK_MEAN, _DARK_SPREAD = 6.0, 4.0
+_DIM_MEAN, _BRIGHT_MEAN, _MOST_GAIN = 70.0, 100.0, 8.0
 _DOWN_IS_UP = 0.5
 
 Picture = NDArray[np.uint8]
 Found = tuple[Detection, ...]
 
 
-def detections_in(detector: Detector, image: Image) -> Found:
-    """What the detector finds in a picture, looking carefully if it can."""
-    picture = _upright(image, image.grey if image.colour is None else image.colour)
+def detections_in(detector: Detector, image: Image, least_score: float | None = None) -> Found:
+    """What the detector finds in a picture, looking carefully if it can; then from `least_score` on, where given."""
+    picture = _to_be_seen(image, image.grey if image.colour is None else image.colour)
     if isinstance(detector, LooksCarefully):
-        return _turned_back(image, detector.detect_carefully(picture))
+        return _turned_back(image, detector.detect_carefully(picture, least_score))
     return _turned_back(image, detector.detect([picture])[0])
 
 
 def seen_in_grey(detector: Detector, images: Sequence[Image]) -> list[Found]:
     """What the detector finds in each grey picture at one look."""
-    found = detector.detect([_upright(image, image.grey) for image in images])
+    found = detector.detect([_to_be_seen(image, image.grey) for image in images])
     return [_turned_back(image, ones) for image, ones in zip(images, found, strict=True)]
 
 
@@ -52,8 +55,19 @@ def on_its_head(image: Image) -> bool:
     return bool(R_OC[2, 1] > _DOWN_IS_UP)
 
 
-def _upright(image: Image, picture: Picture) -> Picture:
-    return np.ascontiguousarray(picture[::-1, ::-1]) if on_its_head(image) else picture
+def brightened(picture: Picture) -> Picture:
+    """A picture (H, W) or (H, W, 3) whose mean is low, up to eight times as bright; any other as it is."""
+    mean = float(picture.mean())
+    if mean >= _DIM_MEAN:
+        return picture
+    gain = min(_BRIGHT_MEAN / max(mean, 1.0), _MOST_GAIN)
+    return np.asarray(cv2.convertScaleAbs(picture, alpha=gain), dtype=np.uint8)
+
+
+def _to_be_seen(image: Image, picture: Picture) -> Picture:
+    """The picture upright and bright enough."""
+    upright = np.ascontiguousarray(picture[::-1, ::-1]) if on_its_head(image) else picture
+    return brightened(upright)
 
 
 def _turned_back(image: Image, found: Found) -> Found:

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 from skills.api import Cause, Detection, LocalisationEstimate, ObjectObservation, Running, Succeeded, Surface
 from skills.arm.arm_skill import ArmSkill, hand_camera_in_hand
 from skills.arm.collision import ArmScene
-from skills.arm.poses import close_stations, look_configuration, overview_stations
+from skills.arm.poses import close_stations, look_configuration, overview_stations, stations_beside
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.attention import unnamed
 from skills.detect.attributes import known_attributes, shows
@@ -30,7 +30,7 @@ from skills.detect.messages import (
 from skills.detect.seeing import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.detect.sighting import FLOOR, Sighting, observation, sightings
 from skills.detect.surface_view import Cluster, view_surface
-from skills.detect.tracks import Track, TrackBook
+from skills.detect.tracks import FAINT_SCORE, SURE_SCORE, Track, TrackBook
 from skills.detect.words import counted, describe, surface_names, wanted
 from skills.robot import FloatArray, Image
 
@@ -64,7 +64,10 @@ class DetectInputs:
 
 @dataclass(frozen=True)
 class Look:
-    """One picture, where the robot was, what was found in it, with and without a place, and what stands there."""
+    """One picture, where the robot was, what was found in it, with and without a place, and what stands there.
+
+    What was found may be faint.
+    """
 
     image: Image
     localisation: LocalisationEstimate
@@ -191,7 +194,10 @@ class Detect(ArmSkill[DetectInputs]):
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
             p_BO, shifts_rad = self._from_elsewhere(track)
             try:
-                yield from self.look(inputs, X_HC, p_BO, shifts_rad[tries - 1], close=close)
+                if tries <= len(shifts_rad):
+                    yield from self.look(inputs, X_HC, p_BO, shifts_rad[tries - 1], close=close)
+                else:
+                    yield from self.look(inputs, X_HC, p_BO, 0.0, beside_B=self.X_WB().inverse() @ track.eyes_W[-1])
             except SkillFailure as failure:
                 if failure.cause is not Cause.PLANNING:
                     raise
@@ -209,7 +215,7 @@ class Detect(ArmSkill[DetectInputs]):
         if self._has_enough(inputs) or len(self._tried) > _CANDIDATES + inputs.count:
             return None
         open_ones = (t for t in self._matching(inputs) if not t.confirmed)
-        return next((t for t in open_ones if self._tried.get(t.number, 0) < len(_CONFIRM_SHIFTS_RAD)), None)
+        return next((t for t in open_ones if self._tried.get(t.number, 0) < _tries_for(t)), None)
 
     def _found(self, inputs: DetectInputs) -> list[Track]:
         """The confirmed ones, those seen last first."""
@@ -232,13 +238,24 @@ class Detect(ArmSkill[DetectInputs]):
         return inputs.floor and track.latest.surface == FLOOR and near
 
     def look(
-        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, shift_rad: float, *, close: bool = False
+        self,
+        inputs: DetectInputs,
+        X_HC: RigidTransform,
+        p_BT: FloatArray,
+        shift_rad: float,
+        *,
+        close: bool = False,
+        beside_B: FloatArray | None = None,
     ) -> Routine[Look]:
-        """Point the camera at p_BT, from a little aside when shift_rad is not 0, and take in what is seen."""
+        """Point the camera at p_BT, from a little aside when shift_rad is not 0, and take in what is seen.
+
+        With `beside_B` from right beside that point.
+        """
         message = f"looking for {wanted(inputs.classes, inputs.attributes)}"
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
             near = close_stations(self.model.p_BS, p_BT, shift_rad) if close else []
+            near = near if beside_B is None else stations_beside(beside_B, p_BT)
             far = overview_stations(self.model, p_BT, shift_rad)
             if abs(shift_rad) >= max(_AROUND_RAD):
                 far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
@@ -250,7 +267,7 @@ class Detect(ArmSkill[DetectInputs]):
         place, detector = self.context.localiser.estimate(), self.context.detector
 
         def examine() -> Look:
-            found = detections_in(detector, image)
+            found = detections_in(detector, image, FAINT_SCORE)
             views = (view_surface(image, place.X_WO, surface) for surface in inputs.surfaces)
             clusters = tuple(cluster for view in views if view is not None for cluster in view.clusters)
             return Look(image, place, found, sightings(image, place, found, inputs.surfaces), clusters)
@@ -264,7 +281,8 @@ class Detect(ArmSkill[DetectInputs]):
         if not is_dark(look.image):
             self._coverage.add(look.image, X_WO)
         tracks = self._book.update(look.sightings, lambda t: in_plain_view(look.image, X_WO, t.position_W))
-        self.context.publish("detections", detections_message(look.image, look.detections, look.sightings))
+        sure = [detection for detection in look.detections if detection.score >= SURE_SCORE]
+        self.context.publish("detections", detections_message(look.image, sure, look.sightings))
         self.context.publish("tracks", tracks_message(self.context, tracks))
         self._clusters += look.clusters
         self._last = look
@@ -301,6 +319,11 @@ class Detect(ArmSkill[DetectInputs]):
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
     """A track as an observation: its fused place, the rest from its last sighting."""
     return observation(replace(track.latest, position_W=track.position_W), attributes)
+
+
+def _tries_for(track: Track) -> int:
+    """How often to look at a track again: once more from nearby where neither side showed its place."""
+    return len(_CONFIRM_SHIFTS_RAD) + (track.views == 1 and track.missed == 0)
 
 
 def _bearing(p_B: FloatArray) -> float:

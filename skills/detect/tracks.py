@@ -1,7 +1,8 @@
 """Things seen over several views: one track for each, with its place, its class and how sure it is that it is there.
 
 A sighting belongs to the track that it fits by place (Mahalanobis distance) and class; places are fused as information
-(inverse covariances add). A track that a picture should show and that is not detected there loses belief.
+(inverse covariances add). A track that a picture should show and that is not detected there loses belief. What is seen
+faintly begins no track, but supports a little one that a surer sighting began.
 """
 
 from __future__ import annotations
@@ -21,10 +22,14 @@ GATE = 16.3
 """Squared Mahalanobis distance within which 99.9 % of the sightings of a thing lie."""
 DIFFERENT_PLACES_M = 0.03
 CONFIRMED_BELIEF = 0.6
+SURE_SCORE = 0.5
+FAINT_SCORE = 0.3
+"""Scores from which on a sighting begins a track, or supports one."""
 _JITTER_M = 0.012
 _NEAR_M = 0.03
 _CONFUSED = 0.02
 _DETECTED_IF_THERE, _DETECTED_IF_NOT = 0.85, 0.12
+_FAINT_IF_THERE, _FAINT_IF_NOT = 0.13, 0.10
 _FIRST_BELIEF, _LEAST_BELIEF = 0.5, 0.05
 
 
@@ -90,14 +95,14 @@ class TrackBook:
     def update(self, seen: Sequence[Sighting], in_plain_view: Callable[[Track], bool]) -> tuple[Track, ...]:
         """Take in all sightings of one picture; `in_plain_view` tells of a track whether the picture should show it."""
         before, seen = tuple(self._tracks.values()), distinct(seen)
-        pairs = _matched(before, seen)
+        pairs = _matched_surest_first(before, seen)
         for track in before:
             if track.number not in pairs.values() and in_plain_view(track):
                 self._miss(track)
         for k, sighting in enumerate(seen):
             if k in pairs:
                 self._tracks[pairs[k]] = _fused(self._tracks[pairs[k]], sighting, self._names)
-            else:
+            elif sighting.detection.score >= SURE_SCORE:
                 self._begin(sighting)
         return self.snapshot()
 
@@ -138,6 +143,18 @@ def _is_same_thing(one: Sighting, other: Sighting) -> bool:
     return one.class_name != other.class_name and apart_m < _NEAR_M
 
 
+def _matched_surest_first(tracks: Sequence[Track], seen: Sequence[Sighting]) -> dict[int, int]:
+    """The same as `_matched`, in which faint sightings are given what the sure ones leave."""
+    sure, faint = (
+        [k for k, s in enumerate(seen) if (s.detection.score >= SURE_SCORE) is wanted] for wanted in (True, False)
+    )
+    pairs: dict[int, int] = {}
+    for rows in (sure, faint):
+        free = [track for track in tracks if track.number not in pairs.values()]
+        pairs |= {rows[k]: number for k, number in _matched(free, [seen[k] for k in rows]).items()}
+    return pairs
+
+
 def _matched(tracks: Sequence[Track], seen: Sequence[Sighting]) -> dict[int, int]:
     """Which sighting (its index) belongs to which track (its number): the nearest pairs first, one to one."""
     options = [(distance2(track, s), k, track.number) for track in tracks for k, s in enumerate(seen) if fits(track, s)]
@@ -170,18 +187,20 @@ def _spread(sighting: Sighting) -> FloatArray:
 
 
 def _fused(track: Track, sighting: Sighting, names: Sequence[str]) -> Track:
-    """The track with one more sighting."""
+    """The track with one more sighting. A faint one changes nothing of what was seen last or best."""
+    sure = sighting.detection.score >= SURE_SCORE
+    likely = (_DETECTED_IF_THERE, _DETECTED_IF_NOT) if sure else (_FAINT_IF_THERE, _FAINT_IF_NOT)
     track_information, information = np.linalg.inv(track.covariance), np.linalg.inv(_spread(sighting))
     covariance = np.linalg.inv(track_information + information)
     position = covariance @ (track_information @ track.position_W + information @ sighting.position_W)
     return replace(
         track,
         classes=_classes(track.classes, sighting),
-        belief=_updated(track.belief, _DETECTED_IF_THERE, _DETECTED_IF_NOT),
+        belief=_updated(track.belief, *likely),
         position_W=position,
         covariance=covariance,
         eyes_W=_with_eye(track.eyes_W, _point(sighting.eye_W)),
-        latest=sighting,
+        latest=sighting if sure else track.latest,
         best=max(track.best, sighting, key=lambda one: one.detection.score),
     )
 

@@ -19,9 +19,9 @@ VARIANTS = (Variant(), Variant(mirrored=True), Variant(scale=0.5))
 def looked(tmp_path, monkeypatch):
     model = load_detector(write_model(tmp_path / "tiny.onnx")).model
 
-    def look(*answers, variants=VARIANTS):
+    def look(*answers, variants=VARIANTS, least_score=None):
         monkeypatch.setattr(OnnxDetector, "detect", lambda self, pictures: [tuple(found) for found in answers])
-        return CarefulDetector(OnnxDetector(model), variants).detect_carefully(SEEN)
+        return CarefulDetector(OnnxDetector(model), variants).detect_carefully(SEEN, least_score)
 
     return look
 
@@ -32,6 +32,12 @@ def test_what_all_looks_tell_has_their_mean_score_and_place(looked):
     )
     assert (found.class_name, found.score) == ("hammer", pytest.approx(0.7))
     assert found.box == pytest.approx(BOX)
+
+
+@pytest.mark.parametrize(("least_score", "told"), [(None, 0), (0.3, 1)])
+def test_what_is_less_sure_is_told_when_asked_for(looked, least_score, told):
+    each = ([Detection("hammer", 0.4, box)] for box in (BOX, MIRRORED, SMALL))
+    assert len(looked(*each, least_score=least_score)) == told
 
 
 def test_what_most_looks_take_for_something_else_is_that(looked):

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from table_scene import CAMERA, COKE, TABLE, scene
 
 from skills.arm.poses import camera_pose
-from skills.detect.seeing import detections_in, is_dark, on_its_head, seen_in_grey
+from skills.detect.seeing import brightened, detections_in, is_dark, on_its_head, seen_in_grey
 from skills.robot import FrameTree
 from skills.testing.detector import PlainColours
 
@@ -78,3 +78,26 @@ def test_a_dim_picture_with_something_in_it_is_not_dark():
     grey = np.zeros_like(image.grey)
     grey[100:140, 100:160] = 60
     assert not is_dark(replace(image, grey=grey))
+
+
+# mean   as bright as       ways
+# 120    120                left as it is
+# 20     100                five times
+# 5      40                 eight times, and no more
+@pytest.mark.parametrize(("mean", "shown"), [(120, 120), (20, 100), (5, 40)])
+def test_a_dim_picture_is_made_brighter(mean, shown):
+    assert brightened(np.full((4, 4, 3), mean, np.uint8)).mean() == shown
+
+
+def test_what_is_bright_in_a_dim_picture_stays_white():
+    picture = np.full((10, 10), 10, np.uint8)
+    picture[0, 0] = 200
+    assert brightened(picture)[0, 0] == 255
+
+
+def test_the_detector_is_shown_dim_pictures_brighter():
+    detector, image = Recorder(), rolled(0.0)
+    dim = replace(image, colour=image.colour // 8)
+    detections_in(detector, dim)
+    (shown,) = detector.shown
+    assert shown.mean() > 1.5 * dim.colour.mean()

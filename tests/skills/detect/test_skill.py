@@ -148,6 +148,17 @@ def test_what_something_hides_is_looked_at_from_the_side():
     assert step.outputs["observation"].position_W == pytest.approx((hidden.x, hidden.y, 0.8075), abs=0.03)
 
 
+def test_what_is_seen_from_one_side_only_is_confirmed_from_right_beside_there():
+    wall = [Can(1.0, y, 0.05, 0.32, GREY) for y in (-0.08, 0.0, 0.08)]
+    hidden = Can(1.2, 0.05, 0.033, 0.115, RED)
+    log = []
+    step = outcome(Detect(context_of(ScriptedRobot(things=[*wall, hidden]), log)), DetectInputs(("coke",), (TABLE,)))
+    assert isinstance(step, Succeeded), step
+    assert step.outputs["observation"].position_W == pytest.approx((hidden.x, hidden.y, 0.8075), abs=0.03)
+    # seen when looked at from the side, hidden from both places between, seen again beside the first one
+    assert [bool(m["detections"]) for topic, m in log if topic == "detections"][-4:] == [True, False, False, True]
+
+
 def test_without_light_and_depth_nothing_was_looked_at():
     robot = ScriptedRobot()
     failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.EXECUTION, "it is dark")

@@ -136,6 +136,35 @@ def test_a_snapshot_does_not_change_afterwards():
         before[0].belief = 1.0
 
 
+def test_what_is_seen_faintly_begins_no_track():
+    assert book_of([sighting(score=0.45)]).snapshot() == ()
+
+
+# pictures, then: believed (at first 0.5; once missed 0.15)   views  confirmed
+# sure, faint            0.57   2  no
+# sure, faint, faint     0.63   3  yes
+# sure, faint, sure      0.90   3  yes
+@pytest.mark.parametrize(
+    ("scores", "belief", "confirmed"),
+    [((0.6, 0.4), 0.57, False), ((0.6, 0.4, 0.4), 0.63, True), ((0.6, 0.4, 0.6), 0.9, True)],
+)
+def test_a_faint_sighting_supports_a_track_a_little(scores, belief, confirmed):
+    pictures = [[sighting(score=score, eye=(0.0, 0.1 * k, 1.0))] for k, score in enumerate(scores)]
+    (track,) = book_of(*pictures).snapshot()
+    assert track.belief == pytest.approx(belief, abs=0.005)
+    assert (track.views, track.confirmed) == (len(scores), confirmed)
+
+
+def test_a_faint_sighting_is_not_told_as_the_last_one():
+    (track,) = book_of([sighting(score=0.8, stamp=1.0)], [sighting(score=0.4, stamp=2.0)]).snapshot()
+    assert (track.last_seen_s, track.latest.detection.score, track.missed) == (1.0, 0.8, 0)
+
+
+def test_a_faint_sighting_takes_no_track_from_a_sure_one():
+    (track,) = book_of([sighting(score=0.8)], [sighting(1.0, score=0.4), sighting(1.02, score=0.7)]).snapshot()
+    assert track.latest.detection.score == 0.7
+
+
 def test_the_order_of_the_sightings_of_a_picture_does_not_matter():
     both = [sighting(1.0), sighting(1.2)]
     places = [sorted(t.position_W[0] for t in book_of(both, seen).snapshot()) for seen in (both, both[::-1])]

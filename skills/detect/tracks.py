@@ -28,9 +28,12 @@ FAINT_SCORE = 0.3
 _JITTER_M = 0.012
 _NEAR_M = 0.03
 _CONFUSED = 0.02
-_DETECTED_IF_THERE, _DETECTED_IF_NOT = 0.85, 0.12
-_FAINT_IF_THERE, _FAINT_IF_NOT = 0.13, 0.10
-_FIRST_BELIEF, _LEAST_BELIEF = 0.5, 0.05
+_MISSED_IF_THERE, _MISSED_IF_NOT = 0.15, 0.88
+_SEEN_BY_CHANCE = 0.25
+"""The share of things among all that is seen at least faintly."""
+_NEW_IN_A_VIEW = 0.5
+"""How much of what a view tells the others have not told yet; 1 were views that err independently."""
+_MOST_SURE, _LEAST_BELIEF = 0.97, 0.05
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ class TrackBook:
         self._tracks[self._count] = Track(
             number=self._count,
             classes=_classes(even, sighting),
-            belief=_FIRST_BELIEF,
+            belief=min(sighting.detection.score, _MOST_SURE),
             position_W=sighting.position_W,
             covariance=_spread(sighting),
             eyes_W=(eye,),
@@ -122,7 +125,7 @@ class TrackBook:
         )
 
     def _miss(self, track: Track) -> None:
-        belief = _updated(track.belief, 1.0 - _DETECTED_IF_THERE, 1.0 - _DETECTED_IF_NOT)
+        belief = _updated(track.belief, _MISSED_IF_THERE / _MISSED_IF_NOT)
         if belief < _LEAST_BELIEF:
             del self._tracks[track.number]
         else:
@@ -189,14 +192,13 @@ def _spread(sighting: Sighting) -> FloatArray:
 def _fused(track: Track, sighting: Sighting, names: Sequence[str]) -> Track:
     """The track with one more sighting. A faint one changes nothing of what was seen last or best."""
     sure = sighting.detection.score >= SURE_SCORE
-    likely = (_DETECTED_IF_THERE, _DETECTED_IF_NOT) if sure else (_FAINT_IF_THERE, _FAINT_IF_NOT)
     track_information, information = np.linalg.inv(track.covariance), np.linalg.inv(_spread(sighting))
     covariance = np.linalg.inv(track_information + information)
     position = covariance @ (track_information @ track.position_W + information @ sighting.position_W)
     return replace(
         track,
         classes=_classes(track.classes, sighting),
-        belief=_updated(track.belief, *likely),
+        belief=_updated(track.belief, _evidence(sighting)),
         position_W=position,
         covariance=covariance,
         eyes_W=_with_eye(track.eyes_W, _point(sighting.eye_W)),
@@ -215,10 +217,22 @@ def _classes(before: Mapping[str, float], sighting: Sighting) -> Mapping[str, fl
     return MappingProxyType({name: max(value / total, 1e-3) for name, value in raw.items()})
 
 
-def _updated(belief: float, if_there: float, if_not: float) -> float:
-    """Bayes' rule for something that is there or not."""
-    there, nothing = belief * if_there, (1.0 - belief) * if_not
-    return there / (there + nothing)
+def _evidence(sighting: Sighting) -> float:
+    """How much likelier a sighting is of a thing than of nothing.
+
+    Scores are taken for the shares of sightings that are right, as they are about (docs/detector.md).
+    """
+    return (_odds(min(sighting.detection.score, _MOST_SURE)) / _odds(_SEEN_BY_CHANCE)) ** _NEW_IN_A_VIEW
+
+
+def _updated(belief: float, likelier: float) -> float:
+    """Bayes' rule for something that is there or not, by how much likelier what is seen is when it is there."""
+    odds = _odds(belief) * likelier
+    return odds / (1.0 + odds)
+
+
+def _odds(probability: float) -> float:
+    return probability / (1.0 - probability)
 
 
 def _with_eye(

@@ -95,15 +95,20 @@ def test_a_class_that_was_only_likely_at_first_may_win():
 
 
 def test_what_should_be_seen_again_and_is_not_loses_belief_and_is_forgotten():
-    beliefs = [t.belief for n in range(1, 4) for t in book_of([sighting()], *[[]] * n).snapshot()]
-    assert beliefs == sorted(beliefs, reverse=True)
-    assert all(belief < 0.5 for belief in beliefs)
-    assert book_of([sighting()], *[[]] * 4).snapshot() == ()
+    # odds 9 of a score of 0.9, times 0.15 / 0.88 for each picture that should show it
+    beliefs = [t.belief for n in range(3) for t in book_of([sighting(score=0.9)], *[[]] * n).snapshot()]
+    assert beliefs == pytest.approx([0.9, 0.605, 0.207], abs=0.001)
+    assert book_of([sighting(score=0.9)], *[[]] * 3).snapshot() == ()
+
+
+@pytest.mark.parametrize("score", [0.5, 0.7, 0.9])
+def test_what_was_seen_once_is_there_as_likely_as_its_score_says(score):
+    assert book_of([sighting(score=score)]).snapshot()[0].belief == pytest.approx(score)
 
 
 def test_what_is_out_of_view_keeps_its_belief():
     (track,) = book_of([sighting()], [], [], in_view=False).snapshot()
-    assert (track.belief, track.missed) == (0.5, 0)
+    assert (track.belief, track.missed) == (0.9, 0)
 
 
 def test_what_was_taken_for_something_else_when_last_seen_is_not_confirmed():
@@ -140,13 +145,14 @@ def test_what_is_seen_faintly_begins_no_track():
     assert book_of([sighting(score=0.45)]).snapshot() == ()
 
 
-# pictures, then: believed (at first 0.5; once missed 0.15)   views  confirmed
-# sure, faint            0.57   2  no
-# sure, faint, faint     0.63   3  yes
-# sure, faint, sure      0.90   3  yes
+# scores           odds: s / (1 - s), then times the root of that over those of 0.25    belief  views  confirmed
+# 0.5, 0.3         1 x 1.134                                                           0.53    2      no
+# 0.5, 0.4         1 x 1.414                                                           0.59    2      no
+# 0.5, 0.5         1 x 1.732                                                           0.63    2      yes
+# 0.6, 0.4         1.5 x 1.414                                                         0.68    2      yes
 @pytest.mark.parametrize(
     ("scores", "belief", "confirmed"),
-    [((0.6, 0.4), 0.57, False), ((0.6, 0.4, 0.4), 0.63, True), ((0.6, 0.4, 0.6), 0.9, True)],
+    [((0.5, 0.3), 0.53, False), ((0.5, 0.4), 0.59, False), ((0.5, 0.5), 0.63, True), ((0.6, 0.4), 0.68, True)],
 )
 def test_a_faint_sighting_supports_a_track_a_little(scores, belief, confirmed):
     pictures = [[sighting(score=score, eye=(0.0, 0.1 * k, 1.0))] for k, score in enumerate(scores)]

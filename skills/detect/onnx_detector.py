@@ -69,7 +69,9 @@ class OnnxDetector:
         if self.model.second is not None:
             options = self.options.regions
             regions = regions_of(boxes, scores, options)
-            boxes, scores = looked_again(session(self.model.second), image, regions, mirrored=options.mirrored)
+            boxes, scores = looked_again(
+                session(self.model.second), image, regions, mirrored_from=options.mirrored_from
+            )
         return self._detections(boxes, scores, placed)
 
     def _detections(self, boxes: Floats, scores: Floats, placed: Letterbox) -> tuple[Detection, ...]:

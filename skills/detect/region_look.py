@@ -17,27 +17,32 @@ Floats = NDArray[np.float32]
 
 
 def looked_again(
-    session: InferenceSession, letterbox: Picture, regions: Regions, *, mirrored: bool
+    session: InferenceSession, letterbox: Picture, regions: Regions, *, mirrored_from: float | None
 ) -> tuple[Floats, Floats]:
     """Boxes (R, 4) in pixels of the letterbox (480, 640, 3), and scores (R, K), of what the second network sees.
 
-    With `mirrored`, the means of what it sees in each chip and in its mirror image.
+    Where that is something with at least the score `mirrored_from`, the means of what it sees in the chip and in its
+    mirror image; nowhere for None.
     """
     if not len(regions):
         return regions.boxes, np.zeros_like(regions.logits)
-    ways = (False, True) if mirrored else (False,)
-    scales, boxes = Scales(letterbox, halved(letterbox)), np.tile(regions.boxes, (len(ways), 1))
-    maps = np.stack([chip_map(box, mirrored=way) for way in ways for box in regions.boxes])
+    scales = Scales(letterbox, halved(letterbox))
+    found, scores = _seen(session, scales, regions, mirrored=False)
+    rows = np.flatnonzero(scores.max(axis=1) >= mirrored_from) if mirrored_from is not None else np.empty(0, np.int64)
+    if len(rows):
+        boxes, others = _seen(session, scales, Regions(regions.boxes[rows], regions.logits[rows]), mirrored=True)
+        found[rows] = 0.5 * (found[rows] + boxes)
+        scores[rows] = 0.5 * (scores[rows] + others)
+    return found, scores
+
+
+def _seen(session: InferenceSession, scales: Scales, regions: Regions, *, mirrored: bool) -> tuple[Floats, Floats]:
+    """Boxes in the letterbox and scores of what is seen in chips about regions, or in their mirror images."""
+    maps = np.stack([chip_map(box, mirrored=mirrored) for box in regions.boxes])
     given = {
         "chips": np.stack([scales.cut(to_chip, (CHIP_PX, CHIP_PX)) for to_chip in maps]),
-        "regions": mapped(boxes, maps),
-        "logits": np.tile(regions.logits, (len(ways), 1)),
+        "regions": mapped(regions.boxes, maps),
+        "logits": regions.logits,
     }
     found, scores = session.run(["boxes", "scores"], given)
-    found = mapped(found, np.stack([cv2.invertAffineTransform(to_chip) for to_chip in maps]))
-    return _mean(found, len(ways)), _mean(scores, len(ways))
-
-
-def _mean(rows: Floats, ways: int) -> Floats:
-    """The mean (R, M) over the ways in which each region was looked at, of rows (ways R, M)."""
-    return np.asarray(rows.reshape(ways, -1, rows.shape[1]).mean(axis=0), dtype=np.float32)
+    return mapped(found, np.stack([cv2.invertAffineTransform(to_chip) for to_chip in maps])), scores

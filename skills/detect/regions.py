@@ -35,9 +35,9 @@ class RegionOptions:
 
     least_score: float = 0.03
     same: float = 0.6
-    most: int = 8
+    most: int = 12
     most_candidates: int = 250
-    mirrored: bool = True
+    mirrored_from: float | None = 0.3
 
 
 @dataclass(frozen=True)

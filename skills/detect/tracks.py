@@ -222,7 +222,8 @@ def _evidence(sighting: Sighting) -> float:
 
     Scores are taken for the shares of sightings that are right, as they are about (docs/detector.md).
     """
-    return (_odds(min(sighting.detection.score, _MOST_SURE)) / _odds(_SEEN_BY_CHANCE)) ** _NEW_IN_A_VIEW
+    likelier = _odds(min(sighting.detection.score, _MOST_SURE)) / _odds(_SEEN_BY_CHANCE)
+    return math.pow(likelier, _NEW_IN_A_VIEW)
 
 
 def _updated(belief: float, likelier: float) -> float:

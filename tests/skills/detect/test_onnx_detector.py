@@ -140,15 +140,24 @@ def test_a_second_network_tells_where_it_is_exactly(looks_again):
     assert found[0].box == pytest.approx((105.0, 102.5, 195.0, 147.5), abs=0.01)
 
 
-def test_a_chip_and_its_mirror_image_are_judged_together(tmp_path):
+# mirrored from   seen in the chip   in its mirror image   told
+# None            1.0                not looked at         1.0
+# 0.3             1.0                0.0                   0.5
+@pytest.mark.parametrize(("mirrored_from", "score"), [(None, 1.0), (0.3, 0.5)])
+def test_a_chip_and_its_mirror_image_are_judged_together(tmp_path, mirrored_from, score):
     """A second network that takes the left half of a chip alone for a beer says half of it with both."""
     file = write_pair(tmp_path / "tiny.onnx", left_only=True)
     picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (0, 2, 150, 400))
-    scores = {
-        mirrored: load_detector(file, DetectorOptions(0.05, regions=RegionOptions(mirrored=mirrored))).detect([picture])
-        for mirrored in (False, True)
-    }
-    assert [round(found[0][0].score, 1) for found in scores.values()] == [1.0, 0.5]
+    options = DetectorOptions(0.05, regions=RegionOptions(mirrored_from=mirrored_from))
+    (found,) = load_detector(file, options).detect([picture])
+    assert round(found[0].score, 1) == score
+
+
+def test_the_mirror_image_of_what_hardly_looks_like_a_thing_is_not_looked_at(tmp_path):
+    file = write_pair(tmp_path / "tiny.onnx", left_only=True)
+    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
+    options = DetectorOptions(0.05, regions=RegionOptions(mirrored_from=0.3))
+    assert load_detector(file, options).detect([picture]) == [()]
 
 
 def test_a_second_network_takes_back_what_the_first_one_is_sure_of(looks_again):

@@ -190,8 +190,7 @@ def _spread(sighting: Sighting) -> FloatArray:
 
 
 def _fused(track: Track, sighting: Sighting, names: Sequence[str]) -> Track:
-    """The track with one more sighting. A faint one changes nothing of what was seen last or best."""
-    sure = sighting.detection.score >= SURE_SCORE
+    """The track with one more sighting."""
     track_information, information = np.linalg.inv(track.covariance), np.linalg.inv(_spread(sighting))
     covariance = np.linalg.inv(track_information + information)
     position = covariance @ (track_information @ track.position_W + information @ sighting.position_W)
@@ -202,9 +201,17 @@ def _fused(track: Track, sighting: Sighting, names: Sequence[str]) -> Track:
         position_W=position,
         covariance=covariance,
         eyes_W=_with_eye(track.eyes_W, _point(sighting.eye_W)),
-        latest=sighting if sure else track.latest,
+        latest=_latest(track, sighting),
         best=max(track.best, sighting, key=lambda one: one.detection.score),
     )
+
+
+def _latest(track: Track, sighting: Sighting) -> Sighting:
+    """What was seen last. A faint sighting tells no more than that it was still there, if it is of the same class."""
+    if sighting.detection.score >= SURE_SCORE:
+        return sighting
+    same = sighting.class_name == track.latest.class_name
+    return replace(track.latest, stamp_s=sighting.stamp_s) if same else track.latest
 
 
 def _classes(before: Mapping[str, float], sighting: Sighting) -> Mapping[str, float]:

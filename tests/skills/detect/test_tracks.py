@@ -161,9 +161,15 @@ def test_a_faint_sighting_supports_a_track_a_little(scores, belief, confirmed):
     assert (track.views, track.confirmed) == (len(scores), confirmed)
 
 
-def test_a_faint_sighting_is_not_told_as_the_last_one():
-    (track,) = book_of([sighting(score=0.8, stamp=1.0)], [sighting(score=0.4, stamp=2.0)]).snapshot()
-    assert (track.last_seen_s, track.latest.detection.score, track.missed) == (1.0, 0.8, 0)
+# the faint sighting   seen last at   told
+# of the same class    2 s            what was seen surely
+# of another           1 s            the same
+@pytest.mark.parametrize(("name", "last_seen_s"), [("coke", 2.0), ("beer", 1.0)])
+def test_a_faint_sighting_tells_only_that_the_thing_is_still_there(name, last_seen_s):
+    seen = [sighting(score=0.8, stamp=1.0)], [sighting(name=name, score=0.4, stamp=2.0)]
+    (track,) = book_of(*seen).snapshot()
+    assert (track.last_seen_s, track.missed) == (last_seen_s, 0)
+    assert (track.latest.class_name, track.latest.detection.score) == ("coke", 0.8)
 
 
 def test_a_faint_sighting_takes_no_track_from_a_sure_one():

@@ -61,11 +61,21 @@ def close_stations(p_BS: FloatArray, p_BT: FloatArray, shift_rad: float = 0.0) -
     ]
 
 
-def stations_beside(p_BC: FloatArray, p_BT: FloatArray, aside_m: float = 0.06) -> list[FloatArray]:
-    """Camera places beside and above p_BC, as seen when looking from there at p_BT."""
-    ahead = (p_BT - p_BC)[:2] / max(float(np.linalg.norm((p_BT - p_BC)[:2])), 1e-6)
-    left = np.array([-ahead[1], ahead[0], 0.0])
-    return [p_BC + aside_m * step for step in (left, -left, _UP, left - _UP, -left - _UP)]
+def stations_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, aside_m: float = 0.06) -> list[FloatArray]:
+    """Camera places beside and above p_BC, as seen when looking from there at p_BT.
+
+    First those on the side on which p_BC is already, seen from the shoulder at p_BS towards p_BT: away from what hides
+    p_BT from there.
+    """
+    left, left_of_shoulder = _left_of(p_BC, p_BT), _left_of(p_BS, p_BT)
+    outwards = left if (p_BC - p_BS) @ left_of_shoulder >= 0.0 else -left
+    return [p_BC + aside_m * step for step in (outwards, outwards - _UP, _UP, -outwards, -outwards - _UP)]
+
+
+def _left_of(p_B: FloatArray, p_BT: FloatArray) -> FloatArray:
+    """The level unit vector to the left when looking from one point to another."""
+    ahead = (p_BT - p_B)[:2] / max(float(np.linalg.norm((p_BT - p_B)[:2])), 1e-6)
+    return np.array([-ahead[1], ahead[0], 0.0])
 
 
 def carry_configuration(scene: ArmScene, R_BH: RotationMatrix, q_near_rad: FloatArray) -> FloatArray:

@@ -255,7 +255,7 @@ class Detect(ArmSkill[DetectInputs]):
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
             near = close_stations(self.model.p_BS, p_BT, shift_rad) if close else []
-            near = near if beside_B is None else stations_beside(beside_B, p_BT)
+            near = near if beside_B is None else stations_beside(self.model.p_BS, beside_B, p_BT)
             far = overview_stations(self.model, p_BT, shift_rad)
             if abs(shift_rad) >= max(_AROUND_RAD):
                 far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))

@@ -33,7 +33,8 @@ _SEEN_BY_CHANCE = 0.25
 """The share of things among all that is seen at least faintly."""
 _NEW_IN_A_VIEW = 0.5
 """How much of what a view tells the others have not told yet; 1 were views that err independently."""
-_MOST_SURE, _LEAST_BELIEF = 0.97, 0.05
+_MOST_SURE = 0.97
+_MOST_BELIEF, _LEAST_BELIEF = 0.999, 0.05
 
 
 @dataclass(frozen=True)
@@ -227,7 +228,7 @@ def _classes(before: Mapping[str, float], sighting: Sighting) -> Mapping[str, fl
 def _evidence(sighting: Sighting) -> float:
     """How much likelier a sighting is of a thing than of nothing.
 
-    Scores are taken for the shares of sightings that are right, as they are about (docs/detector.md).
+    Scores are taken for the shares of sightings that are right, as they are about (docs/finding-things.md).
     """
     likelier = _odds(min(sighting.detection.score, _MOST_SURE)) / _odds(_SEEN_BY_CHANCE)
     return math.pow(likelier, _NEW_IN_A_VIEW)
@@ -236,7 +237,7 @@ def _evidence(sighting: Sighting) -> float:
 def _updated(belief: float, likelier: float) -> float:
     """Bayes' rule for something that is there or not, by how much likelier what is seen is when it is there."""
     odds = _odds(belief) * likelier
-    return odds / (1.0 + odds)
+    return min(odds / (1.0 + odds), _MOST_BELIEF)
 
 
 def _odds(probability: float) -> float:

@@ -106,6 +106,13 @@ def test_what_was_seen_once_is_there_as_likely_as_its_score_says(score):
     assert book_of([sighting(score=score)]).snapshot()[0].belief == pytest.approx(score)
 
 
+def test_what_was_seen_very_often_is_never_past_doubt():
+    (track,) = book_of(*[[sighting(score=0.97)]] * 40).snapshot()
+    assert track.belief == 0.999
+    (track,) = book_of(*[[sighting(score=0.97)]] * 40, [], []).snapshot()
+    assert track.belief < 0.97
+
+
 def test_what_is_out_of_view_keeps_its_belief():
     (track,) = book_of([sighting()], [], [], in_view=False).snapshot()
     assert (track.belief, track.missed) == (0.9, 0)

@@ -1,6 +1,19 @@
 """Lets the tests here import the small detector that lies with the skills' tests."""
 
+import json
 import sys
 from pathlib import Path
 
+import pytest
+
 sys.path.insert(0, str(Path(__file__).parents[2] / "skills"))
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """The folder of a data set without pictures."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    for name in ("train.json", "val.json"):
+        (folder / name).write_text(json.dumps({"images": [], "annotations": [], "categories": []}))
+    return folder

@@ -1,4 +1,3 @@
-import json
 from pathlib import Path
 
 import pytest
@@ -16,15 +15,6 @@ def command(request: pytest.FixtureRequest) -> str:
 
 def run(*words: str) -> Result:
     return CliRunner().invoke(light_app(), ["dataset", *words])
-
-
-@pytest.fixture
-def data(tmp_path: Path) -> Path:
-    folder = tmp_path / "data"
-    folder.mkdir()
-    for name in ("train.json", "val.json"):
-        (folder / name).write_text(json.dumps({"images": [], "annotations": [], "categories": []}))
-    return folder
 
 
 def test_without_torch_the_extra_is_named(

@@ -1,4 +1,3 @@
-import json
 from pathlib import Path
 
 import pytest
@@ -10,15 +9,6 @@ from executive.cli.entry import light_app
 
 def run(*words: str) -> Result:
     return CliRunner().invoke(light_app(), ["dataset", "refine", *words])
-
-
-@pytest.fixture
-def data(tmp_path: Path) -> Path:
-    folder = tmp_path / "data"
-    folder.mkdir()
-    for name in ("train.json", "val.json"):
-        (folder / name).write_text(json.dumps({"images": [], "annotations": [], "categories": []}))
-    return folder
 
 
 def test_a_first_network_that_is_not_there_is_named(

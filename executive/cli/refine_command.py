@@ -39,7 +39,7 @@ def refine_command(
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
     start: Annotated[
         Path | None,
-        typer.Option(help="A checkpoint of another training of the second network; its weights are taken over."),
+        typer.Option(help="A checkpoint or an ONNX file of the second network whose weights are taken over."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:

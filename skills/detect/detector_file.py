@@ -19,7 +19,7 @@ from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX
 from skills.detect.network_file import ModelFileError, Network, NetworkKind, load_network
 from skills.detect.regions import CHIP_PX
 
-__all__ = ["FORMAT", "MODEL_FILE", "REGIONS_FORMAT", "DetectorModel", "load_model", "regions_file"]
+__all__ = ["FORMAT", "MODEL_FILE", "REGIONS_FORMAT", "DetectorModel", "load_model", "load_regions", "regions_file"]
 
 MODEL_FILE: Final = Path(__file__).with_name("model") / "errand_detector.onnx"
 FORMAT: Final = "errand-detector-1"
@@ -60,12 +60,17 @@ def regions_file(file: Path) -> Path:
     return file.with_name(f"{file.stem}_regions{file.suffix}")
 
 
+def load_regions(file: Path) -> Network:
+    """The second network of its own file, whichever first one it belongs to. Raises ModelFileError."""
+    return load_network(file, _SECOND)
+
+
 def load_model(file: Path = MODEL_FILE, *, second: bool = True) -> DetectorModel:
     """The network of a file, and the second one beside it if that is there and wanted. Raises ModelFileError."""
     first, beside = load_network(file, _FIRST), regions_file(file)
     if not second or not beside.exists():
         return DetectorModel(first)
-    found = load_network(beside, _SECOND)
+    found = load_regions(beside)
     if found.metadata.get("first") != first.digest or found.class_names != first.class_names:
         raise ModelFileError(beside, f"it belongs to another network than {file.name}", mend=_SECOND.mend)
     return DetectorModel(first, found)

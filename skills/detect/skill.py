@@ -184,7 +184,7 @@ class Detect(ArmSkill[DetectInputs]):
     ) -> Routine[None]:
         """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
         try:
-            yield from self.look(inputs, X_HC, p_BT, shift_rad, close=close)
+            yield from self.look(inputs, X_HC, p_BT, self._stations(p_BT, shift_rad, close=close))
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -192,23 +192,33 @@ class Detect(ArmSkill[DetectInputs]):
             return
         while (track := self._candidate(inputs)) is not None:
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
-            p_BO, shifts_rad = self._from_elsewhere(track)
+            p_BO = self.X_WB().inverse() @ track.position_W
             try:
-                if tries <= len(shifts_rad):
-                    yield from self.look(inputs, X_HC, p_BO, shifts_rad[tries - 1], close=close)
-                else:
-                    yield from self.look(inputs, X_HC, p_BO, 0.0, beside_B=self.X_WB().inverse() @ track.eyes_W[-1])
+                yield from self.look(inputs, X_HC, p_BO, self._stations_to_confirm(track, tries, close=close))
             except SkillFailure as failure:
                 if failure.cause is not Cause.PLANNING:
                     raise
 
-    def _from_elsewhere(self, track: Track) -> tuple[FloatArray, list[float]]:
-        """The track's place p_BO and by how much to look at it from aside, farthest first from where it was seen."""
+    def _stations(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
+        """Camera places p_BC to look from at p_BT, turned by shift_rad about the shoulder; near ones first if close."""
+        far = overview_stations(self.model, p_BT, shift_rad)
+        if abs(shift_rad) >= max(_AROUND_RAD):
+            far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
+        return [*close_stations(self.model.p_BS, p_BT, shift_rad), *far] if close else far
+
+    def _stations_to_confirm(self, track: Track, tries: int, *, close: bool) -> list[FloatArray]:
+        """Camera places to look from at a track for the first, second or third time after it was seen.
+
+        First from the side farther from where it was seen, then from the other, then from right beside there.
+        """
         X_BW = self.X_WB().inverse()
         p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
+        if tries > len(_CONFIRM_SHIFTS_RAD):
+            return [*stations_beside(self.model.p_BS, eye_B, p_BO), *self._stations(p_BO)]
         seen_rad, bearing = _bearing(eye_B - self.model.p_BS), _bearing(p_BO - self.model.p_BS)
         off = {shift: abs(math.remainder(bearing + shift - seen_rad, math.tau)) for shift in _CONFIRM_SHIFTS_RAD}
-        return p_BO, sorted(_CONFIRM_SHIFTS_RAD, key=lambda shift: -off[shift])
+        shifts_rad = sorted(_CONFIRM_SHIFTS_RAD, key=lambda shift: -off[shift])
+        return self._stations(p_BO, shifts_rad[tries - 1], close=close)
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
         """The likeliest track that may be what is looked for and is to be looked at again."""
@@ -242,24 +252,13 @@ class Detect(ArmSkill[DetectInputs]):
         inputs: DetectInputs,
         X_HC: RigidTransform,
         p_BT: FloatArray,
-        shift_rad: float,
-        *,
-        close: bool = False,
-        beside_B: FloatArray | None = None,
+        stations_B: Sequence[FloatArray],
     ) -> Routine[Look]:
-        """Point the camera at p_BT, from a little aside when shift_rad is not 0, and take in what is seen.
-
-        With `beside_B` from right beside that point.
-        """
+        """Point the camera at p_BT, from the first possible one of `stations_B`, and take in what is seen."""
         message = f"looking for {wanted(inputs.classes, inputs.attributes)}"
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            near = close_stations(self.model.p_BS, p_BT, shift_rad) if close else []
-            near = near if beside_B is None else stations_beside(self.model.p_BS, beside_B, p_BT)
-            far = overview_stations(self.model, p_BT, shift_rad)
-            if abs(shift_rad) >= max(_AROUND_RAD):
-                far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
-            return look_configuration(scene, X_HC, [*near, *far], p_BT, q)
+            return look_configuration(scene, X_HC, stations_B, p_BT, q)
 
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)

@@ -21,10 +21,11 @@ from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX
 from skills.detect.network_file import sealed
 from skills.detect.training.network import Backbone, DetectorNetwork
 
-__all__ = ["Exportable", "export", "fused", "take_bytes", "write_onnx"]
+__all__ = ["Exportable", "export", "fused", "in_full", "normalised_layers", "take_bytes", "write_onnx"]
 
 _OPSET = 17
 _LARGE = 256
+_SHORT = ".short"
 Network = TypeVar("Network", bound=nn.Module)
 
 
@@ -57,15 +58,28 @@ def _shift(network: DetectorNetwork, offsets: Sequence[float]) -> None:
 
 
 def fused(network: Network) -> Network:
-    """A copy for use only, with every normalisation taken into the convolution before it."""
+    """A copy for use only, with every normalisation taken into the layer before it."""
     made: Network = copy.deepcopy(network).cpu().float().eval()
-    for module in made.modules():
-        if isinstance(module, nn.Sequential) and len(module) >= 2 and isinstance(module[1], nn.BatchNorm2d):
-            convolution = module[0]
-            assert isinstance(convolution, nn.Conv2d)
-            module[0] = nn.utils.fusion.fuse_conv_bn_eval(convolution, module[1])
-            module[1] = nn.Identity()
+    for _, unit in normalised_layers(made):
+        layer, normalisation = unit[0], unit[1]
+        if isinstance(layer, nn.Conv2d):
+            unit[0] = nn.utils.fusion.fuse_conv_bn_eval(layer, normalisation)
+        else:
+            unit[0] = nn.utils.fusion.fuse_linear_bn_eval(layer, normalisation)
+        unit[1] = nn.Identity()
     return made
+
+
+def normalised_layers(network: nn.Module) -> list[tuple[str, nn.Sequential]]:
+    """Names and units of a network that begin with a layer and its normalisation."""
+    return [
+        (name, unit)
+        for name, unit in network.named_modules()
+        if isinstance(unit, nn.Sequential)
+        and len(unit) >= 2
+        and isinstance(unit[0], nn.Conv2d | nn.Linear)
+        and isinstance(unit[1], nn.BatchNorm1d | nn.BatchNorm2d)
+    ]
 
 
 def export(
@@ -153,7 +167,12 @@ def _size(weights: onnx.TensorProto) -> int:
 
 
 def _short(weights: onnx.TensorProto) -> str:
-    return f"{weights.name}.short"
+    return f"{weights.name}{_SHORT}"
+
+
+def in_full(name: str) -> str:
+    """The name that a weight has in the network, of that which it has in a compact file."""
+    return name.removesuffix(_SHORT)
 
 
 def _shorten_names(graph: onnx.GraphProto) -> None:

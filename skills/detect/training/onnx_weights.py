@@ -1,9 +1,9 @@
-"""Learning goes on from a detector's ONNX file, in which normalisation is part of the convolutions already."""
+"""Learning goes on from a network's ONNX file, in which normalisation is part of the layers before it already."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,85 +12,103 @@ import onnx
 import torch
 from torch import Tensor, nn
 
-from skills.detect.detector_file import load_model
-from skills.detect.network_file import ModelFileError
+from skills.detect.detector_file import load_model, load_regions
+from skills.detect.network_file import ModelFileError, Network
+from skills.detect.training.export import in_full, normalised_layers
 from skills.detect.training.labels import TrainingDataError
-from skills.detect.training.network import DetectorNetwork
+from skills.detect.training.network import Backbone, DetectorNetwork
+from skills.detect.training.region_network import RegionNetwork
 
-__all__ = ["settle", "take_over"]
+__all__ = ["settle", "take_over", "take_over_regions"]
 
 _BEFORE = "network."
 _BYTES = 255.0
+_MEND = "begin anew without it"
 
 
-@torch.no_grad()
 def take_over(network: DetectorNetwork, file: Path) -> None:
-    """Give a network the weights of an ONNX file; it says the same then, but for the shift of the scores.
+    """Give the first network the weights of an ONNX file; it says the same then, but for the shift of the scores.
 
     Every normalisation passes on what it gets and adds the file's bias, until `settle`. Raises TrainingDataError.
     """
-    kept, offsets = _content(file)
     try:
-        for name, module in network.named_modules():
-            if isinstance(module, nn.Sequential) and _normalised(module):
-                _fill(module[0].weight, kept[f"{name}.0.weight"])
-                _pass_on(module[1], torch.from_numpy(kept[f"{name}.0.bias"]))
-            elif isinstance(module, nn.Conv2d) and module.bias is not None:
-                _fill(module.weight, kept[f"{name}.weight"])
-                _fill(module.bias, kept[f"{name}.bias"])
-        for head in network.heads:
-            head.scores.bias.sub_(torch.tensor(offsets))
-    except (KeyError, ValueError) as error:
-        raise TrainingDataError(f"{file}: holds another network ({error})", mend="begin anew without it") from error
-    network.backbone.stem[0][0].weight.mul_(_BYTES)
-
-
-def _content(file: Path) -> tuple[dict[str, Any], list[float]]:
-    """Arrays by the names that they have in the network, and by how much each class's score was shifted."""
-    try:
-        classes = len(load_model(file, second=False).class_names)
+        told = load_model(file, second=False).first
     except ModelFileError as error:
-        raise TrainingDataError(f"{file}: {error.message}", mend="begin anew without it") from error
-    model = onnx.load(file)
-    arrays = {
-        one.name.removeprefix(_BEFORE): np.array(onnx.numpy_helper.to_array(one)) for one in model.graph.initializer
-    }
-    told = {entry.key: entry.value for entry in model.metadata_props}
-    return arrays, json.loads(told.get("score_offsets", json.dumps([0.0] * classes)))
+        raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
+    _take(network, file, told, network.backbone, [head.scores.bias for head in network.heads])
 
 
-def _fill(weight: Tensor, value: Any) -> None:
-    if tuple(weight.shape) != value.shape:
-        raise ValueError(f"{tuple(value.shape)} numbers where there should be {tuple(weight.shape)}")
-    weight.copy_(torch.from_numpy(value))
-
-
-def _pass_on(normalisation: nn.BatchNorm2d, bias: Tensor) -> None:
-    normalisation.running_mean.zero_()
-    normalisation.running_var.fill_(1.0 - normalisation.eps)
-    normalisation.weight.fill_(1.0)
-    normalisation.bias.copy_(bias)
+def take_over_regions(network: RegionNetwork, file: Path) -> None:
+    """The same for the second network and its file, whichever first network that belongs to."""
+    try:
+        told = load_regions(file)
+    except ModelFileError as error:
+        raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
+    _take(network, file, told, network.detector.backbone, [network.scores.bias])
 
 
 @torch.no_grad()
-def settle(network: DetectorNetwork, batches: Iterable[Tensor]) -> None:
-    """Give each normalisation the statistics of batches (N, 3, H, W) and each filter the length 1, after `take_over`.
+def _take(network: nn.Module, file: Path, told: Network, backbone: Backbone, score_biases: Sequence[Tensor]) -> None:
+    kept, left = _content(file), dict(network.named_parameters())
+    offsets = json.loads(told.metadata.get("score_offsets", json.dumps([0.0] * len(told.class_names))))
+    try:
+        for name, unit in normalised_layers(network):
+            _fill(unit[0].weight, kept[f"{name}.0.weight"])
+            _pass_on(unit[1], kept[f"{name}.0.bias"])
+            for part in ("0.weight", "1.weight", "1.bias"):
+                del left[f"{name}.{part}"]
+        for name, weight in left.items():
+            _fill(weight, kept[name])
+        for bias in score_biases:
+            bias.sub_(torch.tensor(offsets))
+    except (KeyError, ValueError) as error:
+        raise TrainingDataError(f"{file}: holds another network ({error})", mend=_MEND) from error
+    backbone.stem[0][0].weight.mul_(_BYTES)
 
-    What the network says stays the same. Without it, learning would begin by forgetting: it normalises by the batch.
+
+def _content(file: Path) -> dict[str, Tensor]:
+    """Weights by the names that they have in the network."""
+    return {
+        in_full(one.name).removeprefix(_BEFORE): torch.tensor(onnx.numpy_helper.to_array(one).astype(np.float32))
+        for one in onnx.load(file).graph.initializer
+    }
+
+
+def _fill(weight: Tensor, value: Tensor) -> None:
+    if weight.shape != value.shape:
+        raise ValueError(f"{tuple(value.shape)} numbers where there should be {tuple(weight.shape)}")
+    weight.copy_(value)
+
+
+def _pass_on(normalisation: nn.BatchNorm1d | nn.BatchNorm2d, bias: Tensor) -> None:
+    assert normalisation.running_mean is not None
+    assert normalisation.running_var is not None
+    normalisation.running_mean.zero_()
+    normalisation.running_var.fill_(1.0 - normalisation.eps)
+    normalisation.weight.fill_(1.0)
+    _fill(normalisation.bias, bias)
+
+
+@torch.no_grad()
+def settle(network: nn.Module, batches: Iterable[tuple[Tensor, ...]]) -> None:
+    """Give each normalisation the statistics of batches (what the network takes), and each filter the length 1.
+
+    To be done after `take_over`. What the network says stays the same. Without it, learning would begin by forgetting:
+    it normalises by the batch.
     """
-    units = [one for one in network.modules() if isinstance(one, nn.Sequential) and _normalised(one)]
+    units = [unit for _, unit in normalised_layers(network)]
     sums = {unit: torch.zeros(3, unit[1].num_features, dtype=torch.float64) for unit in units}
 
-    def note(convolution: nn.Module, _given: Any, made: Tensor) -> None:
-        values = made.double()
+    def note(layer: nn.Module, _given: Any, made: Tensor) -> None:
+        values = made.double().flatten(2) if made.ndim > 2 else made.double()[..., None]
         count = torch.full((values.shape[1],), float(values.numel() // values.shape[1]), dtype=torch.float64)
-        sums[of[convolution]] += torch.stack([count, values.sum(dim=(0, 2, 3)), values.square().sum(dim=(0, 2, 3))])
+        sums[of[layer]] += torch.stack([count, values.sum(dim=(0, 2)), values.square().sum(dim=(0, 2))])
 
     of = {unit[0]: unit for unit in units}
     handles = [unit[0].register_forward_hook(note) for unit in units]
     network.eval()
     for batch in batches:
-        network(batch)
+        network(*batch)
     for handle in handles:
         handle.remove()
     for unit, (count, total, squares) in sums.items():
@@ -98,14 +116,14 @@ def settle(network: DetectorNetwork, batches: Iterable[Tensor]) -> None:
         _normalise(unit[0], unit[1], mean, squares / count - mean.square())
 
 
-def _normalised(unit: nn.Sequential) -> bool:
-    return len(unit) >= 2 and isinstance(unit[1], nn.BatchNorm2d)
-
-
-def _normalise(convolution: nn.Conv2d, normalisation: nn.BatchNorm2d, mean: Tensor, variance: Tensor) -> None:
-    """Statistics of a convolution's output, and all else such that nothing changes: so far it added a bias only."""
-    lengths = convolution.weight.flatten(1).norm(dim=1).clamp(min=1e-6)
-    convolution.weight.div_(lengths[:, None, None, None])
+def _normalise(
+    layer: nn.Conv2d | nn.Linear, normalisation: nn.BatchNorm1d | nn.BatchNorm2d, mean: Tensor, variance: Tensor
+) -> None:
+    """Statistics of a layer's output, and all else such that nothing changes: so far it added a bias only."""
+    assert normalisation.running_mean is not None
+    assert normalisation.running_var is not None
+    lengths = layer.weight.flatten(1).norm(dim=1).clamp(min=1e-6)
+    layer.weight.div_(lengths.reshape(-1, *[1] * (layer.weight.ndim - 1)))
     mean, variance = mean.float() / lengths, variance.float() / lengths.square()
     normalisation.running_mean.copy_(mean)
     normalisation.running_var.copy_(variance)

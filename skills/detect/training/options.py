@@ -34,7 +34,7 @@ class TrainOptions:
 class RefineOptions:
     """The same for the second network, which belongs to the first one's file `model`.
 
-    `start` names a checkpoint of such a training, of which the weights are taken over.
+    `start` names a checkpoint of such a training, or a second network's ONNX file, of which the weights are taken over.
     """
 
     data: Path

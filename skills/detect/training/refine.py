@@ -95,14 +95,14 @@ def _learn(options: RefineOptions, peers: Peers, device: torch.device, told: Tol
 def _begin(learner: RegionLearner, options: RefineOptions, feed: RegionFeed) -> None:
     """Give the learner the weights that it begins with; the same in all processes. Raises TrainingDataError."""
     checkpoint, size = options.out / CHECKPOINT, options.batch
+    some = (feed.batch(k * size, size) for k in range(_SETTLED_BY))
     if options.resume and checkpoint.is_file():
         learner.restore(checkpoint)
-        learner.keep_early()
     elif options.start is not None:
-        learner.start_from_checkpoint(options.start)
-        learner.keep_early()
+        learner.start_from(options.start, some)
     else:
-        learner.start_from(options.out / MODEL, (feed.batch(k * size, size).chips for k in range(_SETTLED_BY)))
+        learner.begin_with_first(options.out / MODEL, some)
+    learner.keep_early()
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ import torch
 from torch import Tensor
 
 from skills.detect.training.averaging import WeightAverage
-from skills.detect.training.learner import LearningState, optimisers_of, without_learning_early
+from skills.detect.training.learner import ONNX, LearningState, optimisers_of, without_learning_early
 from skills.detect.training.losses import Losses
 from skills.detect.training.network import Backbone, DetectorNetwork
-from skills.detect.training.onnx_weights import settle, take_over
+from skills.detect.training.onnx_weights import settle, take_over, take_over_regions
 from skills.detect.training.peers import Peers
 from skills.detect.training.region_chips import RegionBatch
 from skills.detect.training.region_losses import region_losses
@@ -39,17 +39,28 @@ class RegionLearner(LearningState[RegionNetwork]):
         last = [network.place, *(layer for head in network.detector.heads for layer in (head.scores, head.sides))]
         return RegionLearner(network, WeightAverage(network), optimisers_of(network, last), device)
 
-    def start_from(self, first: Path, chips: Iterable[Tensor]) -> None:
-        """Take over the weights of the first network's ONNX file, with statistics of chips (N, 3, 128, 128).
+    def begin_with_first(self, first: Path, batches: Iterable[RegionBatch]) -> None:
+        """Take over the weights of the first network's ONNX file, with statistics of batches.
 
         What the first network has not, stays as it is. Raises TrainingDataError.
         """
         detector = DetectorNetwork(self.network.classes)
         take_over(detector, first)
-        settle(detector, chips)
+        settle(detector, ((batch.chips,) for batch in batches))
         self.network.detector.load_state_dict(detector.state_dict(), strict=False)
         self.average.network.load_state_dict(self.network.state_dict())
-        self.keep_early()
+
+    def start_from(self, file: Path, batches: Iterable[RegionBatch]) -> None:
+        """Take over the weights of a second network's ONNX file, with statistics of batches, or a checkpoint's.
+
+        Raises TrainingDataError.
+        """
+        if file.suffix != ONNX:
+            self.start_from_checkpoint(file)
+            return
+        take_over_regions(self.network, file)
+        settle(self.network, (_moved((batch.chips, batch.boxes, batch.logits), self.device) for batch in batches))
+        self.average.network.load_state_dict(self.network.state_dict())
 
     def keep_early(self) -> None:
         """Learn no longer what makes the features at stride 8: two fifths of the time of each step."""
@@ -61,8 +72,8 @@ class RegionLearner(LearningState[RegionNetwork]):
         return self.take_step(lambda: self._losses(batch), rate, peers, clock)
 
     def _losses(self, batch: RegionBatch) -> Losses:
-        chips, regions, first, wanted, classes = (
-            part.to(self.device) for part in (batch.chips, batch.boxes, batch.logits, batch.wanted, batch.classes)
+        chips, regions, first, wanted, classes = _moved(
+            (batch.chips, batch.boxes, batch.logits, batch.wanted, batch.classes), self.device
         )
         with self.quick():
             logits, boxes = self._answers(chips, regions, first)
@@ -75,3 +86,7 @@ class RegionLearner(LearningState[RegionNetwork]):
         with torch.no_grad():
             at8 = self.early.early(chips)
         return self.network.from_early(at8, regions, first)
+
+
+def _moved(parts: tuple[Tensor, ...], device: torch.device) -> tuple[Tensor, ...]:
+    return tuple(part.to(device) for part in parts)

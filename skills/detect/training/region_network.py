@@ -42,7 +42,8 @@ class RegionNetwork(nn.Module):
         )
         self.scores = nn.Linear(_JOINED, classes)
         self.sides = nn.Linear(_JOINED, 4)
-        self.trust = nn.Parameter(torch.full((2, classes), 0.5))
+        self.trust_first = nn.Parameter(torch.full((classes,), 0.5))
+        self.trust_seen = nn.Parameter(torch.full((classes,), 0.5))
         self.nearer = nn.Parameter(torch.full((4,), 0.5))
         for last in (self.scores, self.sides):
             nn.init.zeros_(last.weight)
@@ -61,7 +62,7 @@ class RegionNetwork(nn.Module):
         seen_logits = seen_logits.clamp(-_MOST_LOGIT, _MOST_LOGIT)
         told = [self.squeeze(levels[2]).flatten(1), first_logits, seen_logits, boxes / CHIP_PX, seen_boxes / CHIP_PX]
         known = self.join(torch.cat(told, dim=1))
-        logits = self.trust[0] * first_logits + self.trust[1] * seen_logits + self.scores(known)
+        logits = self.trust_first * first_logits + self.trust_seen * seen_logits + self.scores(known)
         nearer = boxes + self.nearer * (seen_boxes - boxes)
         return logits, moved(nearer, _SIDES_SCALE * self.sides(known).float())
 

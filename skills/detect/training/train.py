@@ -79,7 +79,7 @@ def _settle(learner: Learner, options: TrainOptions, maker: CanvasMaker) -> None
         return
     feed, phase = Feed(maker, options.seed, 0, 1), options.schedule.phase(0.0)
     settle(
-        learner.network, (feed.batch(k * phase.batch, phase).pictures.to(learner.device) for k in range(_SETTLED_BY))
+        learner.network, ((feed.batch(k * phase.batch, phase).pictures.to(learner.device),) for k in range(_SETTLED_BY))
     )
     learner.average.network.load_state_dict(learner.network.state_dict())
 

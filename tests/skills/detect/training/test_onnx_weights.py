@@ -40,7 +40,7 @@ def test_settled_on_pictures_it_says_the_same_and_so_it_does_while_learning_from
     network, file = written
     pictures, other = torch.rand(4, 3, 64, 96), random_network(2, len(NAMES))
     take_over(other, file)
-    settle(other, [pictures])
+    settle(other, [(pictures,)])
     with torch.no_grad():
         expected = network(pictures)
         for mine, theirs in zip(other.eval()(pictures), expected, strict=True):

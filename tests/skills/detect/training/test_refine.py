@@ -94,6 +94,16 @@ def test_weights_of_another_training_are_taken_over(options: RefineOptions, tmp_
     assert torch.equal(before["average"]["network"][weight], after["network"][weight])
 
 
+def test_weights_of_a_second_networks_file_are_taken_over(options: RefineOptions, tmp_path: Path) -> None:
+    start, still = refine(replace(options, budget=Budget(pictures=32)), lambda _: None), Schedule(0.0)
+    out = tmp_path / "next"
+    refine(replace(options, out=out, budget=Budget(pictures=4), start=start, schedule=still), lambda _: None)
+    before, after = (read_checkpoint(folder / CHECKPOINT) for folder in (options.out, out))
+    weight = "scores.weight"
+    assert after["progress"]["steps"] == 1
+    assert torch.allclose(before["average"]["network"][weight], after["network"][weight], atol=1e-4)
+
+
 def test_a_network_of_other_classes_is_refused(options: RefineOptions) -> None:
     for split in ("train", "val"):
         write_split(options.data, split, 4, names=("beer", "coke", "wrench"))

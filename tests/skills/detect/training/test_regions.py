@@ -186,7 +186,7 @@ def unsettled(classes: int) -> RegionNetwork:
     torch.manual_seed(3)
     network = RegionNetwork(classes)
     for module in network.modules():
-        if isinstance(module, torch.nn.BatchNorm2d):
+        if isinstance(module, torch.nn.BatchNorm1d | torch.nn.BatchNorm2d):
             module.running_mean.normal_(0.0, 0.1)
             module.running_var.uniform_(0.5, 2.0)
             torch.nn.init.uniform_(module.weight, 0.5, 1.5)
@@ -223,10 +223,11 @@ def test_learning_begins_with_the_first_networks_weights_and_keeps_its_early_lay
     first, file = random_network(1, len(CLASSES)), tmp_path / "m.onnx"
     export(first, file, class_names=CLASSES, facts={})
     batch, learner = feed.batch(0, 8), RegionLearner.new(len(CLASSES), 2, CPU)
-    learner.start_from(file, [batch.chips])
+    learner.begin_with_first(file, [batch])
     with torch.no_grad():
         for mine, theirs in zip(learner.network.detector.eval()(batch.chips), first(batch.chips), strict=True):
             assert torch.allclose(mine, theirs, atol=1e-2)
+    learner.keep_early()
     before = {name: value.clone() for name, value in learner.network.state_dict().items()}
     learner.step(batch, 1e-3, ALONE, 0.0)
     after, kept = learner.network.state_dict(), ("detector.backbone.stem.", "detector.backbone.stage8.")
@@ -239,6 +240,31 @@ def test_the_second_networks_file_holds_its_weights_in_16_bits(tmp_path: Path) -
     export_regions(network, tmp_path / "r.onnx", class_names=CLASSES, facts={})
     weights = sum(weight.numel() for weight in network.parameters())
     assert 2 * weights < (tmp_path / "r.onnx").stat().st_size < 2.2 * weights
+
+
+def test_learning_goes_on_from_a_second_networks_file(tmp_path: Path, feed: RegionFeed) -> None:
+    file, network, batch = tmp_path / "r.onnx", unsettled(len(CLASSES)), feed.batch(0, 8)
+    shift = (0.5, 0.0, -0.5)
+    export_regions(network, file, class_names=CLASSES, facts={"score_offsets": str(list(shift))}, score_offsets=shift)
+    learner = RegionLearner.new(len(CLASSES), 2, CPU)
+    learner.start_from(file, [batch])
+    for mine in (learner.network.eval(), learner.average.network.eval()):
+        with torch.no_grad():
+            given = batch.chips, batch.boxes, batch.logits
+            (logits, boxes), (expected, expected_boxes) = mine(*given), network(*given)
+        assert torch.allclose(logits, expected, atol=2e-2)
+        assert torch.allclose(boxes, expected_boxes, atol=0.3)
+    assert all(
+        float(module.running_var.min()) < 0.9
+        for module in learner.network.modules()
+        if isinstance(module, torch.nn.BatchNorm1d | torch.nn.BatchNorm2d)
+    )
+
+
+def test_learning_goes_on_from_no_first_networks_file(tmp_path: Path, feed: RegionFeed) -> None:
+    export(random_network(1, len(CLASSES)), tmp_path / "m.onnx", class_names=CLASSES, facts={})
+    with pytest.raises(TrainingDataError, match=r"m\.onnx.*begin anew without it"):
+        RegionLearner.new(len(CLASSES), 2, CPU).start_from(tmp_path / "m.onnx", [feed.batch(0, 8)])
 
 
 @pytest.mark.parametrize("go_on", [RegionLearner.restore, RegionLearner.start_from_checkpoint])

@@ -1,0 +1,92 @@
+"""The mean of the weights of networks that learnt from the same beginning, as an ONNX file: often better than each.
+
+    python -m skills.detect.training.average FILE FILE... --out FILE
+
+After Wortsman et al., "Model soups" (2022).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import onnx
+
+from skills.detect.detector_file import load_model, load_regions
+from skills.detect.network_file import ModelFileError, Network, sealed
+from skills.detect.training.labels import TrainingDataError
+
+__all__ = ["average", "main"]
+
+_OFFSETS = "score_offsets"
+_SEAL = "sha256"
+_MEND = "name files that errand dataset train or refine wrote"
+
+
+def average(files: Sequence[Path], out: Path) -> None:
+    """Write the mean of second networks beside the same first one, or of first networks; whole or not at all.
+
+    All that the files tell is the first one's, but for the shifts of scores, which are the mean too. Raises
+    TrainingDataError.
+    """
+    told = [_told(file) for file in files]
+    models = [onnx.load(file) for file in files]
+    weights = [{one.name: onnx.numpy_helper.to_array(one) for one in model.graph.initializer} for model in models]
+    for file, network, found in zip(files, told, weights, strict=True):
+        if not _alike(network, told[0], found, weights[0]):
+            raise TrainingDataError(f"{file}: is another network than {files[0]}", mend=_MEND)
+    made = models[0]
+    for one in made.graph.initializer:
+        if np.issubdtype(weights[0][one.name].dtype, np.floating):
+            mean = np.mean([found[one.name].astype(np.float64) for found in weights], axis=0)
+            one.CopyFrom(onnx.numpy_helper.from_array(mean.astype(weights[0][one.name].dtype), one.name))
+    facts = {entry.key: entry.value for entry in made.metadata_props if entry.key != _SEAL}
+    if all(_OFFSETS in network.metadata for network in told):
+        shifts = np.mean([json.loads(network.metadata[_OFFSETS]) for network in told], axis=0)
+        facts[_OFFSETS] = json.dumps([round(float(value), 4) for value in shifts])
+    del made.metadata_props[:]
+    for key, value in facts.items():
+        made.metadata_props.add(key=key, value=value)
+    fresh = out.with_name(f".{out.name}.new")
+    fresh.write_bytes(sealed(made.SerializeToString(deterministic=True)))
+    fresh.replace(out)
+
+
+def _told(file: Path) -> Network:
+    """What a file of either network tells. Raises TrainingDataError."""
+    try:
+        return load_regions(file)
+    except ModelFileError:
+        pass
+    try:
+        return load_model(file, second=False).first
+    except ModelFileError as error:
+        raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
+
+
+def _alike(one: Network, other: Network, weights: Mapping[str, np.ndarray], others: Mapping[str, np.ndarray]) -> bool:
+    """Whether two networks take and tell the same, stand beside the same first one, and have weights of like shapes."""
+    same = all(one.metadata.get(key) == other.metadata.get(key) for key in ("format", "class_names", "first"))
+    return same and {n: w.shape for n, w in weights.items()} == {n: w.shape for n, w in others.items()}
+
+
+def main() -> int:
+    """The command line."""
+    parser = argparse.ArgumentParser(description="The mean of networks' weights.")
+    parser.add_argument("files", type=Path, nargs="+")
+    parser.add_argument("--out", type=Path, required=True)
+    given = parser.parse_args()
+    try:
+        average(given.files, given.out)
+    except (TrainingDataError, OSError) as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -192,6 +192,9 @@ def unsettled(classes: int) -> RegionNetwork:
             torch.nn.init.uniform_(module.weight, 0.5, 1.5)
         if isinstance(module, torch.nn.Linear):
             torch.nn.init.normal_(module.weight, 0.0, 0.05)
+    with torch.no_grad():  # a file keeps only one of weights that are equal
+        for weight in network.parameters():
+            weight.add_(1e-3 * torch.randn_like(weight))
     return network.eval()
 
 

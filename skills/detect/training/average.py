@@ -17,7 +17,8 @@ import numpy as np
 import onnx
 
 from skills.detect.detector_file import load_model, load_regions
-from skills.detect.network_file import ModelFileError, Network, sealed
+from skills.detect.network_file import ModelFileError, Network
+from skills.detect.training.export import write_sealed
 from skills.detect.training.labels import TrainingDataError
 
 __all__ = ["average", "main"]
@@ -48,12 +49,7 @@ def average(files: Sequence[Path], out: Path) -> None:
     if all(_OFFSETS in network.metadata for network in told):
         shifts = np.mean([json.loads(network.metadata[_OFFSETS]) for network in told], axis=0)
         facts[_OFFSETS] = json.dumps([round(float(value), 4) for value in shifts])
-    del made.metadata_props[:]
-    for key, value in facts.items():
-        made.metadata_props.add(key=key, value=value)
-    fresh = out.with_name(f".{out.name}.new")
-    fresh.write_bytes(sealed(made.SerializeToString(deterministic=True)))
-    fresh.replace(out)
+    write_sealed(made, out, facts)
 
 
 def _told(file: Path) -> Network:

@@ -21,7 +21,7 @@ from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX
 from skills.detect.network_file import sealed
 from skills.detect.training.network import Backbone, DetectorNetwork
 
-__all__ = ["Exportable", "export", "fused", "in_full", "normalised_layers", "take_bytes", "write_onnx"]
+__all__ = ["Exportable", "export", "fused", "in_full", "normalised_layers", "take_bytes", "write_onnx", "write_sealed"]
 
 _OPSET = 17
 _LARGE = 256
@@ -114,9 +114,20 @@ def write_onnx(
         traced = onnx.load(raw)
     if compact:
         _keep_in_16_bits(traced.graph)
-    content = _described(traced, shapes, facts)
+    _size_outputs(traced, shapes)
+    _shorten_names(traced.graph)
+    traced.producer_name, traced.producer_version = "errand", ""
+    onnx.checker.check_model(traced)
+    write_sealed(traced, file, facts)
+
+
+def write_sealed(model: onnx.ModelProto, file: Path, facts: Mapping[str, str]) -> None:
+    """Write a model's file with facts as its metadata; whole or not at all."""
+    del model.metadata_props[:]
+    for key, value in facts.items():
+        model.metadata_props.add(key=key, value=value)
     fresh = file.with_name(f".{file.name}.new")
-    fresh.write_bytes(sealed(content))
+    fresh.write_bytes(sealed(model.SerializeToString(deterministic=True)))
     fresh.replace(file)
 
 
@@ -135,19 +146,11 @@ def _trace(model: nn.Module, example: Mapping[str, Tensor], file: Path) -> None:
         )
 
 
-def _described(model: onnx.ModelProto, shapes: Sequence[Sequence[int]], facts: Mapping[str, str]) -> bytes:
-    """The file's bytes with the sizes of its outputs and facts as its metadata."""
+def _size_outputs(model: onnx.ModelProto, shapes: Sequence[Sequence[int]]) -> None:
+    """Let a model tell the sizes of its outputs."""
     for port, sizes in zip(model.graph.output, shapes, strict=True):
         for axis, size in enumerate(sizes[1:], start=1):
             port.type.tensor_type.shape.dim[axis].dim_value = size
-    _shorten_names(model.graph)
-    del model.metadata_props[:]
-    for key, value in facts.items():
-        model.metadata_props.add(key=key, value=value)
-    model.producer_name, model.producer_version = "errand", ""
-    onnx.checker.check_model(model)
-    content: bytes = model.SerializeToString(deterministic=True)
-    return content
 
 
 def _keep_in_16_bits(graph: onnx.GraphProto) -> None:

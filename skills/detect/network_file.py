@@ -16,6 +16,8 @@ from typing import Any, Final
 import numpy as np
 import onnxruntime
 
+from skills.detect.processor import adds_byte_products_exactly
+
 __all__ = ["THREADS", "ModelFileError", "Network", "NetworkKind", "load_network", "sealed"]
 
 THREADS: Final = 2
@@ -163,6 +165,8 @@ def _session_options(threads: int) -> onnxruntime.SessionOptions:
     options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
     options.use_deterministic_compute = True
     options.add_session_config_entry("session.force_spinning_stop", "1")  # between pictures the cores are others'
+    if not adds_byte_products_exactly():
+        options.add_session_config_entry("session.x64quantprecision", "1")
     options.log_severity_level = QUIET
     return options
 

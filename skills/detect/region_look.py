@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from onnxruntime import InferenceSession
 from skills.detect.regions import CHIP_PX, Regions, chip_map, mapped
 from skills.detect.scales import Scales, halved
 
-__all__ = ["looked_again"]
+__all__ = ["chips_about", "looked_again"]
 
 Picture = NDArray[np.uint8]
 Floats = NDArray[np.float32]
@@ -36,13 +38,22 @@ def looked_again(
     return found, scores
 
 
-def _seen(session: InferenceSession, scales: Scales, regions: Regions, *, mirrored: bool) -> tuple[Floats, Floats]:
-    """Boxes in the letterbox and scores of what is seen in chips about regions, or in their mirror images."""
-    maps = np.stack([chip_map(box, mirrored=mirrored) for box in regions.boxes])
-    given = {
+def chips_about(scales: Scales, regions: Regions, *, mirrored: bool = False) -> dict[str, NDArray[Any]]:
+    """What the second network is given: chips about regions or their mirror images, regions in them, and logits."""
+    maps = _maps(regions, mirrored)
+    return {
         "chips": np.stack([scales.cut(to_chip, (CHIP_PX, CHIP_PX)) for to_chip in maps]),
         "regions": mapped(regions.boxes, maps),
         "logits": regions.logits,
     }
-    found, scores = session.run(["boxes", "scores"], given)
-    return mapped(found, np.stack([cv2.invertAffineTransform(to_chip) for to_chip in maps])), scores
+
+
+def _maps(regions: Regions, mirrored: bool) -> Floats:
+    return np.stack([chip_map(box, mirrored=mirrored) for box in regions.boxes])
+
+
+def _seen(session: InferenceSession, scales: Scales, regions: Regions, *, mirrored: bool) -> tuple[Floats, Floats]:
+    """Boxes in the letterbox and scores of what is seen in chips about regions, or in their mirror images."""
+    found, scores = session.run(["boxes", "scores"], chips_about(scales, regions, mirrored=mirrored))
+    back = np.stack([cv2.invertAffineTransform(to_chip) for to_chip in _maps(regions, mirrored)])
+    return mapped(found, back), scores

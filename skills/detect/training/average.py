@@ -18,34 +18,40 @@ import onnx
 
 from skills.detect.detector_file import load_model, load_regions
 from skills.detect.network_file import ModelFileError, Network
-from skills.detect.training.export import write_sealed
 from skills.detect.training.labels import TrainingDataError
+from skills.detect.training.onnx_files import EIGHT_BITS, SEAL, in_full, learnt_weights, write_sealed
 
 __all__ = ["average", "main"]
 
 _OFFSETS = "score_offsets"
-_SEAL = "sha256"
 _MEND = "name files that errand dataset train or refine wrote"
 
 
 def average(files: Sequence[Path], out: Path) -> None:
     """Write the mean of second networks beside the same first one, or of first networks; whole or not at all.
 
-    All that the files tell is the first one's, but for the shifts of scores, which are the mean too. Raises
-    TrainingDataError.
+    One at least must reckon with floats, as what is written does. It tells what the first of those tells, but for the
+    shifts of scores, which are the mean too. Raises TrainingDataError.
     """
     told = [_told(file) for file in files]
+    floats = next((k for k, network in enumerate(told) if EIGHT_BITS not in network.metadata), None)
+    if floats is None:
+        raise TrainingDataError(
+            f"{files[0]}: reckons with 8 bits, and so do all others",
+            mend="name one at least that errand dataset train or refine wrote",
+        )
     models = [onnx.load(file) for file in files]
-    weights = [{one.name: onnx.numpy_helper.to_array(one) for one in model.graph.initializer} for model in models]
+    made, weights = models[floats], [learnt_weights(model) for model in models]
     for file, network, found in zip(files, told, weights, strict=True):
-        if not _alike(network, told[0], found, weights[0]):
-            raise TrainingDataError(f"{file}: is another network than {files[0]}", mend=_MEND)
-    made = models[0]
+        if not _alike(network, told[floats], found, weights[floats]):
+            raise TrainingDataError(f"{file}: is another network than {files[floats]}", mend=_MEND)
     for one in made.graph.initializer:
-        if np.issubdtype(weights[0][one.name].dtype, np.floating):
-            mean = np.mean([found[one.name].astype(np.float64) for found in weights], axis=0)
-            one.CopyFrom(onnx.numpy_helper.from_array(mean.astype(weights[0][one.name].dtype), one.name))
-    facts = {entry.key: entry.value for entry in made.metadata_props if entry.key != _SEAL}
+        name = in_full(one.name)
+        if name in weights[floats]:
+            kind = onnx.numpy_helper.to_array(one).dtype
+            mean = np.mean([found[name].astype(np.float64) for found in weights], axis=0)
+            one.CopyFrom(onnx.numpy_helper.from_array(mean.astype(kind), one.name))
+    facts = {entry.key: entry.value for entry in made.metadata_props if entry.key != SEAL}
     if all(_OFFSETS in network.metadata for network in told):
         shifts = np.mean([json.loads(network.metadata[_OFFSETS]) for network in told], axis=0)
         facts[_OFFSETS] = json.dumps([round(float(value), 4) for value in shifts])

@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import copy
 import json
-import math
 import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
 import onnx
 import torch
 from torch import Tensor, nn
 
 from skills.detect.detector_file import FORMAT
 from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX
-from skills.detect.network_file import sealed
+from skills.detect.training import onnx_files
 from skills.detect.training.network import Backbone, DetectorNetwork
+from skills.detect.training.onnx_files import shorten_names, write_sealed
 
-__all__ = ["Exportable", "export", "fused", "in_full", "normalised_layers", "take_bytes", "write_onnx", "write_sealed"]
+__all__ = ["Exportable", "export", "fused", "normalised_layers", "take_bytes", "write_onnx"]
 
 _OPSET = 17
-_LARGE = 256
-_SHORT = ".short"
 Network = TypeVar("Network", bound=nn.Module)
 
 
@@ -113,22 +110,12 @@ def write_onnx(
         _trace(model, example, raw)
         traced = onnx.load(raw)
     if compact:
-        _keep_in_16_bits(traced.graph)
+        onnx_files.compact(traced.graph)
     _size_outputs(traced, shapes)
-    _shorten_names(traced.graph)
+    shorten_names(traced.graph)
     traced.producer_name, traced.producer_version = "errand", ""
     onnx.checker.check_model(traced)
     write_sealed(traced, file, facts)
-
-
-def write_sealed(model: onnx.ModelProto, file: Path, facts: Mapping[str, str]) -> None:
-    """Write a model's file with facts as its metadata; whole or not at all."""
-    del model.metadata_props[:]
-    for key, value in facts.items():
-        model.metadata_props.add(key=key, value=value)
-    fresh = file.with_name(f".{file.name}.new")
-    fresh.write_bytes(sealed(model.SerializeToString(deterministic=True)))
-    fresh.replace(file)
 
 
 def _trace(model: nn.Module, example: Mapping[str, Tensor], file: Path) -> None:
@@ -151,41 +138,3 @@ def _size_outputs(model: onnx.ModelProto, shapes: Sequence[Sequence[int]]) -> No
     for port, sizes in zip(model.graph.output, shapes, strict=True):
         for axis, size in enumerate(sizes[1:], start=1):
             port.type.tensor_type.shape.dim[axis].dim_value = size
-
-
-def _keep_in_16_bits(graph: onnx.GraphProto) -> None:
-    """Halve the numbers of all larger weights, each made whole again by a node before all others."""
-    large = [one for one in graph.initializer if one.data_type == onnx.TensorProto.FLOAT and _size(one) >= _LARGE]
-    nodes = [onnx.helper.make_node("Cast", [_short(one)], [one.name], to=onnx.TensorProto.FLOAT) for one in large]
-    for one in large:
-        values = onnx.numpy_helper.to_array(one).astype(np.float16)
-        one.CopyFrom(onnx.numpy_helper.from_array(values, _short(one)))
-    nodes.extend(graph.node)
-    del graph.node[:]
-    graph.node.extend(nodes)
-
-
-def _size(weights: onnx.TensorProto) -> int:
-    return math.prod(weights.dims)
-
-
-def _short(weights: onnx.TensorProto) -> str:
-    return f"{weights.name}{_SHORT}"
-
-
-def in_full(name: str) -> str:
-    """The name that a weight has in the network, of that which it has in a compact file."""
-    return name.removesuffix(_SHORT)
-
-
-def _shorten_names(graph: onnx.GraphProto) -> None:
-    """Numbers in place of the long names of what is passed on within the network, and nodes without names."""
-    kept = {port.name for port in graph.output}
-    short: dict[str, str] = {}
-    for node in graph.node:
-        node.name = ""
-        for name in (name for name in node.output if name not in kept):
-            short[name] = f"v{len(short)}"
-    for node in graph.node:
-        for names in (node.input, node.output):
-            names[:] = [short.get(name, name) for name in names]

@@ -19,7 +19,7 @@ from skills.detect.training.calibrate import score_offsets
 from skills.detect.training.labels import TrainingDataError
 from skills.detection import Detection
 
-__all__ = ["Examination", "examination", "examine", "offsets_by"]
+__all__ = ["Examination", "examination", "examine", "offsets_by", "read_picture"]
 
 LEAST_SCORE = 0.02
 
@@ -61,10 +61,11 @@ def offsets_by(model: Path, exam: Examination, *, second: bool) -> tuple[float, 
 
 def _found(model: Path, exam: Examination, second: bool) -> list[tuple[Detection, ...]]:
     detector = OnnxDetector(load_model(model, second=second), DetectorOptions(threshold=LEAST_SCORE))
-    return [detector.detect([_read(exam.folder / picture.file)])[0] for picture in exam.pictures]
+    return [detector.detect([read_picture(exam.folder / picture.file)])[0] for picture in exam.pictures]
 
 
-def _read(file: Path) -> NDArray[np.uint8]:
+def read_picture(file: Path) -> NDArray[np.uint8]:
+    """A picture (H, W, 3) of a data set. Raises TrainingDataError."""
     picture = cv2.imread(str(file), cv2.IMREAD_COLOR_RGB)
     if picture is None:
         raise TrainingDataError(f"{file}: is no picture, or damaged", mend="render the data set anew")

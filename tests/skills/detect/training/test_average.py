@@ -13,8 +13,10 @@ onnx = pytest.importorskip("onnx")
 
 from skills.detect.detector_file import load_model  # noqa: E402
 from skills.detect.training.average import average, main  # noqa: E402
+from skills.detect.training.eight_bits import in_eight_bits  # noqa: E402
 from skills.detect.training.export import export  # noqa: E402
 from skills.detect.training.labels import TrainingDataError  # noqa: E402
+from skills.detect.training.onnx_files import EIGHT_BITS, SEAL, write_sealed  # noqa: E402
 
 
 def written(file: Path, seed: int, shift: float = 0.0, names: tuple[str, ...] = CLASSES) -> Path:
@@ -52,6 +54,30 @@ def test_a_network_of_other_classes_is_refused_and_nothing_written(tmp_path: Pat
     with pytest.raises(TrainingDataError, match=r"2\.onnx.*another network than.*1\.onnx"):
         average([one, other], tmp_path / "mean.onnx")
     assert not (tmp_path / "mean.onnx").exists()
+
+
+def test_a_network_in_8_bits_takes_part_and_what_is_written_reckons_with_floats(tmp_path: Path) -> None:
+    one, other = written(tmp_path / "1.onnx", 1), in_8_bits(written(tmp_path / "2.onnx", 2))
+    average([other, one], tmp_path / "mean.onnx")
+    found, first, second = (weights_of(file) for file in (tmp_path / "mean.onnx", one, other))
+    assert set(found) == set(first)
+    for name in (name for name in first if name.startswith("network.")):
+        theirs = second.get(name, second.get(f"{name}.short"))
+        assert np.allclose(found[name], (first[name] + theirs.astype(np.float32)) / 2, atol=1e-6)
+
+
+def test_networks_in_8_bits_alone_have_no_mean(tmp_path: Path) -> None:
+    one = in_8_bits(written(tmp_path / "1.onnx", 1))
+    with pytest.raises(TrainingDataError, match=r"1\.onnx.*8 bits"):
+        average([one, one], tmp_path / "mean.onnx")
+
+
+def in_8_bits(file: Path) -> Path:
+    model = onnx.load(file)
+    facts = {entry.key: entry.value for entry in model.metadata_props if entry.key != SEAL}
+    given = {"images": np.random.default_rng(0).integers(0, 256, (1, 480, 640, 3), dtype=np.uint8)}
+    write_sealed(in_eight_bits(model, [given]), file, {**facts, EIGHT_BITS: "yes"})
+    return file
 
 
 def test_a_damaged_file_is_named_and_ends_with_2(

@@ -2,15 +2,18 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from random_networks import random_network
 
 torch = pytest.importorskip("torch")
-pytest.importorskip("onnx")
+onnx = pytest.importorskip("onnx")
 
+from skills.detect.training.eight_bits import in_eight_bits  # noqa: E402
 from skills.detect.training.export import export  # noqa: E402
 from skills.detect.training.labels import TrainingDataError  # noqa: E402
 from skills.detect.training.network import DetectorNetwork  # noqa: E402
+from skills.detect.training.onnx_files import EIGHT_BITS, SEAL, write_sealed  # noqa: E402
 from skills.detect.training.onnx_weights import settle, take_over  # noqa: E402
 
 NAMES = ("beer", "coke", "cube")
@@ -32,6 +35,21 @@ def test_a_network_says_what_the_one_in_the_file_said(written: tuple[DetectorNet
     with torch.no_grad():
         for mine, theirs in zip(other(pictures), network(pictures), strict=True):
             assert torch.allclose(mine, theirs, atol=1e-3)
+
+
+def test_what_reckons_with_8_bits_gives_the_weights_that_it_was_made_of(
+    written: tuple[DetectorNetwork, Path], tmp_path: Path
+) -> None:
+    network, file = written
+    model = onnx.load(file)
+    given = {"images": np.random.default_rng(0).integers(0, 256, (1, 480, 640, 3), dtype=np.uint8)}
+    facts = {entry.key: entry.value for entry in model.metadata_props if entry.key != SEAL}
+    write_sealed(in_eight_bits(model, [given]), tmp_path / "8.onnx", {**facts, EIGHT_BITS: "yes"})
+    pictures, other = torch.rand(2, 3, 64, 96), random_network(2, len(NAMES))
+    take_over(other, tmp_path / "8.onnx")
+    with torch.no_grad():
+        for mine, theirs in zip(other(pictures), network(pictures), strict=True):
+            assert torch.allclose(mine, theirs, atol=5e-2)
 
 
 def test_settled_on_pictures_it_says_the_same_and_so_it_does_while_learning_from_them(

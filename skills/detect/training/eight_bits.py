@@ -61,10 +61,12 @@ def detector_in_eight_bits(file: Path, data: Path, out: Path) -> Path:
         raise TrainingDataError(
             f"{file}: reckons with 8 bits already", mend="name a file that errand dataset train or refine wrote"
         )
+    made = out / file.name
+    if made.exists() and made.samefile(file):
+        raise TrainingDataError(f"{file}: would be written over", mend="name another folder with --out")
     exam = examination(data, "train", model.class_names, _MEASURED_BY)
     pictures = [letterbox(read_picture(exam.folder / picture.file))[0] for picture in exam.pictures]
     out.mkdir(parents=True, exist_ok=True)
-    made = out / file.name
     if EIGHT_BITS in model.first.metadata:
         made.write_bytes(file.read_bytes())
     else:

@@ -151,6 +151,14 @@ def test_what_is_in_8_bits_already_is_refused(tmp_path: Path, data: Path) -> Non
     assert not (tmp_path / "out").exists()
 
 
+def test_nothing_is_written_over(tmp_path: Path, data: Path, plain: "onnx.ModelProto") -> None:
+    file = tmp_path / "detector.onnx"
+    file.write_bytes(plain.SerializeToString())
+    with pytest.raises(TrainingDataError, match=r"detector\.onnx.*written over"):
+        detector_in_eight_bits(file, data, tmp_path)
+    assert file.read_bytes() == plain.SerializeToString()
+
+
 @pytest.mark.parametrize(
     ("detector", "pictures", "named"),
     [

@@ -41,7 +41,6 @@ __all__ = ["detector_in_eight_bits", "in_eight_bits", "main"]
 _MEASURED_BY: Final = 160
 _CHIPS_AT_ONCE: Final = 8
 _AT_ONCE: Final = 8
-_SHARE_WITHIN_PERCENT: Final = 99.999
 _KINDS: Final = ("Conv", "Relu", "Concat", "MaxPool", "Resize", "Add")
 
 Given = Mapping[str, NDArray[Any]]
@@ -96,9 +95,8 @@ def in_eight_bits(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelP
             activation_type=QuantType.QUInt8,
             weight_type=QuantType.QInt8,
             nodes_to_quantize=_between_convolutions(plain.graph),
-            calibrate_method=CalibrationMethod.Percentile,
+            calibrate_method=CalibrationMethod.Entropy,
             extra_options={
-                "CalibPercentile": _SHARE_WITHIN_PERCENT,
                 "AddQDQPairToWeight": True,
                 "QuantizeBias": False,
                 "CalibStridedMinMax": min(_AT_ONCE, len(given)),

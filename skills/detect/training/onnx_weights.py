@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from skills.detect.detector_file import load_model, load_regions
 from skills.detect.network_file import ModelFileError, Network
 from skills.detect.training.export import normalised_layers
 from skills.detect.training.labels import TrainingDataError
-from skills.detect.training.network import Backbone, DetectorNetwork, Residual
+from skills.detect.training.network import Backbone, DetectorNetwork
 from skills.detect.training.onnx_files import learnt_weights
 from skills.detect.training.region_network import RegionNetwork
 
@@ -40,10 +40,7 @@ def take_over(network: DetectorNetwork, file: Path) -> None:
 
 
 def take_over_regions(network: RegionNetwork, file: Path) -> None:
-    """The same for the second network and its file, whichever first network that belongs to.
-
-    Residual blocks that the file's network had not yet are left as they are, passing on what they get.
-    """
+    """The same for the second network and its file, whichever first network that belongs to."""
     try:
         told = load_regions(file)
     except ModelFileError as error:
@@ -54,13 +51,9 @@ def take_over_regions(network: RegionNetwork, file: Path) -> None:
 @torch.no_grad()
 def _take(network: nn.Module, file: Path, told: Network, backbone: Backbone, score_biases: Sequence[Tensor]) -> None:
     kept, left = _content(file), dict(network.named_parameters())
-    new = _new_blocks(network, kept)
-    left = {name: weight for name, weight in left.items() if not name.startswith(new)}
     offsets = json.loads(told.metadata.get("score_offsets", json.dumps([0.0] * len(told.class_names))))
     try:
         for name, unit in normalised_layers(network):
-            if name.startswith(new):
-                continue
             _fill(unit[0].weight, kept[f"{name}.0.weight"])
             _pass_on(unit[1], kept[f"{name}.0.bias"])
             for part in ("0.weight", "1.weight", "1.bias"):
@@ -72,12 +65,6 @@ def _take(network: nn.Module, file: Path, told: Network, backbone: Backbone, sco
     except (KeyError, ValueError) as error:
         raise TrainingDataError(f"{file}: holds another network ({error})", mend=_MEND) from error
     backbone.stem[0][0].weight.mul_(_BYTES)
-
-
-def _new_blocks(network: nn.Module, kept: Mapping[str, Tensor]) -> tuple[str, ...]:
-    """How the names of residual blocks begin of which nothing is kept: they pass on what they get until they learn."""
-    blocks = [f"{name}." for name, part in network.named_modules() if isinstance(part, Residual)]
-    return tuple(block for block in blocks if not any(name.startswith(block) for name in kept))
 
 
 def _content(file: Path) -> dict[str, Tensor]:
@@ -131,7 +118,7 @@ def settle(network: nn.Module, batches: Iterable[tuple[Tensor, ...]]) -> None:
 def _normalise(
     layer: nn.Conv2d | nn.Linear, normalisation: nn.BatchNorm1d | nn.BatchNorm2d, mean: Tensor, variance: Tensor
 ) -> None:
-    """Statistics of a layer's output, and all else such that nothing changes: so far it had none."""
+    """Statistics of a layer's output, and all else such that nothing changes: so far it added a bias only."""
     assert normalisation.running_mean is not None
     assert normalisation.running_var is not None
     lengths = layer.weight.flatten(1).norm(dim=1).clamp(min=1e-6)
@@ -139,5 +126,5 @@ def _normalise(
     mean, variance = mean.float() / lengths, variance.float() / lengths.square()
     normalisation.running_mean.copy_(mean)
     normalisation.running_var.copy_(variance)
-    normalisation.bias.add_(normalisation.weight * lengths * mean)
-    normalisation.weight.mul_(lengths * torch.sqrt(variance + normalisation.eps))
+    normalisation.weight.copy_(lengths * torch.sqrt(variance + normalisation.eps))
+    normalisation.bias.add_(lengths * mean)

@@ -17,7 +17,7 @@ from skills.detect.training.overlaps import overlap
 
 __all__ = ["RegionNetwork"]
 
-_WIDTHS = Widths(residuals=(7, 3))
+_WIDTHS = Widths(residuals=(3, 2))
 _CELLS_8, _CELLS_32 = CHIP_PX // 8, CHIP_PX // 32
 _SQUEEZED, _JOINED = 32, 128
 _MOST_LOGIT = 8.0

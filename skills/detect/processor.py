@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -11,6 +12,7 @@ _CPU_INFO: Final = Path("/proc/cpuinfo")
 _ABLE: Final = frozenset({"avx512_vnni", "avx_vnni"})
 
 
+@cache
 def adds_byte_products_exactly(cpu_info: Path = _CPU_INFO) -> bool:
     """Whether the processor adds products of bytes in 32 bits at once (VNNI), by what Linux tells of it.
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -72,7 +74,8 @@ def load_network(file: Path, kind: NetworkKind) -> Network:
     """The network of a file. Raises ModelFileError."""
     reader = _Reader(file, kind)
     content = reader.content()
-    session, single = reader.session(content, THREADS), reader.session(content, 1)
+    with ThreadPoolExecutor(THREADS) as side_by_side:
+        session, single = side_by_side.map(partial(reader.session, content), (THREADS, 1))
     metadata = session.get_modelmeta().custom_metadata_map
     reader.check_format(metadata)
     names = reader.class_names(metadata)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import onnx
 
 from skills.detect.detector_file import load_model, load_regions
 from skills.detect.network_file import ModelFileError, Network
+from skills.detect.training.command import exit_code_of
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.onnx_files import EIGHT_BITS, SEAL, in_full, learnt_weights, write_sealed
 
@@ -82,12 +82,7 @@ def main() -> int:
     parser.add_argument("files", type=Path, nargs="+")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
-    try:
-        average(given.files, given.out)
-    except (TrainingDataError, OSError) as error:
-        sys.stderr.write(f"error: {error}\n")
-        return 2
-    return 0
+    return exit_code_of(lambda: average(given.files, given.out))
 
 
 if __name__ == "__main__":

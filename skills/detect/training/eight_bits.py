@@ -14,7 +14,6 @@ import argparse
 import contextlib
 import hashlib
 import io
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,6 +31,7 @@ from skills.detect.network_file import ModelFileError
 from skills.detect.region_look import chips_about
 from skills.detect.regions import RegionOptions, Regions, regions_of
 from skills.detect.scales import Scales, halved
+from skills.detect.training.command import exit_code_of
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.onnx_files import EIGHT_BITS, SEAL, compact, in_32_bits, shorten_names, write_sealed
 from skills.detect.training.validate import examination, read_picture
@@ -196,12 +196,7 @@ def main() -> int:
     parser.add_argument("--data", type=Path, required=True, help="the data set's folder")
     parser.add_argument("--out", type=Path, required=True, help="the folder to write to")
     given = parser.parse_args()
-    try:
-        detector_in_eight_bits(given.file, given.data, given.out)
-    except (TrainingDataError, OSError) as error:
-        sys.stderr.write(f"error: {error}\n")
-        return 2
-    return 0
+    return exit_code_of(lambda: detector_in_eight_bits(given.file, given.data, given.out))
 
 
 if __name__ == "__main__":

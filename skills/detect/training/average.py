@@ -19,7 +19,7 @@ from skills.detect.detector_file import load_model, load_regions
 from skills.detect.network_file import ModelFileError, Network
 from skills.detect.training.command import exit_code_of
 from skills.detect.training.labels import TrainingDataError
-from skills.detect.training.onnx_files import EIGHT_BITS, SEAL, in_full, learnt_weights, write_sealed
+from skills.detect.training.onnx_files import EIGHT_BITS, facts_of, in_full, learnt_weights, write_sealed
 
 __all__ = ["average", "main"]
 
@@ -51,7 +51,7 @@ def average(files: Sequence[Path], out: Path) -> None:
             kind = onnx.numpy_helper.to_array(one).dtype
             mean = np.mean([found[name].astype(np.float64) for found in weights], axis=0)
             one.CopyFrom(onnx.numpy_helper.from_array(mean.astype(kind), one.name))
-    facts = {entry.key: entry.value for entry in made.metadata_props if entry.key != SEAL}
+    facts = facts_of(made)
     if all(_OFFSETS in network.metadata for network in told):
         shifts = np.mean([json.loads(network.metadata[_OFFSETS]) for network in told], axis=0)
         facts[_OFFSETS] = json.dumps([round(float(value), 4) for value in shifts])

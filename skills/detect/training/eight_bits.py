@@ -33,10 +33,10 @@ from skills.detect.regions import RegionOptions, Regions, regions_of
 from skills.detect.scales import Scales, halved
 from skills.detect.training.command import exit_code_of
 from skills.detect.training.labels import TrainingDataError
-from skills.detect.training.onnx_files import EIGHT_BITS, SEAL, compact, in_32_bits, shorten_names, write_sealed
+from skills.detect.training.onnx_files import EIGHT_BITS, compact, facts_of, in_32_bits, shorten_names, write_sealed
 from skills.detect.training.validate import examination, read_picture
 
-__all__ = ["detector_in_eight_bits", "in_eight_bits", "main"]
+__all__ = ["detector_in_eight_bits", "in_eight_bits", "main", "write_in_eight_bits"]
 
 _MEASURED_BY: Final = 160
 _CHIPS_AT_ONCE: Final = 8
@@ -69,10 +69,10 @@ def detector_in_eight_bits(file: Path, data: Path, out: Path) -> Path:
     if EIGHT_BITS in model.first.metadata:
         made.write_bytes(file.read_bytes())
     else:
-        _write(file, [{"images": picture[None]} for picture in pictures], made, {})
+        write_in_eight_bits(file, [{"images": picture[None]} for picture in pictures], made)
     if model.second is not None:
         first = {"first": hashlib.sha256(made.read_bytes()).hexdigest()}
-        _write(regions_file(file), _chips(model, pictures), regions_file(made), first)
+        write_in_eight_bits(regions_file(file), _chips(model, pictures), regions_file(made), first)
     return made
 
 
@@ -183,10 +183,13 @@ def _regions_in(model: DetectorModel, picture: NDArray[np.uint8]) -> Regions:
     return regions_of(boxes[0], scores[0], RegionOptions())
 
 
-def _write(file: Path, given: Sequence[Given], out: Path, other_facts: Mapping[str, str]) -> None:
+def write_in_eight_bits(
+    file: Path, given: Sequence[Given], out: Path, other_facts: Mapping[str, str] | None = None
+) -> None:
+    """Write the network of a file so that it reckons with 8 bits; it tells what it did, and `other_facts`."""
     model = onnx.load(file)
-    facts = {entry.key: entry.value for entry in model.metadata_props if entry.key != SEAL}
-    write_sealed(in_eight_bits(model, given), out, {**facts, **other_facts, EIGHT_BITS: "yes"})
+    facts = {**facts_of(model), **(other_facts or {}), EIGHT_BITS: "yes"}
+    write_sealed(in_eight_bits(model, given), out, facts)
 
 
 def main() -> int:

@@ -15,8 +15,8 @@ from skills.detect.network_file import sealed
 
 __all__ = [
     "EIGHT_BITS",
-    "SEAL",
     "compact",
+    "facts_of",
     "in_32_bits",
     "in_full",
     "learnt_weights",
@@ -26,8 +26,7 @@ __all__ = [
 
 EIGHT_BITS: Final = "eight_bits"
 """What a file has among its metadata when its network reckons with 8 bits."""
-SEAL: Final = "sha256"
-"""What sealing adds to the metadata."""
+_SEAL: Final = "sha256"
 _LEARNT: Final = "network."
 _RANGES: Final = ("_scale", "_zero_point")
 _LARGE: Final = 256
@@ -42,6 +41,11 @@ def write_sealed(model: onnx.ModelProto, file: Path, facts: Mapping[str, str]) -
     fresh = file.with_name(f".{file.name}.new")
     fresh.write_bytes(sealed(model.SerializeToString(deterministic=True)))
     fresh.replace(file)
+
+
+def facts_of(model: onnx.ModelProto) -> dict[str, str]:
+    """What a model's file tells, but for what sealing adds."""
+    return {entry.key: entry.value for entry in model.metadata_props if entry.key != _SEAL}
 
 
 def learnt_weights(model: onnx.ModelProto) -> dict[str, NDArray[np.floating]]:

@@ -13,10 +13,9 @@ onnx = pytest.importorskip("onnx")
 
 from skills.detect.detector_file import load_model  # noqa: E402
 from skills.detect.training.average import average, main  # noqa: E402
-from skills.detect.training.eight_bits import in_eight_bits  # noqa: E402
+from skills.detect.training.eight_bits import write_in_eight_bits  # noqa: E402
 from skills.detect.training.export import export  # noqa: E402
 from skills.detect.training.labels import TrainingDataError  # noqa: E402
-from skills.detect.training.onnx_files import EIGHT_BITS, SEAL, write_sealed  # noqa: E402
 
 
 def written(file: Path, seed: int, shift: float = 0.0, names: tuple[str, ...] = CLASSES) -> Path:
@@ -73,10 +72,8 @@ def test_networks_in_8_bits_alone_have_no_mean(tmp_path: Path) -> None:
 
 
 def in_8_bits(file: Path) -> Path:
-    model = onnx.load(file)
-    facts = {entry.key: entry.value for entry in model.metadata_props if entry.key != SEAL}
     given = {"images": np.random.default_rng(0).integers(0, 256, (1, 480, 640, 3), dtype=np.uint8)}
-    write_sealed(in_eight_bits(model, [given]), file, {**facts, EIGHT_BITS: "yes"})
+    write_in_eight_bits(file, [given], file)
     return file
 
 

@@ -22,9 +22,9 @@ from skills.detect.training.onnx_files import learnt_weights  # noqa: E402
 CELLS = 15 * 20
 
 
-def convolutions(*, classes: int = len(CLASSES), shift: float = 2.0) -> "onnx.ModelProto":
+def convolutions() -> "onnx.ModelProto":
     """A first network of three convolutions, to a box and scores at each of 300 cells."""
-    random = np.random.default_rng(5)
+    random, classes = np.random.default_rng(5), len(CLASSES)
     sizes = {"first": (16, 3, 32), "second": (24, 16, 3), "last": (4 + classes, 24, 1)}
     constants = {
         f"network.{name}.weight": random.normal(0, 1 / np.sqrt(inputs * size * size), (outputs, inputs, size, size))
@@ -32,7 +32,7 @@ def convolutions(*, classes: int = len(CLASSES), shift: float = 2.0) -> "onnx.Mo
     }
     constants["network.first.weight"] /= 100.0
     constants |= {f"network.{name}.bias": random.normal(0, 0.1, outputs) for name, (outputs, _, _) in sizes.items()}
-    constants["network.last.bias"] += shift
+    constants["network.last.bias"] += 2.0
     whole = {
         "ends": np.array([4, classes]),
         "cells": np.array([0, CELLS, 4 + classes]),

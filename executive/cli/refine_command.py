@@ -1,4 +1,4 @@
-"""`errand dataset refine`: a second network learns to judge what the detector's first one finds."""
+"""`errand dataset refine`: a second or third network learns to judge what those before it find."""
 
 from __future__ import annotations
 
@@ -24,10 +24,13 @@ UNLESS_SAID_MINUTES: Final = 90.0
 
 def refine_command(
     data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
-    out: Annotated[Path, typer.Option(help="Folder for checkpoints, curves and both ONNX files.")],
+    out: Annotated[Path, typer.Option(help="Folder for checkpoints, curves and the ONNX files.")],
     model: Annotated[
         Path | None, typer.Option(help="The first network's file; else the one of Errand.", show_default=False)
     ] = None,
+    third: Annotated[
+        bool, typer.Option("--third", help="Learn the third network, which judges what the second one sees.")
+    ] = False,
     minutes: Annotated[
         float | None,
         typer.Option(min=0.01, help="How long to learn; an hour and a half unless said.", show_default=False),
@@ -39,11 +42,11 @@ def refine_command(
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
     start: Annotated[
         Path | None,
-        typer.Option(help="A checkpoint or an ONNX file of the second network whose weights are taken over."),
+        typer.Option(help="A checkpoint or an ONNX file of the same network whose weights are taken over."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Train the second network, which looks again at each place that the first one finds, and export it."""
+    """Train the second network, which looks again at each place that the first one finds, or the third; export it."""
     console = console_for(as_json)
     with refusals():
         check_folders(data, out, resume)
@@ -55,6 +58,7 @@ def refine_command(
             first,
             out,
             budget_of(data, minutes, epochs, unless_said_minutes=UNLESS_SAID_MINUTES),
+            third=third,
             seed=seed,
             processes=jobs or os.cpu_count() or 1,
             resume=resume,

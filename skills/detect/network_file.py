@@ -20,7 +20,7 @@ import onnxruntime
 
 from skills.detect.processor import adds_byte_products_exactly
 
-__all__ = ["THREADS", "ModelFileError", "Network", "NetworkKind", "load_network", "sealed"]
+__all__ = ["THREADS", "Inputs", "ModelFileError", "Network", "NetworkKind", "Outputs", "load_network", "sealed"]
 
 THREADS: Final = 2
 QUIET: Final = 4

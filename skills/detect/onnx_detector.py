@@ -16,7 +16,8 @@ from skills.detect.detector_file import MODEL_FILE, DetectorModel, load_model
 from skills.detect.letterbox import Letterbox, letterbox
 from skills.detect.network_file import THREADS, Network
 from skills.detect.region_look import looked_again
-from skills.detect.regions import RegionOptions, regions_of
+from skills.detect.regions import JUDGED, RegionOptions
+from skills.detect.scales import Scales, halved
 from skills.detect.suppression import SuppressionOptions, candidates_of, told
 from skills.detection import Detection
 
@@ -30,13 +31,15 @@ Floats = NDArray[np.float32]
 class DetectorOptions:
     """The least score that is told, also of a class that a thing may be as well, and how boxes on it become one.
 
-    `regions` are the places at which a second network, where there is one, looks again.
+    `regions` are the places at which a second network, where there is one, looks again, and `judged` those of them that
+    a third one judges, where there is one.
     """
 
     threshold: float = 0.5
     rival_threshold: float = 0.1
     suppression: SuppressionOptions = field(default_factory=SuppressionOptions)
     regions: RegionOptions = field(default_factory=RegionOptions)
+    judged: RegionOptions = JUDGED
 
 
 @dataclass(frozen=True)
@@ -67,11 +70,10 @@ class OnnxDetector:
         boxes, scores = session(self.model.first).run(["boxes", "scores"], {"images": image[None]})
         boxes, scores = boxes[0], scores[0]
         if self.model.second is not None:
-            options = self.options.regions
-            regions = regions_of(boxes, scores, options)
-            boxes, scores = looked_again(
-                session(self.model.second), image, regions, mirrored_from=options.mirrored_from
-            )
+            scales = Scales(image, halved(image))
+            boxes, scores = looked_again(session(self.model.second), scales, boxes, scores, self.options.regions)
+            if self.model.third is not None:
+                boxes, scores = looked_again(session(self.model.third), scales, boxes, scores, self.options.judged)
         return self._detections(boxes, scores, placed)
 
     def _detections(self, boxes: Floats, scores: Floats, placed: Letterbox) -> tuple[Detection, ...]:

@@ -1,4 +1,4 @@
-"""A second look at places that the first network found: what is there, and where exactly."""
+"""Another look at places that a network found: what is there, and where exactly."""
 
 from __future__ import annotations
 
@@ -9,37 +9,38 @@ import numpy as np
 from numpy.typing import NDArray
 from onnxruntime import InferenceSession
 
-from skills.detect.regions import CHIP_PX, Regions, chip_map, mapped
-from skills.detect.scales import Scales, halved
+from skills.detect.regions import CHIP_PX, RegionOptions, Regions, chip_map, mapped, regions_of
+from skills.detect.scales import Scales
 
 __all__ = ["chips_about", "looked_again"]
 
-Picture = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 
 
 def looked_again(
-    session: InferenceSession, letterbox: Picture, regions: Regions, *, mirrored_from: float | None
+    session: InferenceSession, scales: Scales, boxes: Floats, scores: Floats, options: RegionOptions
 ) -> tuple[Floats, Floats]:
-    """Boxes (R, 4) in pixels of the letterbox (480, 640, 3), and scores (R, K), of what the second network sees.
+    """Boxes (R, 4) and scores (R, K) of what a network sees at the places that boxes (A, 4) and scores (A, K) tell of.
 
-    Where that is something with at least the score `mirrored_from`, the means of what it sees in the chip and in its
-    mirror image; nowhere for None.
+    Boxes are in pixels of the letterbox (480, 640, 3), of which `scales` are. Where it looks at the mirror image too,
+    the means of what it sees in both.
     """
+    regions = regions_of(boxes, scores, options)
     if not len(regions):
         return regions.boxes, np.zeros_like(regions.logits)
-    scales = Scales(letterbox, halved(letterbox))
-    found, scores = _seen(session, scales, regions, mirrored=False)
-    rows = np.flatnonzero(scores.max(axis=1) >= mirrored_from) if mirrored_from is not None else np.empty(0, np.int64)
+    found, seen = _seen(session, scales, regions, mirrored=False)
+    if options.mirrored_from is None:
+        return found, seen
+    rows = np.flatnonzero(seen.max(axis=1) >= options.mirrored_from)
     if len(rows):
-        boxes, others = _seen(session, scales, Regions(regions.boxes[rows], regions.logits[rows]), mirrored=True)
-        found[rows] = 0.5 * (found[rows] + boxes)
-        scores[rows] = 0.5 * (scores[rows] + others)
-    return found, scores
+        again, others = _seen(session, scales, Regions(regions.boxes[rows], regions.logits[rows]), mirrored=True)
+        found[rows] = 0.5 * (found[rows] + again)
+        seen[rows] = 0.5 * (seen[rows] + others)
+    return found, seen
 
 
 def chips_about(scales: Scales, regions: Regions, *, mirrored: bool = False) -> dict[str, NDArray[Any]]:
-    """What the second network is given: chips about regions or their mirror images, regions in them, and logits."""
+    """What such a network is given: chips about regions or their mirror images, regions in them, and logits."""
     maps = _maps(regions, mirrored)
     return {
         "chips": np.stack([scales.cut(to_chip, (CHIP_PX, CHIP_PX)) for to_chip in maps]),

@@ -1,7 +1,8 @@
 """Places in a picture where something may be, as the first network's surest boxes tell, and a chip cut out about each.
 
 All is in pixels of the letterbox. That a second network looks again at such places is after Girshick, "Fast R-CNN"
-(2015); here it sees the picture anew, enlarged or made smaller to one size, and not the first one's features.
+(2015); here it sees the picture anew, enlarged or made smaller to one size, and not the first one's features. That a
+third one judges what the second one made of them is after Cai and Vasconcelos, "Cascade R-CNN" (2018).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from skills.detect.suppression import apart
 
-__all__ = ["CHIP_PX", "RegionOptions", "Regions", "chip_map", "logits_of", "mapped", "regions_of"]
+__all__ = ["CHIP_PX", "JUDGED", "RegionOptions", "Regions", "chip_map", "logits_of", "mapped", "regions_of"]
 
 CHIP_PX: Final = 128
 THING_PX: Final = 84.0
@@ -38,6 +39,10 @@ class RegionOptions:
     most: int = 12
     most_candidates: int = 250
     mirrored_from: float | None = 0.3
+
+
+JUDGED: Final = RegionOptions(least_score=0.03, same=0.8, mirrored_from=None)
+"""What a third network judges of what the second one sees."""
 
 
 @dataclass(frozen=True)

@@ -85,9 +85,11 @@ def picture_of(*things, size=(480, 640), classes=CLASSES):
 
 
 def second_bytes(
-    first: bytes, *, classes=CLASSES, form="errand-regions-1", told=None, size=128, left_only=False
+    first: bytes, *, classes=CLASSES, form="errand-regions-1", key="first", told=None, size=128, left_only=False
 ) -> bytes:
     """A second network: boxes a tenth smaller than the regions; the first class's score is the share of red.
+
+    It tells as `key` the digest of the file of the one before it.
 
     With `left_only` it looks at the left half of the chip alone.
     """
@@ -128,7 +130,7 @@ def second_bytes(
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
     belongs = hashlib.sha256(first).hexdigest() if told is None else told
-    helper.set_model_props(model, {"format": form, "class_names": json.dumps(list(classes)), "first": belongs})
+    helper.set_model_props(model, {"format": form, "class_names": json.dumps(list(classes)), key: belongs})
     onnx.checker.check_model(model)
     return model.SerializeToString()
 
@@ -137,4 +139,16 @@ def write_pair(file: Path, **changes) -> Path:
     """Both networks, beside each other; `changes` are the second one's."""
     write_model(file)
     file.with_name(f"{file.stem}_regions.onnx").write_bytes(second_bytes(file.read_bytes(), **changes))
+    return file
+
+
+def third_bytes(second: bytes, **changes) -> bytes:
+    """A third network that sees and tells what such a second one does."""
+    return second_bytes(second, **{"form": "errand-third-1", "key": "second", **changes})
+
+
+def write_three(file: Path, **changes) -> Path:
+    """All three networks, beside each other; `changes` are the third one's."""
+    second = write_pair(file).with_name(f"{file.stem}_regions.onnx")
+    file.with_name(f"{file.stem}_third.onnx").write_bytes(third_bytes(second.read_bytes(), **changes))
     return file

@@ -8,6 +8,7 @@ After Wortsman et al., "Model soups" (2022).
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import onnx
 
-from skills.detect.detector_file import load_model, load_regions
+from skills.detect.detector_file import load_model, load_regions, load_third
 from skills.detect.network_file import ModelFileError, Network
 from skills.detect.training.command import exit_code_of
 from skills.detect.training.labels import TrainingDataError
@@ -24,11 +25,12 @@ from skills.detect.training.onnx_files import EIGHT_BITS, facts_of, in_full, lea
 __all__ = ["average", "main"]
 
 _OFFSETS = "score_offsets"
+_ALIKE = ("format", "class_names", "first", "second")
 _MEND = "name files that errand dataset train or refine wrote"
 
 
 def average(files: Sequence[Path], out: Path) -> None:
-    """Write the mean of second networks beside the same first one, or of first networks; whole or not at all.
+    """Write the mean of networks of one kind that stand beside the same one before them; whole or not at all.
 
     One at least must reckon with floats, as what is written does. It tells what the first of those tells, but for the
     shifts of scores, which are the mean too. Raises TrainingDataError.
@@ -59,20 +61,19 @@ def average(files: Sequence[Path], out: Path) -> None:
 
 
 def _told(file: Path) -> Network:
-    """What a file of either network tells. Raises TrainingDataError."""
+    """What a file of any of the networks tells. Raises TrainingDataError."""
+    for load in (load_regions, load_third):
+        with contextlib.suppress(ModelFileError):
+            return load(file)
     try:
-        return load_regions(file)
-    except ModelFileError:
-        pass
-    try:
-        return load_model(file, second=False).first
+        return load_model(file, networks=1).first
     except ModelFileError as error:
         raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
 
 
 def _alike(one: Network, other: Network, weights: Mapping[str, np.ndarray], others: Mapping[str, np.ndarray]) -> bool:
-    """Whether two networks take and tell the same, stand beside the same first one, and have weights of like shapes."""
-    same = all(one.metadata.get(key) == other.metadata.get(key) for key in ("format", "class_names", "first"))
+    """Whether two networks take and tell the same, stand beside the same other one, and have weights of like shapes."""
+    same = all(one.metadata.get(key) == other.metadata.get(key) for key in _ALIKE)
     return same and {n: w.shape for n, w in weights.items()} == {n: w.shape for n, w in others.items()}
 
 

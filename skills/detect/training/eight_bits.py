@@ -2,10 +2,10 @@
 
     python -m skills.detect.training.eight_bits DIR/errand_detector.onnx --data PICTURES --out FOLDER
 
-Weights keep 16 bits in the file, so that learning can go on from it; ONNX Runtime brings them to 8 when it loads them.
-What passes between layers gets its range from some pictures that were learnt from. The first convolution, which sees
-the picture, and the last ones, which tell scores and boxes, stay as they are. After Jacob et al., "Quantization and
-Training of Neural Networks for Efficient Integer-Arithmetic-Only Inference" (2018). Needs no torch.
+Weights have 8 bits in the file, those of each output in steps of their own; learning can go on from them. What passes
+between layers gets its range from some pictures that were learnt from. The first convolution, which sees the picture,
+and the last ones, which tell scores and boxes, stay as they are. After Jacob et al., "Quantization and Training of
+Neural Networks for Efficient Integer-Arithmetic-Only Inference" (2018). Needs no torch.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import contextlib
 import hashlib
 import io
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,11 +26,11 @@ from numpy.typing import NDArray
 from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, QuantFormat, QuantType, quantize_static
 from onnxruntime.quantization.shape_inference import quant_pre_process
 
-from skills.detect.detector_file import DetectorModel, load_model, regions_file
+from skills.detect.detector_file import DetectorModel, load_model, regions_file, third_file
 from skills.detect.letterbox import letterbox
-from skills.detect.network_file import ModelFileError
-from skills.detect.region_look import chips_about
-from skills.detect.regions import RegionOptions, Regions, regions_of
+from skills.detect.network_file import ModelFileError, Network
+from skills.detect.region_look import chips_about, looked_again
+from skills.detect.regions import JUDGED, RegionOptions, Regions, regions_of
 from skills.detect.scales import Scales, halved
 from skills.detect.training.command import exit_code_of
 from skills.detect.training.labels import TrainingDataError
@@ -41,22 +42,22 @@ __all__ = ["detector_in_eight_bits", "in_eight_bits", "main", "write_in_eight_bi
 _MEASURED_BY: Final = 160
 _CHIPS_AT_ONCE: Final = 8
 _AT_ONCE: Final = 8
-_KINDS: Final = ("Conv", "Relu", "Concat", "MaxPool", "Resize", "Add")
+_KINDS: Final = ("Conv", "Relu", "Clip", "Concat", "MaxPool", "Resize", "Add")
 
 Given = Mapping[str, NDArray[Any]]
 
 
 def detector_in_eight_bits(file: Path, data: Path, out: Path) -> Path:
-    """Write the network of a file, and the second one beside it, into a folder; gives the first's file.
+    """Write the network of a file, and those beside it, into a folder; gives the first's file.
 
-    A first one that reckons with 8 bits already is copied. Ranges are measured on pictures of the data set `data` that
+    Those that reckon with 8 bits already stay as they are. Ranges are measured on pictures of the data set `data` that
     were learnt from. Raises TrainingDataError for files that cannot be used, or when there is nothing to do.
     """
     try:
         model = load_model(file)
     except ModelFileError as error:
         raise TrainingDataError(f"{error.file}: {error.message}", mend="name a detector's ONNX file") from error
-    if EIGHT_BITS in (model.second or model.first).metadata:
+    if EIGHT_BITS in (model.third or model.second or model.first).metadata:
         raise TrainingDataError(
             f"{file}: reckons with 8 bits already", mend="name a file that errand dataset train or refine wrote"
         )
@@ -66,13 +67,22 @@ def detector_in_eight_bits(file: Path, data: Path, out: Path) -> Path:
     exam = examination(data, "train", model.class_names, _MEASURED_BY)
     pictures = [letterbox(read_picture(exam.folder / picture.file))[0] for picture in exam.pictures]
     out.mkdir(parents=True, exist_ok=True)
-    if EIGHT_BITS in model.first.metadata:
-        made.write_bytes(file.read_bytes())
-    else:
-        write_in_eight_bits(file, [{"images": picture[None]} for picture in pictures], made)
-    if model.second is not None:
-        first = {"first": hashlib.sha256(made.read_bytes()).hexdigest()}
-        write_in_eight_bits(regions_file(file), _chips(model, pictures), regions_file(made), first)
+    scales = [Scales(picture, halved(picture)) for picture in pictures]
+    networks: tuple[tuple[Path, Network | None, Callable[[], Sequence[Given]]], ...] = (
+        (file, model.first, lambda: [{"images": picture[None]} for picture in pictures]),
+        (regions_file(file), model.second, lambda: _chips(partial(_places, model), scales)),
+        (third_file(file), model.third, lambda: _chips(partial(_seen_places, model), scales)),
+    )
+    belongs: dict[str, str] = {}
+    for name, (source, network, given) in zip(("first", "second", "third"), networks, strict=True):
+        if network is not None:
+            target = out / source.name
+            if EIGHT_BITS in network.metadata:
+                kept = onnx.load(source)
+                write_sealed(kept, target, {**facts_of(kept), **belongs})
+            else:
+                write_in_eight_bits(source, given(), target, belongs)
+            belongs = {name: hashlib.sha256(target.read_bytes()).hexdigest()}
     return made
 
 
@@ -97,7 +107,6 @@ def in_eight_bits(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelP
             nodes_to_quantize=_between_convolutions(plain.graph),
             calibrate_method=CalibrationMethod.Entropy,
             extra_options={
-                "AddQDQPairToWeight": True,
                 "QuantizeBias": False,
                 "CalibStridedMinMax": min(_AT_ONCE, len(given)),
             },
@@ -163,10 +172,10 @@ def _downstream(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto]) -> set[
     return found
 
 
-def _chips(model: DetectorModel, pictures: Sequence[NDArray[np.uint8]]) -> list[Given]:
-    """What the second network is given of pictures in the letterbox, always of as many chips."""
-    looked_at = [(picture, _regions_in(model, picture)) for picture in pictures]
-    found = [chips_about(Scales(picture, halved(picture)), regions) for picture, regions in looked_at if len(regions)]
+def _chips(look: Callable[[Scales], Regions], pictures: Sequence[Scales]) -> list[Given]:
+    """What a network is given at the places of a look at pictures in the letterbox, always of as many chips."""
+    looked_at = [(picture, look(picture)) for picture in pictures]
+    found = [chips_about(picture, regions) for picture, regions in looked_at if len(regions)]
     if not found:
         raise TrainingDataError("the first network finds no place to look at", mend="train it for longer first")
     together = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
@@ -178,9 +187,20 @@ def _chips(model: DetectorModel, pictures: Sequence[NDArray[np.uint8]]) -> list[
     ]
 
 
-def _regions_in(model: DetectorModel, picture: NDArray[np.uint8]) -> Regions:
-    boxes, scores = model.first.session.run(["boxes", "scores"], {"images": picture[None]})
-    return regions_of(boxes[0], scores[0], RegionOptions())
+def _places(model: DetectorModel, scales: Scales) -> Regions:
+    """Where the second network looks."""
+    return regions_of(*_first_look(model, scales), RegionOptions())
+
+
+def _seen_places(model: DetectorModel, scales: Scales) -> Regions:
+    """Where the third network looks."""
+    assert model.second is not None  # it stands beside a second one only
+    return regions_of(*looked_again(model.second.session, scales, *_first_look(model, scales), RegionOptions()), JUDGED)
+
+
+def _first_look(model: DetectorModel, scales: Scales) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    boxes, scores = model.first.session.run(["boxes", "scores"], {"images": scales.full[None]})
+    return boxes[0], scores[0]
 
 
 def write_in_eight_bits(

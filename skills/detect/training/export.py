@@ -17,10 +17,10 @@ from torch import Tensor, nn
 from skills.detect.detector_file import FORMAT
 from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX
 from skills.detect.training import onnx_files
-from skills.detect.training.network import Backbone, DetectorNetwork
+from skills.detect.training.network import DetectorNetwork
 from skills.detect.training.onnx_files import shorten_names, write_sealed
 
-__all__ = ["Exportable", "export", "fused", "normalised_layers", "take_bytes", "write_onnx"]
+__all__ = ["Exportable", "export", "fused", "normalised_layers", "write_onnx"]
 
 _OPSET = 17
 Network = TypeVar("Network", bound=nn.Module)
@@ -34,18 +34,12 @@ class Exportable(nn.Module):
         self.network = fused(network)
         if score_offsets is not None:
             _shift(self.network, score_offsets)
-        take_bytes(self.network.backbone)
+        self.network.backbone.take_bytes()
 
     def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
         """Boxes and scores. The first convolution takes values from 0 to 255, its weights being so much smaller."""
         logits, boxes = self.network(images.permute(0, 3, 1, 2).float())
         return boxes, logits.sigmoid()
-
-
-@torch.no_grad()
-def take_bytes(backbone: Backbone) -> None:
-    """Let the first convolution take values from 0 to 255."""
-    backbone.stem[0][0].weight.mul_(1.0 / 255.0)
 
 
 @torch.no_grad()

@@ -17,7 +17,7 @@ from skills.detect.training.export import fused
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.losses import Losses, LossOptions, TruthBatch, losses
 from skills.detect.training.muon import Muon
-from skills.detect.training.network import Backbone, DetectorNetwork, cells
+from skills.detect.training.network import Backbone, DetectorNetwork, EarlyLayers, cells
 from skills.detect.training.onnx_weights import take_over
 from skills.detect.training.peers import Peers
 from skills.detect.training.records import Course
@@ -29,6 +29,7 @@ ONNX = ".onnx"
 _LONGEST_STEP = 10.0
 _WITHOUT = "begin anew without it"
 Network = TypeVar("Network", bound=nn.Module)
+Early = TypeVar("Early", bound=EarlyLayers)
 
 
 @dataclass
@@ -161,11 +162,11 @@ class Learner(LearningState[DetectorNetwork]):
             self.start_from_checkpoint(file)
 
 
-def without_learning_early(backbone: Backbone, average: Backbone, device: torch.device) -> Backbone:
+def without_learning_early(backbone: Early, average: Early, device: torch.device) -> Early:
     """Learn a backbone's layers up to stride 8 no longer; the averaged one, without normalisation, to use for them."""
     for part in (backbone.stem, backbone.stage8):
         part.requires_grad_(False)
-    made: Backbone = fused(average).requires_grad_(False).to(device, memory_format=torch.channels_last)
+    made: Early = fused(average).requires_grad_(False).to(device, memory_format=torch.channels_last)
     return made
 
 

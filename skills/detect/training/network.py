@@ -119,7 +119,18 @@ class PooledContext(nn.Module):
         return mixed
 
 
-class Backbone(nn.Module):
+class EarlyLayers(nn.Module):
+    """A backbone's layers up to stride 8."""
+
+    stem: nn.Sequential
+    stage8: nn.Sequential
+
+    def early(self, pictures: Tensor) -> Tensor:
+        """Pictures (N, 3, H, W) to features at stride 8: edges and textures."""
+        raise NotImplementedError
+
+
+class Backbone(EarlyLayers):
     """Picture to features at strides 8, 16 and 32."""
 
     def __init__(self, widths: Widths) -> None:
@@ -148,6 +159,11 @@ class Backbone(nn.Module):
         """(N, 3, H, W) to features at stride 8: edges and textures, half of the time that a step of learning takes."""
         at8: Tensor = self.stage8(self.stem(pictures))
         return at8
+
+    @torch.no_grad()
+    def take_bytes(self) -> None:
+        """Take values from 0 to 255 from now on."""
+        self.stem[0][0].weight.mul_(1.0 / 255.0)
 
     def late(self, at8: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Features at stride 8 to three levels."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import onnx
@@ -28,7 +28,9 @@ EIGHT_BITS: Final = "eight_bits"
 """What a file has among its metadata when its network reckons with 8 bits."""
 _SEAL: Final = "sha256"
 _LEARNT: Final = "network."
-_RANGES: Final = ("_scale", "_zero_point")
+_SCALE: Final = "_scale"
+_ZERO_POINT: Final = "_zero_point"
+_QUANTISED: Final = "_quantized"
 _LARGE: Final = 256
 _SHORT: Final = ".short"
 
@@ -49,13 +51,20 @@ def facts_of(model: onnx.ModelProto) -> dict[str, str]:
 
 
 def learnt_weights(model: onnx.ModelProto) -> dict[str, NDArray[np.floating]]:
-    """What a network has learnt, by the names that weights have in it."""
-    kept = {in_full(one.name): one for one in model.graph.initializer}
-    return {
-        name: onnx.numpy_helper.to_array(one)
-        for name, one in kept.items()
-        if name.startswith(_LEARNT) and not name.endswith(_RANGES)
-    }
+    """What a network has learnt, by the names that weights have in it; those of 8 bits as what they stand for."""
+    kept = {in_full(one.name): onnx.numpy_helper.to_array(one) for one in model.graph.initializer}
+    whole = {name.removesuffix(_QUANTISED): name for name in kept if name.endswith(_QUANTISED)}
+    plain = (name for name in kept if not name.endswith((_SCALE, _ZERO_POINT, _QUANTISED)))
+    learnt = {name: kept[name] for name in plain} | {name: _dequantised(kept, name) for name in whole}
+    return {name: values for name, values in learnt.items() if name.startswith(_LEARNT)}
+
+
+def _dequantised(kept: Mapping[str, NDArray[Any]], name: str) -> NDArray[np.floating]:
+    """The weights (out, ...) of which each output's are whole numbers in steps of its own."""
+    steps = kept[f"{name}{_QUANTISED}"].astype(np.float32)
+    per_output = (-1, *[1] * (steps.ndim - 1))
+    zero, scale = (kept[f"{name}{kind}"].astype(np.float32).reshape(per_output) for kind in (_ZERO_POINT, _SCALE))
+    return np.asarray((steps - zero) * scale)
 
 
 def in_full(name: str) -> str:
@@ -65,7 +74,7 @@ def in_full(name: str) -> str:
 
 def compact(graph: onnx.GraphProto) -> None:
     """Halve the numbers of all larger weights, each made whole again by a node before all others."""
-    large = [one for one in graph.initializer if one.data_type == onnx.TensorProto.FLOAT and _size(one) >= _LARGE]
+    large = [one for one in graph.initializer if _is_compacted(one)]
     nodes = [onnx.helper.make_node("Cast", [_short(one)], [one.name], to=onnx.TensorProto.FLOAT) for one in large]
     for one in large:
         values = onnx.numpy_helper.to_array(one).astype(np.float16)
@@ -105,8 +114,9 @@ def _replace_nodes(graph: onnx.GraphProto, nodes: list[onnx.NodeProto]) -> None:
     graph.node.extend(copies)
 
 
-def _size(weights: onnx.TensorProto) -> int:
-    return math.prod(weights.dims)
+def _is_compacted(weights: onnx.TensorProto) -> bool:
+    of_floats = weights.data_type == onnx.TensorProto.FLOAT and not weights.name.endswith(_SCALE)
+    return of_floats and math.prod(weights.dims) >= _LARGE
 
 
 def _short(weights: onnx.TensorProto) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +12,17 @@ import onnx
 import torch
 from torch import Tensor, nn
 
-from skills.detect.detector_file import load_model, load_regions
+from skills.detect.detector_file import load_model, load_regions, load_third
 from skills.detect.network_file import ModelFileError, Network
+from skills.detect.training.chip_network import ChipNetwork
 from skills.detect.training.export import normalised_layers
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.network import Backbone, DetectorNetwork
 from skills.detect.training.onnx_files import learnt_weights
 from skills.detect.training.region_network import RegionNetwork
+from skills.detect.training.third_network import ThirdNetwork
 
-__all__ = ["settle", "take_over", "take_over_regions"]
+__all__ = ["settle", "take_over", "take_over_regions", "take_over_third"]
 
 _BEFORE = "network."
 _BYTES = 255.0
@@ -33,23 +35,40 @@ def take_over(network: DetectorNetwork, file: Path) -> None:
     Every normalisation passes on what it gets and adds the file's bias, until `settle`. Raises TrainingDataError.
     """
     try:
-        told = load_model(file, second=False).first
+        told = load_model(file, networks=1).first
     except ModelFileError as error:
         raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
-    _take(network, file, told, network.backbone, [head.scores.bias for head in network.heads])
+    _take(network, file, told, [head.scores.bias for head in network.heads])
+    _take_shares(network.backbone)
 
 
 def take_over_regions(network: RegionNetwork, file: Path) -> None:
     """The same for the second network and its file, whichever first network that belongs to."""
+    _take_chip_network(network, file, load_regions)
+    _take_shares(network.detector.backbone)
+
+
+def take_over_third(network: ThirdNetwork, file: Path) -> None:
+    """The same for the third network and its file, whichever second network that belongs to."""
+    _take_chip_network(network, file, load_third)
+
+
+def _take_chip_network(network: ChipNetwork, file: Path, load: Callable[[Path], Network]) -> None:
     try:
-        told = load_regions(file)
+        told = load(file)
     except ModelFileError as error:
         raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
-    _take(network, file, told, network.detector.backbone, [network.scores.bias])
+    _take(network, file, told, [network.scores.bias])
 
 
 @torch.no_grad()
-def _take(network: nn.Module, file: Path, told: Network, backbone: Backbone, score_biases: Sequence[Tensor]) -> None:
+def _take_shares(backbone: Backbone) -> None:
+    """Take values from 0 to 1 again, instead of bytes."""
+    backbone.stem[0][0].weight.mul_(_BYTES)
+
+
+@torch.no_grad()
+def _take(network: nn.Module, file: Path, told: Network, score_biases: Sequence[Tensor]) -> None:
     kept, left = _content(file), dict(network.named_parameters())
     offsets = json.loads(told.metadata.get("score_offsets", json.dumps([0.0] * len(told.class_names))))
     try:
@@ -64,7 +83,6 @@ def _take(network: nn.Module, file: Path, told: Network, backbone: Backbone, sco
             bias.sub_(torch.tensor(offsets))
     except (KeyError, ValueError) as error:
         raise TrainingDataError(f"{file}: holds another network ({error})", mend=_MEND) from error
-    backbone.stem[0][0].weight.mul_(_BYTES)
 
 
 def _content(file: Path) -> dict[str, Tensor]:

@@ -32,15 +32,16 @@ class TrainOptions:
 
 @dataclass(frozen=True)
 class RefineOptions:
-    """The same for the second network, which belongs to the first one's file `model`.
+    """The same for the second network, which belongs to the first one's file `model`; or for the `third`, beside both.
 
-    `start` names a checkpoint of such a training, or a second network's ONNX file, of which the weights are taken over.
+    `start` names a checkpoint of such a training, or such a network's ONNX file, of which the weights are taken over.
     """
 
     data: Path
     model: Path
     out: Path
     budget: Budget
+    third: bool = False
     seed: int = 1
     processes: int = 1
     resume: bool = False

@@ -1,9 +1,10 @@
-"""The second network learns to judge the places that the first one finds, from a data set's folder to the ONNX file."""
+"""The second or the third network learns to judge what those before it find, from a folder to its ONNX file."""
 
 from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,16 +12,25 @@ from typing import Final
 
 import torch
 
-from skills.detect.detector_file import load_model, regions_file
-from skills.detect.network_file import ModelFileError
+from skills.detect.detector_file import (
+    REGIONS_FORMAT,
+    THIRD_FORMAT,
+    DetectorModel,
+    load_model,
+    regions_file,
+    third_file,
+)
+from skills.detect.network_file import ModelFileError, Network
+from skills.detect.regions import Regions
+from skills.detect.scales import Scales
 from skills.detect.training.labels import LearningPicture, TrainingDataError, category_names, digest_of, read_split
 from skills.detect.training.loop import CHECKPOINT, Loop, Stepped, figures_of
 from skills.detect.training.options import RefineOptions
 from skills.detect.training.peers import Peers
 from skills.detect.training.region_chips import RegionFeed
 from skills.detect.training.region_export import export_regions
-from skills.detect.training.region_learner import RegionLearner
-from skills.detect.training.region_table import RegionTable, table_of
+from skills.detect.training.region_learner import ChipLearner, RegionLearner, ThirdLearner
+from skills.detect.training.region_table import RegionTable, first_look, second_look, table_of
 from skills.detect.training.store import PictureStore, open_store
 from skills.detect.training.together import Told, learn_together
 from skills.detect.training.train import MODEL, PICTURES
@@ -33,29 +43,60 @@ _CALIBRATED_BY: Final = 900
 _SETTLED_BY: Final = 24
 
 
+@dataclass(frozen=True)
+class _Stage:
+    """What is particular to learning the network that comes after so many others.
+
+    It learns from the `look` of the last of those, to whose digest its own file tells that it belongs.
+    """
+
+    before: int
+    look: Callable[[DetectorModel, Scales], Regions]
+    learner: type[ChipLearner]
+    form: str
+    belongs: str
+    file: Callable[[Path], Path]
+    last: Callable[[DetectorModel], Network | None]
+
+    @property
+    def networks(self) -> int:
+        """How many there are with it."""
+        return self.before + 1
+
+
+_SECOND: Final = _Stage(1, first_look, RegionLearner, REGIONS_FORMAT, "first", regions_file, lambda model: model.first)
+_THIRD: Final = _Stage(2, second_look, ThirdLearner, THIRD_FORMAT, "second", third_file, lambda model: model.second)
+
+
+def _stage(options: RefineOptions) -> _Stage:
+    return _THIRD if options.third else _SECOND
+
+
 def refine(options: RefineOptions, told: Told) -> Path:
-    """Learn, and give the second network's ONNX file, beside a copy of the first one's. Raises TrainingDataError."""
+    """Learn, and give the network's ONNX file, beside copies of those before it. Raises TrainingDataError."""
     options.out.mkdir(parents=True, exist_ok=True)
     pictures = read_split(options.data, "train")
     names = category_names(options.data)
     examination(options.data, "val", names)
-    first = _first_beside(options)
+    first = _copied(options.model, options)
+    if options.third:
+        _copied(regions_file(options.model), options)
     store = open_store(options.out / PICTURES, pictures)
     if not options.resume or not (options.out / TABLE).is_file():
         _look_at_all(options, names, pictures, store)
     learn_together(partial(_learn, options), options.processes, options.out, told)
-    return regions_file(first)
+    return _stage(options).file(first)
 
 
-def _first_beside(options: RefineOptions) -> Path:
-    """The first network's file in the folder that is written to; what is gone on with keeps the one that it had."""
-    file = options.out / MODEL
+def _copied(model: Path, options: RefineOptions) -> Path:
+    """A network's file in the folder that is written to; what is gone on with keeps the one that it had."""
+    file = options.out / model.name.replace(options.model.stem, Path(MODEL).stem, 1)
     try:
-        if not file.is_file() or not (options.resume or options.model.samefile(file)):
-            shutil.copyfile(options.model, file)
+        if not file.is_file() or not (options.resume or model.samefile(file)):
+            shutil.copyfile(model, file)
     except OSError as error:
         raise TrainingDataError(
-            f"{options.model}: cannot be copied ({error.strerror})", mend="name a detector's ONNX file with --model"
+            f"{model}: cannot be copied ({error.strerror})", mend="name a detector's ONNX file with --model"
         ) from error
     return file
 
@@ -63,16 +104,17 @@ def _first_beside(options: RefineOptions) -> Path:
 def _look_at_all(
     options: RefineOptions, names: tuple[str, ...], pictures: tuple[LearningPicture, ...], store: PictureStore
 ) -> None:
-    """Write down what the first network finds. Raises TrainingDataError."""
+    """Write down what the networks before find. Raises TrainingDataError."""
+    stage = _stage(options)
     try:
-        model = load_model(options.out / MODEL, second=False)
+        model = load_model(options.out / MODEL, networks=stage.before)
     except ModelFileError as error:
         raise TrainingDataError(f"{options.model}: {error.message}", mend=error.mend) from error
     if model.class_names != names:
         raise TrainingDataError(
             f"{options.model}: knows other classes than {options.data}", mend="render the data anew"
         )
-    table = table_of(model, pictures, store)
+    table = table_of(partial(stage.look, model), pictures, store)
     if not (table.classes >= 0).any() or not (table.classes < 0).any():
         raise TrainingDataError(
             f"{options.model}: finds nothing to tell apart in {options.data}", mend="train it for longer first"
@@ -83,7 +125,7 @@ def _look_at_all(
 def _learn(options: RefineOptions, peers: Peers, device: torch.device, told: Told) -> None:
     """One process's part in learning."""
     names = category_names(options.data)
-    learner = RegionLearner.new(len(names), options.seed, device)
+    learner = _stage(options).learner.new(len(names), options.seed, device)
     store = open_store(options.out / PICTURES, read_split(options.data, "train"))
     table = RegionTable.read(options.out / TABLE)
     _begin(learner, options, RegionFeed(table, store, options.seed, 0, 1))
@@ -92,7 +134,7 @@ def _learn(options: RefineOptions, peers: Peers, device: torch.device, told: Tol
     Loop(_Regions(options, learner, peers, feed, exam), options.budget, peers, options.out, told).run()
 
 
-def _begin(learner: RegionLearner, options: RefineOptions, feed: RegionFeed) -> None:
+def _begin(learner: ChipLearner, options: RefineOptions, feed: RegionFeed) -> None:
     """Give the learner the weights that it begins with; the same in all processes. Raises TrainingDataError."""
     checkpoint, size = options.out / CHECKPOINT, options.batch
     some = (feed.batch(k * size, size) for k in range(_SETTLED_BY))
@@ -101,7 +143,7 @@ def _begin(learner: RegionLearner, options: RefineOptions, feed: RegionFeed) -> 
     elif options.start is not None:
         learner.start_from(options.start, some)
     else:
-        learner.begin_with_first(options.out / MODEL, some)
+        learner.begin(options.out / MODEL, some)
     learner.keep_early()
 
 
@@ -110,7 +152,7 @@ class _Regions:
     """Learning from chips about regions."""
 
     options: RefineOptions
-    state: RegionLearner
+    state: ChipLearner
     peers: Peers
     feed: RegionFeed
     exam: Examination
@@ -126,20 +168,21 @@ class _Regions:
     def written(self, *, last: bool) -> dict[str, float]:
         """Write the ONNX file, and give its figures of some held-out pictures."""
         export_refined(self.state, self.options, calibrated=last)
-        return figures_of(examine(self.options.out / MODEL, self.exam, second=True))
+        return figures_of(examine(self.options.out / MODEL, self.exam, networks=_stage(self.options).networks))
 
 
-def export_refined(learner: RegionLearner, options: RefineOptions, *, calibrated: bool) -> None:
+def export_refined(learner: ChipLearner, options: RefineOptions, *, calibrated: bool) -> None:
     """Write the averaged network's ONNX file; calibrated by pictures that were learnt from."""
-    first, names = options.out / MODEL, category_names(options.data)
-    file, network = regions_file(first), learner.average.network
-    facts = {
-        "seed": str(options.seed),
-        "data": digest_of(options.data),
-        "first": load_model(first, second=False).first.digest,
-    }
-    export_regions(network, file, class_names=names, facts=facts)
+    stage, first, names = _stage(options), options.out / MODEL, category_names(options.data)
+    before = stage.last(load_model(first, networks=stage.before))
+    assert before is not None  # its look at all pictures is what was learnt from
+    facts = {"seed": str(options.seed), "data": digest_of(options.data), stage.belongs: before.digest}
+    write = partial(export_regions, learner.average.network, stage.file(first), form=stage.form, class_names=names)
+    write(facts=facts)
     if calibrated:
-        offsets = offsets_by(first, examination(options.data, "train", names, _CALIBRATED_BY), second=True)
-        told = {**facts, "score_offsets": json.dumps([round(value, 4) for value in offsets])}
-        export_regions(network, file, class_names=names, facts=told, score_offsets=offsets)
+        exam = examination(options.data, "train", names, _CALIBRATED_BY)
+        offsets = offsets_by(first, exam, networks=stage.networks)
+        write(
+            facts={**facts, "score_offsets": json.dumps([round(value, 4) for value in offsets])},
+            score_offsets=offsets,
+        )

@@ -1,4 +1,4 @@
-"""The second network as an ONNX file that takes chips as bytes."""
+"""The second and the third network as ONNX files that take chips as bytes."""
 
 from __future__ import annotations
 
@@ -9,21 +9,20 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from skills.detect.detector_file import REGIONS_FORMAT
 from skills.detect.regions import CHIP_PX
-from skills.detect.training.export import fused, take_bytes, write_onnx
-from skills.detect.training.region_network import RegionNetwork
+from skills.detect.training.chip_network import ChipNetwork
+from skills.detect.training.export import fused, write_onnx
 
 __all__ = ["ExportableRegions", "export_regions"]
 
 
 class ExportableRegions(nn.Module):
-    """Chips (N, 128, 128, 3) of bytes, regions (N, 4) in them and first logits (N, K) to boxes (N, 4) and scores."""
+    """Chips (N, 128, 128, 3) of bytes, regions (N, 4) in them and logits (N, K) to boxes (N, 4) and scores."""
 
-    def __init__(self, network: RegionNetwork, score_offsets: Sequence[float] | None = None) -> None:
+    def __init__(self, network: ChipNetwork, score_offsets: Sequence[float] | None = None) -> None:
         super().__init__()
         self.network = fused(network)
-        take_bytes(self.network.detector.backbone)
+        self.network.take_bytes()
         if score_offsets is not None:
             with torch.no_grad():
                 self.network.scores.bias.add_(torch.tensor(score_offsets))
@@ -35,16 +34,18 @@ class ExportableRegions(nn.Module):
 
 
 def export_regions(
-    network: RegionNetwork,
+    network: ChipNetwork,
     file: Path,
     *,
+    form: str,
     class_names: Sequence[str],
     facts: Mapping[str, str],
     score_offsets: Sequence[float] | None = None,
 ) -> None:
-    """Write the ONNX file; whole or not at all. `score_offsets` are added to the logits of each class.
+    """Write the ONNX file of a format; whole or not at all. `score_offsets` are added to the logits of each class.
 
-    `facts` must tell as `first` the digest of the first network's file.
+    `facts` must tell the digest of the file of the network before it: as `first` that of the first, as `second` that of
+    the second.
     """
     model = ExportableRegions(network, score_offsets).eval()
     example = {
@@ -52,5 +53,5 @@ def export_regions(
         "regions": torch.full((2, 4), float(CHIP_PX)) * torch.tensor([0.2, 0.2, 0.8, 0.8]),
         "logits": torch.zeros((2, len(class_names))),
     }
-    told = {"format": REGIONS_FORMAT, "class_names": json.dumps(list(class_names)), **facts}
+    told = {"format": form, "class_names": json.dumps(list(class_names)), **facts}
     write_onnx(model, example, file, told, compact=True)

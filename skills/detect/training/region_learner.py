@@ -1,4 +1,4 @@
-"""The state of learning of the second network, and one step of it."""
+"""The state of learning of the second or the third network, and one step of it."""
 
 from __future__ import annotations
 
@@ -10,61 +10,58 @@ import torch
 from torch import Tensor
 
 from skills.detect.training.averaging import WeightAverage
+from skills.detect.training.chip_network import ChipNetwork
 from skills.detect.training.learner import ONNX, LearningState, optimisers_of, without_learning_early
+from skills.detect.training.lite_backbone import LiteBackbone
 from skills.detect.training.losses import Losses
-from skills.detect.training.network import Backbone, DetectorNetwork
-from skills.detect.training.onnx_weights import settle, take_over, take_over_regions
+from skills.detect.training.network import DetectorNetwork, EarlyLayers
+from skills.detect.training.onnx_weights import settle, take_over, take_over_regions, take_over_third
 from skills.detect.training.peers import Peers
 from skills.detect.training.region_chips import RegionBatch
 from skills.detect.training.region_losses import region_losses
 from skills.detect.training.region_network import RegionNetwork
+from skills.detect.training.third_network import ThirdNetwork
 
-__all__ = ["RegionLearner"]
+__all__ = ["ChipLearner", "RegionLearner", "ThirdLearner"]
 
 
 @dataclass
-class RegionLearner(LearningState[RegionNetwork]):
-    """All that changes while the second network learns.
+class ChipLearner(LearningState[ChipNetwork]):
+    """All that changes while a network learns from chips.
 
-    `early` makes the features at stride 8. It is the first network's, is not learnt, and needs no normalisation.
+    `early` makes the features at stride 8 when they are no longer learnt. It needs no normalisation.
     """
 
-    early: Backbone | None = None
+    early: EarlyLayers | None = None
 
-    @staticmethod
-    def new(classes: int, seed: int, device: torch.device) -> RegionLearner:
+    @classmethod
+    def new(cls, classes: int, seed: int, device: torch.device) -> ChipLearner:
         """A network that has learnt nothing yet."""
-        torch.manual_seed(seed)
-        network = RegionNetwork(classes).to(device, memory_format=torch.channels_last)
-        last = [network.place, *(layer for head in network.detector.heads for layer in (head.scores, head.sides))]
-        return RegionLearner(network, WeightAverage(network), optimisers_of(network, last), device)
+        raise NotImplementedError
 
-    def begin_with_first(self, first: Path, batches: Iterable[RegionBatch]) -> None:
-        """Take over the weights of the first network's ONNX file, with statistics of batches.
-
-        What the first network has not, stays as it is. Raises TrainingDataError.
-        """
-        detector = DetectorNetwork(self.network.classes)
-        take_over(detector, first)
-        settle(detector, ((batch.chips,) for batch in batches))
-        self.network.detector.load_state_dict(detector.state_dict(), strict=False)
-        self.average.network.load_state_dict(self.network.state_dict())
+    def begin(self, first: Path, batches: Iterable[RegionBatch]) -> None:
+        """Take over weights to begin with, with statistics of batches. Raises TrainingDataError."""
+        raise NotImplementedError
 
     def start_from(self, file: Path, batches: Iterable[RegionBatch]) -> None:
-        """Take over the weights of a second network's ONNX file, with statistics of batches, or a checkpoint's.
+        """Take over the weights of such a network's ONNX file, with statistics of batches, or a checkpoint's.
 
         Raises TrainingDataError.
         """
         if file.suffix != ONNX:
             self.start_from_checkpoint(file)
             return
-        take_over_regions(self.network, file)
+        self.take_over_file(file)
         settle(self.network, (_moved((batch.chips, batch.boxes, batch.logits), self.device) for batch in batches))
         self.average.network.load_state_dict(self.network.state_dict())
 
+    def take_over_file(self, file: Path) -> None:
+        """Take over the weights of such a network's ONNX file. Raises TrainingDataError."""
+        raise NotImplementedError
+
     def keep_early(self) -> None:
         """Learn no longer what makes the features at stride 8: two fifths of the time of each step."""
-        mine, average = self.network.detector.backbone, self.average.network.detector.backbone
+        mine, average = self.network.early_layers, self.average.network.early_layers
         self.early = without_learning_early(mine, average, self.device)
 
     def step(self, batch: RegionBatch, rate: float, peers: Peers, clock: float) -> tuple[float, float, float]:
@@ -72,20 +69,73 @@ class RegionLearner(LearningState[RegionNetwork]):
         return self.take_step(lambda: self._losses(batch), rate, peers, clock)
 
     def _losses(self, batch: RegionBatch) -> Losses:
-        chips, regions, first, wanted, classes = _moved(
+        chips, regions, before, wanted, classes = _moved(
             (batch.chips, batch.boxes, batch.logits, batch.wanted, batch.classes), self.device
         )
         with self.quick():
-            logits, boxes = self._answers(chips, regions, first)
+            logits, boxes = self._answers(chips, regions, before)
         return region_losses(logits, boxes, wanted, classes)
 
-    def _answers(self, chips: Tensor, regions: Tensor, first: Tensor) -> tuple[Tensor, Tensor]:
+    def _answers(self, chips: Tensor, regions: Tensor, before: Tensor) -> tuple[Tensor, Tensor]:
         if self.early is None:
-            logits, boxes = self.network(chips, regions, first)
+            logits, boxes = self.network(chips, regions, before)
             return logits, boxes
         with torch.no_grad():
             at8 = self.early.early(chips)
-        return self.network.from_early(at8, regions, first)
+        return self.network.from_early(at8, regions, before)
+
+
+@dataclass
+class RegionLearner(ChipLearner):
+    """The same of the second network, of which the early layers are the first one's."""
+
+    @classmethod
+    def new(cls, classes: int, seed: int, device: torch.device) -> RegionLearner:
+        """A network that has learnt nothing yet."""
+        torch.manual_seed(seed)
+        network = RegionNetwork(classes).to(device, memory_format=torch.channels_last)
+        last = [network.place, *(layer for head in network.detector.heads for layer in (head.scores, head.sides))]
+        return cls(network, WeightAverage(network), optimisers_of(network, last), device)
+
+    def begin(self, first: Path, batches: Iterable[RegionBatch]) -> None:
+        """Take over the weights of the first network's ONNX file, with statistics of batches.
+
+        What the first network has not, stays as it is. Raises TrainingDataError.
+        """
+        detector = DetectorNetwork(self.network.classes)
+        take_over(detector, first)
+        settle(detector, ((batch.chips,) for batch in batches))
+        begun = {f"detector.{name}": weights for name, weights in detector.state_dict().items()}
+        self.network.load_state_dict(begun, strict=False)
+        self.average.network.load_state_dict(self.network.state_dict())
+
+    def take_over_file(self, file: Path) -> None:
+        """Take over the weights of a second network's ONNX file. Raises TrainingDataError."""
+        take_over_regions(self.network, file)
+
+
+@dataclass
+class ThirdLearner(ChipLearner):
+    """The same of the third network, of which the early layers are those of ImageNet."""
+
+    @classmethod
+    def new(cls, classes: int, seed: int, device: torch.device) -> ThirdLearner:
+        """A network that has learnt nothing yet."""
+        torch.manual_seed(seed)
+        network = ThirdNetwork(classes).to(device, memory_format=torch.channels_last)
+        return cls(network, WeightAverage(network), optimisers_of(network, [network.place]), device)
+
+    def begin(self, first: Path, batches: Iterable[RegionBatch]) -> None:
+        """Take over the backbone's weights of ImageNet. Raises TrainingDataError."""
+        backbone = LiteBackbone()
+        backbone.begin_with_imagenet()
+        begun = {f"backbone.{name}": weights for name, weights in backbone.state_dict().items()}
+        self.network.load_state_dict(begun, strict=False)
+        self.average.network.load_state_dict(self.network.state_dict())
+
+    def take_over_file(self, file: Path) -> None:
+        """Take over the weights of a third network's ONNX file. Raises TrainingDataError."""
+        take_over_third(self.network, file)
 
 
 def _moved(parts: tuple[Tensor, ...], device: torch.device) -> tuple[Tensor, ...]:

@@ -12,21 +12,20 @@ import torch
 from torch import Tensor, nn
 
 from skills.detect.regions import CHIP_PX
-from skills.detect.training.network import ConvUnit, DetectorNetwork, Widths
+from skills.detect.training.chip_network import MOST_LOGIT, ChipNetwork, covered, moved
+from skills.detect.training.network import Backbone, ConvUnit, DetectorNetwork, Widths
 from skills.detect.training.overlaps import overlap
 
 __all__ = ["RegionNetwork"]
 
 _WIDTHS = Widths(residuals=(3, 2))
-_CELLS_8, _CELLS_32 = CHIP_PX // 8, CHIP_PX // 32
+_CELLS_32 = CHIP_PX // 32
 _SQUEEZED, _JOINED = 32, 128
-_MOST_LOGIT = 8.0
-_MOST_GROWTH = 1.5
 _SIDES_SCALE = 0.1
 
 
-class RegionNetwork(nn.Module):
-    """Chips (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them and first logits (N, K) to logits and better boxes."""
+class RegionNetwork(ChipNetwork):
+    """A chip network that begins with the first network's weights."""
 
     def __init__(self, classes: int, widths: Widths = _WIDTHS) -> None:
         super().__init__()
@@ -50,21 +49,26 @@ class RegionNetwork(nn.Module):
             nn.init.zeros_(last.bias)
         nn.init.zeros_(self.place.weight)
 
-    def forward(self, chips: Tensor, boxes: Tensor, first_logits: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (N, K) and boxes (N, 4) as x0 y0 x1 y1 in pixels of the chip."""
-        return self.from_early(self.detector.backbone.early(chips), boxes, first_logits)
+    @property
+    def early_layers(self) -> Backbone:
+        """What makes the features at stride 8."""
+        return self.detector.backbone
 
-    def from_early(self, at8: Tensor, boxes: Tensor, first_logits: Tensor) -> tuple[Tensor, Tensor]:
-        """The same of what the backbone's early part makes of chips."""
-        first_logits = first_logits.clamp(-_MOST_LOGIT, _MOST_LOGIT)
+    def take_bytes(self) -> None:
+        """Take chips of values from 0 to 255 from now on."""
+        self.detector.backbone.take_bytes()
+
+    def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, K) and boxes (N, 4) of what the early layers make of chips."""
+        first_logits = logits.clamp(-MOST_LOGIT, MOST_LOGIT)
         levels = self.detector.neck(self.detector.backbone.late(at8 + self.place(covered(boxes))))
         seen_logits, seen_boxes = surest_about(boxes, *self.detector.from_levels(levels))
-        seen_logits = seen_logits.clamp(-_MOST_LOGIT, _MOST_LOGIT)
+        seen_logits = seen_logits.clamp(-MOST_LOGIT, MOST_LOGIT)
         told = [self.squeeze(levels[2]).flatten(1), first_logits, seen_logits, boxes / CHIP_PX, seen_boxes / CHIP_PX]
         known = self.join(torch.cat(told, dim=1))
-        logits = self.trust_first * first_logits + self.trust_seen * seen_logits + self.scores(known)
+        found = self.trust_first * first_logits + self.trust_seen * seen_logits + self.scores(known)
         nearer = boxes + self.nearer * (seen_boxes - boxes)
-        return logits, moved(nearer, _SIDES_SCALE * self.sides(known).float())
+        return found, moved(nearer, _SIDES_SCALE * self.sides(known).float())
 
 
 def surest_about(boxes: Tensor, logits: Tensor, found: Tensor) -> tuple[Tensor, Tensor]:
@@ -77,20 +81,3 @@ def surest_about(boxes: Tensor, logits: Tensor, found: Tensor) -> tuple[Tensor, 
         best = fit.argmax(dim=1)[:, None, None]
     surest = logits.gather(1, best.expand(-1, 1, logits.shape[2]))[:, 0]
     return surest, found.gather(1, best.expand(-1, 1, 4))[:, 0]
-
-
-def covered(boxes: Tensor) -> Tensor:
-    """The share of each cell of stride 8 that boxes (N, 4) cover, (N, 1, 16, 16)."""
-    edges = torch.arange(_CELLS_8, device=boxes.device, dtype=boxes.dtype)[None] * 8.0
-    x0, y0, x1, y1 = (boxes[:, k : k + 1] for k in range(4))
-    across = ((x1 - edges) / 8.0).clamp(0.0, 1.0) - ((x0 - edges) / 8.0).clamp(0.0, 1.0)
-    down = ((y1 - edges) / 8.0).clamp(0.0, 1.0) - ((y0 - edges) / 8.0).clamp(0.0, 1.0)
-    return (down[:, :, None] * across[:, None, :])[:, None]
-
-
-def moved(boxes: Tensor, sides: Tensor) -> Tensor:
-    """Boxes (N, 4) with middles moved by shares of their sizes, and sizes changed by factors of which `sides` tells."""
-    middle, size = (boxes[:, :2] + boxes[:, 2:]) / 2, boxes[:, 2:] - boxes[:, :2]
-    middle = middle + sides[:, :2] * size
-    half = size * sides[:, 2:].clamp(-_MOST_GROWTH, _MOST_GROWTH).exp() / 2
-    return torch.cat([middle - half, middle + half], dim=1)

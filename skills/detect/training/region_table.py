@@ -1,8 +1,8 @@
-"""What the first network takes for things in the pictures that are learnt from, and what is really there."""
+"""What a network takes for things in the pictures that are learnt from, and what is really there."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -11,23 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detect.detector_file import DetectorModel
-from skills.detect.regions import RegionOptions, regions_of
+from skills.detect.region_look import looked_again
+from skills.detect.regions import RegionOptions, Regions, regions_of
+from skills.detect.scales import Scales
 from skills.detect.scoring_matching import overlaps
 from skills.detect.training.labels import Labels, LearningPicture
 from skills.detect.training.store import PictureStore
 
-__all__ = ["NEAR", "RegionTable", "table_of"]
+__all__ = ["NEAR", "Look", "RegionTable", "first_look", "second_look", "table_of"]
 
 NEAR: Final = 0.3
 _WITHIN_IGNORED: Final = 0.6
 _LOOKED_AT: Final = RegionOptions(least_score=0.01, most=20)
+_SEEN: Final = RegionOptions(least_score=0.015, same=0.9, most=20)
 
 Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class RegionTable:
-    """R regions: picture's number (R,), box (R, 4) in the letterbox, first logits (R, K), and the thing there.
+    """R regions: picture's number (R,), box (R, 4) in the letterbox, logits (R, K), and the thing there.
 
     `classes` (R,) are those of the things with which regions share NEAR or more, or -1; `wanted` (R, 4) are the things'
     boxes, and the region's own where there is no thing.
@@ -55,17 +58,33 @@ class RegionTable:
             return RegionTable(**{name: kept[name] for name in RegionTable.__dataclass_fields__})
 
 
-def table_of(model: DetectorModel, pictures: Sequence[LearningPicture], store: PictureStore) -> RegionTable:
+Look = Callable[[Scales], Regions]
+"""Where a network sees something in a picture in the letterbox, and what."""
+
+
+def first_look(model: DetectorModel, scales: Scales) -> Regions:
+    """The places that the first network finds."""
+    boxes, scores = model.first.single.run(["boxes", "scores"], {"images": scales.full[None]})
+    return regions_of(boxes[0], scores[0], _LOOKED_AT)
+
+
+def second_look(model: DetectorModel, scales: Scales) -> Regions:
+    """What the second network makes of them. Raises ValueError where there is none."""
+    if model.second is None:
+        raise ValueError("there is no second network")
+    boxes, scores = model.first.single.run(["boxes", "scores"], {"images": scales.full[None]})
+    return regions_of(*looked_again(model.second.single, scales, boxes[0], scores[0], RegionOptions()), _SEEN)
+
+
+def table_of(look: Look, pictures: Sequence[LearningPicture], store: PictureStore) -> RegionTable:
     """The regions of all pictures. Those on what is to be ignored are left out."""
-    rows = [_rows(model, store, number, picture.labels) for number, picture in enumerate(pictures)]
+    rows = [_rows(look(store.scales(number)), number, picture.labels) for number, picture in enumerate(pictures)]
     names = RegionTable.__dataclass_fields__
     return RegionTable(**{name: np.concatenate([vars(row)[name] for row in rows]) for name in names})
 
 
-def _rows(model: DetectorModel, store: PictureStore, number: int, labels: Labels) -> RegionTable:
+def _rows(regions: Regions, number: int, labels: Labels) -> RegionTable:
     """The regions of one picture."""
-    found, scores = model.first.single.run(["boxes", "scores"], {"images": store.full[number][None]})
-    regions = regions_of(found[0], scores[0], _LOOKED_AT)
     things = label_boxes(labels)
     boxes, none, all_of_them = regions.boxes.astype(np.float64), np.zeros(len(labels), bool), np.ones(len(labels), bool)
     shared, inside = (overlaps(boxes, things.astype(np.float64), crowd) for crowd in (none, all_of_them))

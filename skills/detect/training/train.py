@@ -106,7 +106,7 @@ class _Canvases:
     def written(self, *, last: bool) -> dict[str, float]:
         """Write the ONNX file, and give its figures of some held-out pictures."""
         export_model(self.state, self.options, calibrated=last)
-        return figures_of(examine(self.options.out / MODEL, self.exam, second=False))
+        return figures_of(examine(self.options.out / MODEL, self.exam, networks=1))
 
 
 def export_model(learner: Learner, options: TrainOptions, *, calibrated: bool) -> None:
@@ -116,6 +116,6 @@ def export_model(learner: Learner, options: TrainOptions, *, calibrated: bool) -
     facts = {"seed": str(options.seed), "data": digest_of(options.data)}
     export(network, file, class_names=names, facts=facts)
     if calibrated:
-        offsets = offsets_by(file, examination(options.data, "train", names, _CALIBRATED_BY), second=False)
+        offsets = offsets_by(file, examination(options.data, "train", names, _CALIBRATED_BY), networks=1)
         told = {**facts, "score_offsets": json.dumps([round(value, 4) for value in offsets])}
         export(network, file, class_names=names, facts=told, score_offsets=offsets)

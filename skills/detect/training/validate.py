@@ -49,18 +49,18 @@ def examination(folder: Path, split: str, class_names: Sequence[str], most: int 
     return Examination(folder, pictures[::step], class_names)
 
 
-def examine(model: Path, exam: Examination, *, second: bool) -> Score:
-    """The figures of an ONNX file, with the second network beside it or without."""
-    return score(exam.pictures, _found(model, exam, second), exam.class_names)
+def examine(model: Path, exam: Examination, *, networks: int) -> Score:
+    """The figures of an ONNX file, and of those beside it, up to so many `networks`."""
+    return score(exam.pictures, _found(model, exam, networks), exam.class_names)
 
 
-def offsets_by(model: Path, exam: Examination, *, second: bool) -> tuple[float, ...]:
+def offsets_by(model: Path, exam: Examination, *, networks: int) -> tuple[float, ...]:
     """What to add to the logits of each class, by the pictures of an examination."""
-    return score_offsets(exam.pictures, _found(model, exam, second), exam.class_names)
+    return score_offsets(exam.pictures, _found(model, exam, networks), exam.class_names)
 
 
-def _found(model: Path, exam: Examination, second: bool) -> list[tuple[Detection, ...]]:
-    detector = OnnxDetector(load_model(model, second=second), DetectorOptions(threshold=LEAST_SCORE))
+def _found(model: Path, exam: Examination, networks: int) -> list[tuple[Detection, ...]]:
+    detector = OnnxDetector(load_model(model, networks=networks), DetectorOptions(threshold=LEAST_SCORE))
     return [detector.detect([read_picture(exam.folder / picture.file)])[0] for picture in exam.pictures]
 
 

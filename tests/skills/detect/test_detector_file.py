@@ -1,7 +1,7 @@
 """The network's file: what is refused, and how it is told."""
 
 import pytest
-from tiny_detector import CLASSES, model_bytes, second_bytes, write_model, write_pair
+from tiny_detector import CLASSES, model_bytes, second_bytes, third_bytes, write_model, write_pair, write_three
 
 from skills.detect.detector_file import load_model
 from skills.detect.network_file import ModelFileError, sealed
@@ -79,7 +79,7 @@ def second_refused(file):
 def test_a_second_network_beside_the_first_is_loaded_unless_it_is_unwanted(tmp_path):
     file = write_pair(tmp_path / "model.onnx")
     assert load_model(file).second is not None
-    assert load_model(file, second=False).second is None
+    assert load_model(file, networks=1).second is None
     assert load_model(write_model(tmp_path / "alone.onnx")).second is None
 
 
@@ -104,3 +104,47 @@ def test_a_damaged_second_network_is_named(tmp_path):
     file = write_model(tmp_path / "model.onnx")
     (tmp_path / "model_regions.onnx").write_bytes(second_bytes(file.read_bytes())[:-100])
     assert "damaged" in second_refused(file)
+
+
+def third_refused(file):
+    with pytest.raises(ModelFileError) as error:
+        load_model(file)
+    assert str(error.value).startswith(f"{file.with_name('model_third.onnx')}: ")
+    assert "errand dataset refine --third --data DIR --out DIR" in str(error.value)
+    return error.value.message
+
+
+# networks wanted   loaded
+# 3                 all
+# 2                 the first and the second
+@pytest.mark.parametrize(("networks", "third"), [(3, True), (2, False)])
+def test_a_third_network_beside_both_is_loaded_unless_it_is_unwanted(tmp_path, networks, third):
+    model = load_model(write_three(tmp_path / "model.onnx"), networks=networks)
+    assert model.second is not None
+    assert (model.third is not None) is third
+
+
+def test_a_third_network_without_a_second_one_is_left_alone(tmp_path):
+    file = write_three(tmp_path / "model.onnx")
+    (tmp_path / "model_regions.onnx").unlink()
+    assert load_model(file).third is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"told": "0" * 64}, "belongs to another network than model_regions.onnx"),
+        ({"classes": ("beer", "coke", "cube")}, "belongs to another network"),
+        ({"form": "errand-third-9"}, "errand-third-9"),
+        ({"size": 64}, "other inputs or outputs"),
+    ],
+)
+def test_a_third_network_that_does_not_fit_is_refused(tmp_path, changes, told):
+    assert told in third_refused(write_three(tmp_path / "model.onnx", **changes))
+
+
+def test_a_damaged_third_network_is_named(tmp_path):
+    file = write_pair(tmp_path / "model.onnx")
+    second = (tmp_path / "model_regions.onnx").read_bytes()
+    (tmp_path / "model_third.onnx").write_bytes(third_bytes(second)[:-100])
+    assert "damaged" in third_refused(file)

@@ -4,7 +4,7 @@ import threading
 
 import numpy as np
 import pytest
-from tiny_detector import CLASSES, picture_of, write_model, write_pair
+from tiny_detector import CLASSES, picture_of, write_model, write_pair, write_three
 
 from skills.detect.network_file import ModelFileError
 from skills.detect.onnx_detector import DetectorOptions, load_detector
@@ -174,3 +174,31 @@ def test_with_a_second_network_one_picture_gives_the_same_as_several(looks_again
         reddened(picture_of(("coke", 0.3, (300, 200, 400, 400))), (250, 150, 450, 450)),
     ]
     assert looks_again.detect(pictures) == [looks_again.detect([one])[0] for one in pictures]
+
+
+def test_a_third_network_judges_what_the_second_one_sees(tmp_path):
+    """The third one sees red in the left half alone, where there is none."""
+    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
+    second, third = (write_pair(tmp_path / "two.onnx"), write_three(tmp_path / "three.onnx", left_only=True))
+    options = DetectorOptions(0.05)
+    assert [one.class_name for one in load_detector(second, options).detect([picture])[0]] == ["beer"]
+    assert load_detector(third, options).detect([picture]) == [()]
+
+
+# each network says boxes a tenth smaller than those that it gets
+# 100 wide, 50 high -> 90, 45 -> 81, 40.5 about the same middle (150, 125)
+def test_a_third_network_looks_where_the_second_one_says(tmp_path):
+    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 150))), (0, 2, 300, 300))
+    (found,) = load_detector(write_three(tmp_path / "three.onnx")).detect([picture])
+    assert found[0].box == pytest.approx((109.5, 104.75, 190.5, 145.25), abs=0.01)
+
+
+# least score that is judged   what the second one says   looked at
+# 0.03                         1.0                        yes
+# 1.1                          1.0                        no, so nothing is told
+@pytest.mark.parametrize(("least_score", "told"), [(0.03, 1), (1.1, 0)])
+def test_what_the_second_network_hardly_sees_is_not_judged(tmp_path, least_score, told):
+    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 200))), (50, 50, 250, 250))
+    options = DetectorOptions(judged=RegionOptions(least_score=least_score))
+    (found,) = load_detector(write_three(tmp_path / "three.onnx"), options).detect([picture])
+    assert len(found) == told

@@ -36,7 +36,7 @@ def test_the_detector_says_here_what_it_says_with_the_exact_sums() -> None:
     exact = SessionOptions()
     exact.add_session_config_entry("session.x64quantprecision", "1")
     given = {"images": np.random.default_rng(3).integers(0, 256, (1, 480, 640, 3), dtype=np.uint8)}
-    said = load_model(second=False).first.single.run(None, given)
+    said = load_model(networks=1).first.single.run(None, given)
     expected = InferenceSession(str(MODEL_FILE), exact).run(None, given)
     for mine, theirs in zip(said, expected, strict=True):
         assert np.allclose(mine, theirs, atol=1e-3)

@@ -13,7 +13,7 @@ from tiny_detector import CLASSES, picture_of, write_model
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
-from skills.detect.detector_file import load_model, regions_file  # noqa: E402
+from skills.detect.detector_file import load_model, regions_file, third_file  # noqa: E402
 from skills.detect.onnx_detector import OnnxDetector  # noqa: E402
 from skills.detect.training.labels import TrainingDataError  # noqa: E402
 from skills.detect.training.learner import read_checkpoint  # noqa: E402
@@ -74,6 +74,23 @@ def test_a_first_network_gets_a_second_one(options: RefineOptions, processes: in
     assert told[-1].progress == 1.0
     assert told[-1].figures is not None
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, TABLE, "curves.png", "pictures"}
+
+
+def test_both_get_a_third_one_that_belongs_to_the_second(options: RefineOptions, tmp_path: Path) -> None:
+    refine(options, lambda _: None)
+    next_one = replace(options, third=True, model=options.out / MODEL, out=tmp_path / "next")
+    file = refine(next_one, lambda _: None)
+    assert file == third_file(next_one.out / MODEL)
+    model = load_model(next_one.out / MODEL)
+    assert model.second is not None
+    assert model.third is not None
+    assert model.third.metadata["second"] == model.second.digest
+    assert len(OnnxDetector(model).detect([picture_of()])) == 1
+
+
+def test_without_a_second_network_there_is_no_third_one(options: RefineOptions) -> None:
+    with pytest.raises(TrainingDataError, match=r"first_regions\.onnx: cannot be copied"):
+        refine(replace(options, third=True), lambda _: None)
 
 
 def test_it_goes_on_where_it_stood(options: RefineOptions) -> None:

@@ -1,6 +1,7 @@
 """The parts of the second network's training; skipped without torch."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,10 @@ from tiny_detector import CLASSES, picture_of, write_model
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
-from skills.detect.detector_file import load_model, regions_file  # noqa: E402
+from skills.detect.detector_file import REGIONS_FORMAT, load_model, regions_file  # noqa: E402
 from skills.detect.regions import CHIP_PX  # noqa: E402
 from skills.detect.scales import halved  # noqa: E402
+from skills.detect.training.chip_network import covered, moved  # noqa: E402
 from skills.detect.training.export import export  # noqa: E402
 from skills.detect.training.labels import Labels, LearningPicture, TrainingDataError  # noqa: E402
 from skills.detect.training.learner import Learner  # noqa: E402
@@ -23,8 +25,8 @@ from skills.detect.training.region_chips import RegionFeed  # noqa: E402
 from skills.detect.training.region_export import export_regions  # noqa: E402
 from skills.detect.training.region_learner import RegionLearner  # noqa: E402
 from skills.detect.training.region_losses import region_losses  # noqa: E402
-from skills.detect.training.region_network import RegionNetwork, covered, moved, surest_about  # noqa: E402
-from skills.detect.training.region_table import RegionTable, table_of  # noqa: E402
+from skills.detect.training.region_network import RegionNetwork, surest_about  # noqa: E402
+from skills.detect.training.region_table import RegionTable, first_look, table_of  # noqa: E402
 from skills.detect.training.store import PictureStore  # noqa: E402
 
 ALONE = Peers(0, 1)
@@ -44,7 +46,8 @@ def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> Learni
 
 
 def table(file: Path, picture: LearningPicture, *things: tuple[str, float, tuple[float, ...]]) -> RegionTable:
-    return table_of(load_model(write_model(file)), [picture], store_of(picture_of(*things)))
+    look = partial(first_look, load_model(write_model(file)))
+    return table_of(look, [picture], store_of(picture_of(*things)))
 
 
 def test_a_place_on_a_thing_wants_its_class_and_box_and_another_nothing(tmp_path: Path) -> None:
@@ -202,7 +205,14 @@ def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
     first = write_model(tmp_path / "m.onnx")
     facts = {"first": load_model(first).first.digest}
     network = unsettled(len(CLASSES))
-    export_regions(network, regions_file(first), class_names=CLASSES, facts=facts, score_offsets=(0.5, 0.0, -0.5))
+    export_regions(
+        network,
+        regions_file(first),
+        form=REGIONS_FORMAT,
+        class_names=CLASSES,
+        facts=facts,
+        score_offsets=(0.5, 0.0, -0.5),
+    )
     random = np.random.default_rng(0)
     chips = random.integers(0, 256, (3, CHIP_PX, CHIP_PX, 3), dtype=np.uint8)
     boxes = np.array([[22, 40, 106, 88], [30, 22, 80, 106], [40, 40, 90, 90]], np.float32)
@@ -226,7 +236,7 @@ def test_learning_begins_with_the_first_networks_weights_and_keeps_its_early_lay
     first, file = random_network(1, len(CLASSES)), tmp_path / "m.onnx"
     export(first, file, class_names=CLASSES, facts={})
     batch, learner = feed.batch(0, 8), RegionLearner.new(len(CLASSES), 2, CPU)
-    learner.begin_with_first(file, [batch])
+    learner.begin(file, [batch])
     with torch.no_grad():
         for mine, theirs in zip(learner.network.detector.eval()(batch.chips), first(batch.chips), strict=True):
             assert torch.allclose(mine, theirs, atol=1e-2)
@@ -240,7 +250,7 @@ def test_learning_begins_with_the_first_networks_weights_and_keeps_its_early_lay
 
 def test_the_second_networks_file_holds_its_weights_in_16_bits(tmp_path: Path) -> None:
     network = unsettled(len(CLASSES))
-    export_regions(network, tmp_path / "r.onnx", class_names=CLASSES, facts={})
+    export_regions(network, tmp_path / "r.onnx", form=REGIONS_FORMAT, class_names=CLASSES, facts={})
     weights = sum(weight.numel() for weight in network.parameters())
     assert 2 * weights < (tmp_path / "r.onnx").stat().st_size < 2.2 * weights
 
@@ -248,7 +258,14 @@ def test_the_second_networks_file_holds_its_weights_in_16_bits(tmp_path: Path) -
 def test_learning_goes_on_from_a_second_networks_file(tmp_path: Path, feed: RegionFeed) -> None:
     file, network, batch = tmp_path / "r.onnx", unsettled(len(CLASSES)), feed.batch(0, 8)
     shift = (0.5, 0.0, -0.5)
-    export_regions(network, file, class_names=CLASSES, facts={"score_offsets": str(list(shift))}, score_offsets=shift)
+    export_regions(
+        network,
+        file,
+        form=REGIONS_FORMAT,
+        class_names=CLASSES,
+        facts={"score_offsets": str(list(shift))},
+        score_offsets=shift,
+    )
     learner = RegionLearner.new(len(CLASSES), 2, CPU)
     learner.start_from(file, [batch])
     for mine in (learner.network.eval(), learner.average.network.eval()):

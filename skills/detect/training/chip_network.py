@@ -1,0 +1,58 @@
+"""What the second and the third network have in common: both judge boxes in chips, after what stands before them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import torch
+from torch import Tensor, nn
+
+from skills.detect.regions import CHIP_PX
+from skills.detect.training.network import EarlyLayers
+
+__all__ = ["MOST_LOGIT", "ChipNetwork", "covered", "moved"]
+
+MOST_LOGIT: Final = 8.0
+_MOST_GROWTH: Final = 1.5
+_CELLS_8: Final = CHIP_PX // 8
+
+
+class ChipNetwork(nn.Module):
+    """Chips (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them and logits before (N, K) to logits and better boxes."""
+
+    classes: int
+    scores: nn.Linear
+
+    @property
+    def early_layers(self) -> EarlyLayers:
+        """What makes the features at stride 8."""
+        raise NotImplementedError
+
+    def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, K) and boxes (N, 4) of what the early layers make of chips."""
+        raise NotImplementedError
+
+    def take_bytes(self) -> None:
+        """Take chips of values from 0 to 255 from now on."""
+        raise NotImplementedError
+
+    def forward(self, chips: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, K) and boxes (N, 4) as x0 y0 x1 y1 in pixels of the chip."""
+        return self.from_early(self.early_layers.early(chips), boxes, logits)
+
+
+def covered(boxes: Tensor) -> Tensor:
+    """The share of each cell of stride 8 that boxes (N, 4) cover, (N, 1, 16, 16)."""
+    edges = torch.arange(_CELLS_8, device=boxes.device, dtype=boxes.dtype)[None] * 8.0
+    x0, y0, x1, y1 = (boxes[:, k : k + 1] for k in range(4))
+    across = ((x1 - edges) / 8.0).clamp(0.0, 1.0) - ((x0 - edges) / 8.0).clamp(0.0, 1.0)
+    down = ((y1 - edges) / 8.0).clamp(0.0, 1.0) - ((y0 - edges) / 8.0).clamp(0.0, 1.0)
+    return (down[:, :, None] * across[:, None, :])[:, None]
+
+
+def moved(boxes: Tensor, sides: Tensor) -> Tensor:
+    """Boxes (N, 4) with middles moved by shares of their sizes, and sizes changed by factors of which `sides` tells."""
+    middle, size = (boxes[:, :2] + boxes[:, 2:]) / 2, boxes[:, 2:] - boxes[:, :2]
+    middle = middle + sides[:, :2] * size
+    half = size * sides[:, 2:].clamp(-_MOST_GROWTH, _MOST_GROWTH).exp() / 2
+    return torch.cat([middle - half, middle + half], dim=1)

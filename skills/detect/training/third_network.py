@@ -1,0 +1,63 @@
+"""The third network: what the second one saw in a chip, judged by one that knew the world's pictures before ours.
+
+It begins with a backbone's weights of ImageNet, and with the second one's opinion, to which it adds.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from skills.detect.regions import CHIP_PX
+from skills.detect.training.chip_network import MOST_LOGIT, ChipNetwork, covered, moved
+from skills.detect.training.lite_backbone import AT_8, AT_16, AT_32, LiteBackbone
+from skills.detect.training.network import ConvUnit
+
+__all__ = ["ThirdNetwork"]
+
+_CELLS_16, _CELLS_32 = CHIP_PX // 16, CHIP_PX // 32
+_SQUEEZED_16, _SQUEEZED_32, _JOINED = 24, 96, 192
+_SIDES_SCALE = 0.1
+
+
+class ThirdNetwork(ChipNetwork):
+    """A chip network that says at first what stands before it says."""
+
+    def __init__(self, classes: int) -> None:
+        super().__init__()
+        self.classes = classes
+        self.backbone = LiteBackbone()
+        self.place = nn.Conv2d(1, AT_8, 1, bias=False)
+        self.squeeze16 = ConvUnit(AT_16, _SQUEEZED_16)
+        self.squeeze32 = ConvUnit(AT_32, _SQUEEZED_32)
+        known = _SQUEEZED_16 * _CELLS_16 * _CELLS_16 + _SQUEEZED_32 * _CELLS_32 * _CELLS_32 + classes + 4
+        self.join = nn.Sequential(
+            nn.Linear(known, _JOINED, bias=False),
+            nn.BatchNorm1d(_JOINED, eps=1e-3, momentum=0.03),
+            nn.ReLU(),
+            nn.Dropout(0.1),
+        )
+        self.scores = nn.Linear(_JOINED, classes)
+        self.sides = nn.Linear(_JOINED, 4)
+        self.trust = nn.Parameter(torch.ones(classes))
+        for last in (self.scores, self.sides):
+            nn.init.zeros_(last.weight)
+            nn.init.zeros_(last.bias)
+        nn.init.zeros_(self.place.weight)
+
+    @property
+    def early_layers(self) -> LiteBackbone:
+        """What makes the features at stride 8."""
+        return self.backbone
+
+    def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, K) and boxes (N, 4) of what the early layers make of chips."""
+        at16, at32 = self.backbone.late(at8 + self.place(covered(boxes)))
+        before = logits.clamp(-MOST_LOGIT, MOST_LOGIT)
+        told = [self.squeeze16(at16).flatten(1), self.squeeze32(at32).flatten(1), before, boxes / CHIP_PX]
+        known = self.join(torch.cat(told, dim=1))
+        return self.trust * before + self.scores(known), moved(boxes, _SIDES_SCALE * self.sides(known).float())
+
+    def take_bytes(self) -> None:
+        """Take chips of values from 0 to 255 from now on."""
+        self.backbone.take_bytes()

@@ -168,9 +168,18 @@ class Detect(ArmSkill[DetectInputs]):
 
     def _refresh(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
         """Look once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""
+        if (track := self._seen_a_while_ago(inputs)) is not None:
+            yield from self._look_and_confirm(inputs, X_HC, self.X_WB().inverse() @ track.position_W, [])
+        if (track := self._seen_a_while_ago(inputs)) is not None:  # from there it did not show: from where it did
+            X_BW = self.X_WB().inverse()
+            p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
+            stations = [*stations_beside(self.model.p_BS, eye_B, p_BO), *self._stations(p_BO)]
+            yield from self._look_if_possible(inputs, X_HC, p_BO, stations)
+
+    def _seen_a_while_ago(self, inputs: DetectInputs) -> Track | None:
+        """What was found and seen last, unless it was seen just now."""
         newest = next(iter(self._found(inputs)), None)
-        if newest is not None and self.context.clock.now() - newest.last_seen_s > _FRESH_S:
-            yield from self._look_and_confirm(inputs, X_HC, self.X_WB().inverse() @ newest.position_W, [])
+        return newest if newest is not None and self.context.clock.now() - newest.last_seen_s > _FRESH_S else None
 
     def _look_and_confirm(
         self,
@@ -193,11 +202,17 @@ class Detect(ArmSkill[DetectInputs]):
         while (track := self._candidate(inputs)) is not None:
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
             p_BO = self.X_WB().inverse() @ track.position_W
-            try:
-                yield from self.look(inputs, X_HC, p_BO, self._stations_to_confirm(track, tries, close=close))
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
+            yield from self._look_if_possible(inputs, X_HC, p_BO, self._stations_to_confirm(track, tries, close=close))
+
+    def _look_if_possible(
+        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, stations_B: Sequence[FloatArray]
+    ) -> Routine[None]:
+        """Look at a point, unless the arm cannot."""
+        try:
+            yield from self.look(inputs, X_HC, p_BT, stations_B)
+        except SkillFailure as failure:
+            if failure.cause is not Cause.PLANNING:
+                raise
 
     def _stations(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
         """Camera places p_BC to look from at p_BT, turned by shift_rad about the shoulder; near ones first if close."""

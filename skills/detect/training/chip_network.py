@@ -36,6 +36,9 @@ class ChipNetwork(nn.Module):
         """Take chips of values from 0 to 255 from now on."""
         raise NotImplementedError
 
+    def stop_learning(self) -> None:
+        """Change what is to be otherwise in use than while learning: nothing, unless said."""
+
     def forward(self, chips: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, K) and boxes (N, 4) as x0 y0 x1 y1 in pixels of the chip."""
         return self.from_early(self.early_layers.early(chips), boxes, logits)

@@ -20,7 +20,7 @@ from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.network import Backbone, DetectorNetwork
 from skills.detect.training.onnx_files import learnt_weights
 from skills.detect.training.region_network import RegionNetwork
-from skills.detect.training.third_network import ThirdNetwork
+from skills.detect.training.third_network import USED, ThirdNetwork
 
 __all__ = ["settle", "take_over", "take_over_regions", "take_over_third"]
 
@@ -51,6 +51,7 @@ def take_over_regions(network: RegionNetwork, file: Path) -> None:
 def take_over_third(network: ThirdNetwork, file: Path) -> None:
     """The same for the third network and its file, whichever second network that belongs to."""
     _take_chip_network(network, file, load_third)
+    network.add(1.0 / USED)
 
 
 def _take_chip_network(network: ChipNetwork, file: Path, load: Callable[[Path], Network]) -> None:

@@ -22,6 +22,7 @@ class ExportableRegions(nn.Module):
     def __init__(self, network: ChipNetwork, score_offsets: Sequence[float] | None = None) -> None:
         super().__init__()
         self.network = fused(network)
+        self.network.stop_learning()
         self.network.take_bytes()
         if score_offsets is not None:
             with torch.no_grad():

@@ -15,7 +15,7 @@ from onnxruntime import InferenceSession
 from skills.detect.detector_file import MODEL_FILE, DetectorModel, load_model
 from skills.detect.letterbox import Letterbox, letterbox
 from skills.detect.network_file import THREADS, Network
-from skills.detect.region_look import looked_again
+from skills.detect.region_look import judged, looked_again
 from skills.detect.regions import JUDGED, RegionOptions
 from skills.detect.scales import Scales, halved
 from skills.detect.suppression import SuppressionOptions, candidates_of, told
@@ -32,7 +32,7 @@ class DetectorOptions:
     """The least score that is told, also of a class that a thing may be as well, and how boxes on it become one.
 
     `regions` are the places at which a second network, where there is one, looks again, and `judged` those of them that
-    a third one judges, where there is one.
+    a third one judges, where there is one; what it does not judge is told as the second one sees it.
     """
 
     threshold: float = 0.5
@@ -73,7 +73,7 @@ class OnnxDetector:
             scales = Scales(image, halved(image))
             boxes, scores = looked_again(session(self.model.second), scales, boxes, scores, self.options.regions)
             if self.model.third is not None:
-                boxes, scores = looked_again(session(self.model.third), scales, boxes, scores, self.options.judged)
+                boxes, scores = judged(session(self.model.third), scales, boxes, scores, self.options.judged)
         return self._detections(boxes, scores, placed)
 
     def _detections(self, boxes: Floats, scores: Floats, placed: Letterbox) -> tuple[Detection, ...]:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from onnxruntime import InferenceSession
 
-from skills.detect.regions import CHIP_PX, RegionOptions, Regions, chip_map, mapped, regions_of
+from skills.detect.regions import CHIP_PX, RegionOptions, Regions, chip_map, mapped, regions_of, rows_of
 from skills.detect.scales import Scales
 
-__all__ = ["chips_about", "looked_again"]
+__all__ = ["chips_about", "judged", "looked_again"]
 
 Floats = NDArray[np.float32]
 
@@ -37,6 +37,16 @@ def looked_again(
         found[rows] = 0.5 * (found[rows] + again)
         seen[rows] = 0.5 * (seen[rows] + others)
     return found, seen
+
+
+def judged(
+    session: InferenceSession, scales: Scales, boxes: Floats, scores: Floats, options: RegionOptions
+) -> tuple[Floats, Floats]:
+    """Boxes (R, 4) and scores (R, K), with those of the places that `options` choose as a network sees them."""
+    rows = rows_of(boxes, scores, options)
+    boxes, scores = boxes.copy(), scores.copy()
+    boxes[rows], scores[rows] = looked_again(session, scales, boxes[rows], scores[rows], options)
+    return boxes, scores
 
 
 def chips_about(scales: Scales, regions: Regions, *, mirrored: bool = False) -> dict[str, NDArray[Any]]:

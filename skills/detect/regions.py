@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skills.detect.suppression import apart
 
-__all__ = ["CHIP_PX", "JUDGED", "RegionOptions", "Regions", "chip_map", "logits_of", "mapped", "regions_of"]
+__all__ = ["CHIP_PX", "JUDGED", "RegionOptions", "Regions", "chip_map", "logits_of", "mapped", "regions_of", "rows_of"]
 
 CHIP_PX: Final = 128
 THING_PX: Final = 84.0
@@ -41,7 +41,7 @@ class RegionOptions:
     mirrored_from: float | None = 0.3
 
 
-JUDGED: Final = RegionOptions(least_score=0.03, same=0.8, mirrored_from=None)
+JUDGED: Final = RegionOptions(least_score=0.12, same=1.0, most=8, mirrored_from=None)
 """What a third network judges of what the second one sees."""
 
 
@@ -57,7 +57,13 @@ class Regions:
 
 
 def regions_of(boxes: Floats, scores: Floats, options: RegionOptions) -> Regions:
-    """The places that boxes (A, 4) and scores (A, K) of the first network tell of, the surest first.
+    """The places that boxes (A, 4) and scores (A, K) of a network tell of, the surest first."""
+    rows = rows_of(boxes, scores, options)
+    return Regions(boxes[rows], logits_of(scores[rows]))
+
+
+def rows_of(boxes: Floats, scores: Floats, options: RegionOptions) -> NDArray[np.int64]:
+    """Which of boxes (A, 4) with scores (A, K) are places to look at again, the surest first.
 
     What is not finite, or has no area, is none.
     """
@@ -65,8 +71,7 @@ def regions_of(boxes: Floats, scores: Floats, options: RegionOptions) -> Regions
     rows = np.flatnonzero(best >= options.least_score)
     rows = rows[np.argsort(-best[rows], kind="stable")][: options.most_candidates]
     rows = rows[np.isfinite(boxes[rows]).all(axis=1) & (boxes[rows, 2:] > boxes[rows, :2]).all(axis=1)]
-    rows = rows[apart(boxes[rows], options.same)[: options.most]]
-    return Regions(boxes[rows], logits_of(scores[rows]))
+    return np.asarray(rows[apart(boxes[rows], options.same)[: options.most]], dtype=np.int64)
 
 
 def logits_of(scores: Floats) -> Floats:

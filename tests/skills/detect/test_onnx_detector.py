@@ -193,12 +193,23 @@ def test_a_third_network_looks_where_the_second_one_says(tmp_path):
     assert found[0].box == pytest.approx((109.5, 104.75, 190.5, 145.25), abs=0.01)
 
 
-# least score that is judged   what the second one says   looked at
-# 0.03                         1.0                        yes
-# 1.1                          1.0                        no, so nothing is told
-@pytest.mark.parametrize(("least_score", "told"), [(0.03, 1), (1.1, 0)])
-def test_what_the_second_network_hardly_sees_is_not_judged(tmp_path, least_score, told):
-    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 200))), (50, 50, 250, 250))
-    options = DetectorOptions(judged=RegionOptions(least_score=least_score))
-    (found,) = load_detector(write_three(tmp_path / "three.onnx"), options).detect([picture])
+# least score that is judged   what the second one says   told
+# 0.12                         1.0                        what the third one says: nothing
+# 1.1                          1.0                        what the second one says
+@pytest.mark.parametrize(("least_score", "told"), [(0.12, []), (1.1, ["beer"])])
+def test_what_the_third_network_does_not_judge_is_told_as_the_second_one_sees_it(tmp_path, least_score, told):
+    """The third one sees red in the left half alone, where there is none."""
+    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
+    options = DetectorOptions(0.05, judged=RegionOptions(least_score=least_score, mirrored_from=None))
+    (found,) = load_detector(write_three(tmp_path / "three.onnx", left_only=True), options).detect([picture])
+    assert [one.class_name for one in found] == told
+
+
+# of two places that the second one sees, the third judges so many
+@pytest.mark.parametrize(("most", "told"), [(1, 1), (2, 0)])
+def test_the_surest_places_are_judged(tmp_path, most, told):
+    picture = picture_of(("hammer", 0.6, (100, 100, 200, 200)), ("hammer", 0.6, (400, 100, 500, 200)))
+    picture = reddened(reddened(picture, (150, 2, 300, 400)), (450, 2, 600, 400))
+    options = DetectorOptions(0.05, judged=RegionOptions(same=1.0, most=most, mirrored_from=None))
+    (found,) = load_detector(write_three(tmp_path / "three.onnx", left_only=True), options).detect([picture])
     assert len(found) == told

@@ -48,8 +48,11 @@ def unknown_command(line):
     words = shlex.split(line, comments=True)
     if words[1] not in COMMANDS:
         return f"no command {words[1]}"
-    known = {name for parameter in COMMANDS[words[1]].params for name in (*parameter.opts, *parameter.secondary_opts)}
-    return next((f"{words[1]} has no {word}" for word in words[2:] if word.startswith("-") and word not in known), None)
+    command, rest = COMMANDS[words[1]], words[2:]
+    while rest and rest[0] in getattr(command, "commands", {}):
+        command, rest = command.commands[rest[0]], rest[1:]
+    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    return next((f"{command.name} has no {word}" for word in rest if word.startswith("-") and word not in known), None)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_id)

@@ -78,9 +78,10 @@ def refine(options: RefineOptions, told: Told) -> Path:
     pictures = read_split(options.data, "train")
     names = category_names(options.data)
     examination(options.data, "val", names)
-    first = _copied(options.model, options)
+    first = options.out / MODEL
+    _copy(options.model, first, options)
     if options.third:
-        _copied(regions_file(options.model), options)
+        _copy(regions_file(options.model), regions_file(first), options)
     store = open_store(options.out / PICTURES, pictures)
     if not options.resume or not (options.out / TABLE).is_file():
         _look_at_all(options, names, pictures, store)
@@ -88,9 +89,8 @@ def refine(options: RefineOptions, told: Told) -> Path:
     return _stage(options).file(first)
 
 
-def _copied(model: Path, options: RefineOptions) -> Path:
-    """A network's file in the folder that is written to; what is gone on with keeps the one that it had."""
-    file = options.out / model.name.replace(options.model.stem, Path(MODEL).stem, 1)
+def _copy(model: Path, file: Path, options: RefineOptions) -> None:
+    """Bring a network's file to where it is written to; what is gone on with keeps the one that it had."""
     try:
         if not file.is_file() or not (options.resume or model.samefile(file)):
             shutil.copyfile(model, file)
@@ -98,7 +98,6 @@ def _copied(model: Path, options: RefineOptions) -> Path:
         raise TrainingDataError(
             f"{model}: cannot be copied ({error.strerror})", mend="name a detector's ONNX file with --model"
         ) from error
-    return file
 
 
 def _look_at_all(

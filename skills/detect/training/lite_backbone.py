@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.network import EarlyLayers
 
-__all__ = ["AT_8", "AT_16", "AT_32", "InvertedResidual", "LiteBackbone", "PaddedDepthwise"]
+__all__ = ["AT_8", "AT_16", "AT_32", "InvertedResidual", "LiteBackbone", "PaddedConv", "PaddedDepthwise"]
 
 AT_8, AT_16, AT_32 = 40, 112, 320
 """Channels at strides 8, 16 and 32."""

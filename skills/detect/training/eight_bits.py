@@ -29,11 +29,12 @@ from onnxruntime.quantization.shape_inference import quant_pre_process
 from skills.detect.detector_file import DetectorModel, load_model, regions_file, third_file
 from skills.detect.letterbox import letterbox
 from skills.detect.network_file import ModelFileError, Network
-from skills.detect.region_look import chips_about, looked_again
+from skills.detect.region_look import chips_about
 from skills.detect.regions import JUDGED, RegionOptions, Regions, regions_of
 from skills.detect.scales import Scales, halved
 from skills.detect.training.command import exit_code_of
 from skills.detect.training.labels import TrainingDataError
+from skills.detect.training.looks import seen_by_first, seen_by_second
 from skills.detect.training.onnx_files import EIGHT_BITS, compact, facts_of, in_32_bits, shorten_names, write_sealed
 from skills.detect.training.validate import examination, read_picture
 
@@ -189,18 +190,12 @@ def _chips(look: Callable[[Scales], Regions], pictures: Sequence[Scales]) -> lis
 
 def _places(model: DetectorModel, scales: Scales) -> Regions:
     """Where the second network looks."""
-    return regions_of(*_first_look(model, scales), RegionOptions())
+    return regions_of(*seen_by_first(model, scales), RegionOptions())
 
 
 def _seen_places(model: DetectorModel, scales: Scales) -> Regions:
     """Where the third network looks."""
-    assert model.second is not None  # it stands beside a second one only
-    return regions_of(*looked_again(model.second.session, scales, *_first_look(model, scales), RegionOptions()), JUDGED)
-
-
-def _first_look(model: DetectorModel, scales: Scales) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    boxes, scores = model.first.session.run(["boxes", "scores"], {"images": scales.full[None]})
-    return boxes[0], scores[0]
+    return regions_of(*seen_by_second(model, scales), JUDGED)
 
 
 def write_in_eight_bits(

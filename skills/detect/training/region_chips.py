@@ -32,7 +32,7 @@ _BOX_SPREAD: Final = 0.04
 
 @dataclass(frozen=True)
 class RegionBatch:
-    """Chips (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them, first logits (N, K), and what is right.
+    """Chips (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them, logits (N, K) of them, and what is right.
 
     `wanted` (N, 4) are boxes, `classes` (N,) numbers or -1 for nothing.
     """

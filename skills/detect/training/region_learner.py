@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from skills.detect.training.averaging import WeightAverage
 from skills.detect.training.chip_network import ChipNetwork
@@ -42,6 +42,12 @@ class ChipLearner(LearningState[ChipNetwork]):
     def begin(self, first: Path, batches: Iterable[RegionBatch]) -> None:
         """Take over weights to begin with, with statistics of batches. Raises TrainingDataError."""
         raise NotImplementedError
+
+    def begin_with(self, part: nn.Module, name: str) -> None:
+        """Take over the weights of a part of the network, which goes by some name in it."""
+        begun = {f"{name}.{key}": weights for key, weights in part.state_dict().items()}
+        self.network.load_state_dict(begun, strict=False)
+        self.average.network.load_state_dict(self.network.state_dict())
 
     def start_from(self, file: Path, batches: Iterable[RegionBatch]) -> None:
         """Take over the weights of such a network's ONNX file, with statistics of batches, or a checkpoint's.
@@ -105,9 +111,7 @@ class RegionLearner(ChipLearner):
         detector = DetectorNetwork(self.network.classes)
         take_over(detector, first)
         settle(detector, ((batch.chips,) for batch in batches))
-        begun = {f"detector.{name}": weights for name, weights in detector.state_dict().items()}
-        self.network.load_state_dict(begun, strict=False)
-        self.average.network.load_state_dict(self.network.state_dict())
+        self.begin_with(detector, "detector")
 
     def take_over_file(self, file: Path) -> None:
         """Take over the weights of a second network's ONNX file. Raises TrainingDataError."""
@@ -129,9 +133,7 @@ class ThirdLearner(ChipLearner):
         """Take over the backbone's weights of ImageNet. Raises TrainingDataError."""
         backbone = LiteBackbone()
         backbone.begin_with_imagenet()
-        begun = {f"backbone.{name}": weights for name, weights in backbone.state_dict().items()}
-        self.network.load_state_dict(begun, strict=False)
-        self.average.network.load_state_dict(self.network.state_dict())
+        self.begin_with(backbone, "backbone")
 
     def take_over_file(self, file: Path) -> None:
         """Take over the weights of a third network's ONNX file. Raises TrainingDataError."""

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detect.detector_file import DetectorModel
-from skills.detect.region_look import looked_again
 from skills.detect.regions import RegionOptions, Regions, regions_of
 from skills.detect.scales import Scales
 from skills.detect.scoring_matching import overlaps
 from skills.detect.training.labels import Labels, LearningPicture
+from skills.detect.training.looks import seen_by_first, seen_by_second
 from skills.detect.training.store import PictureStore
 
 __all__ = ["NEAR", "Look", "RegionTable", "first_look", "second_look", "table_of"]
@@ -64,16 +64,12 @@ Look = Callable[[Scales], Regions]
 
 def first_look(model: DetectorModel, scales: Scales) -> Regions:
     """The places that the first network finds."""
-    boxes, scores = model.first.single.run(["boxes", "scores"], {"images": scales.full[None]})
-    return regions_of(boxes[0], scores[0], _LOOKED_AT)
+    return regions_of(*seen_by_first(model, scales), _LOOKED_AT)
 
 
 def second_look(model: DetectorModel, scales: Scales) -> Regions:
     """What the second network makes of them. Raises ValueError where there is none."""
-    if model.second is None:
-        raise ValueError("there is no second network")
-    boxes, scores = model.first.single.run(["boxes", "scores"], {"images": scales.full[None]})
-    return regions_of(*looked_again(model.second.single, scales, boxes[0], scores[0], RegionOptions()), _SEEN)
+    return regions_of(*seen_by_second(model, scales), _SEEN)
 
 
 def table_of(look: Look, pictures: Sequence[LearningPicture], store: PictureStore) -> RegionTable:

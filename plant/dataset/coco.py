@@ -17,6 +17,7 @@ LEAST_SHARE = 0.25
 LEAST_LONG_PX = 10
 LEAST_SHORT_PX = 4
 LEAST_NOTED_PX = 6
+MOST_OF_PICTURE = 0.95
 DARKEST_MEAN, DARKEST_SPREAD = 14.0, 7.0
 
 
@@ -56,8 +57,8 @@ def annotation(
     """One label without ids, or None when next to nothing is seen.
 
     `visibility` is the share seen of what the thing alone would show in the picture, `truncation` the share of the
-    thing beyond the picture's edge. Too little seen, too small or too `dark`: `ignore` is 1, and `iscrowd`, by which
-    COCO's tools pass over it.
+    thing beyond the picture's edge. Too little seen, too small, too `dark`, or all over the picture, without an
+    outline: `ignore` is 1, and `iscrowd`, by which COCO's tools pass over it.
     """
     area = int(mask.sum())
     if area < LEAST_NOTED_PX:
@@ -66,7 +67,8 @@ def annotation(
     visibility = min(1.0, area / max(alone.inside_px, 1))
     truncation = 1.0 - alone.inside_px / max(alone.whole_px, alone.inside_px, 1)
     seen = visibility * (1.0 - truncation)
-    ignored = dark or seen < LEAST_SHARE or max(w, h) < LEAST_LONG_PX or min(w, h) < LEAST_SHORT_PX
+    too_small = max(w, h) < LEAST_LONG_PX or min(w, h) < LEAST_SHORT_PX
+    ignored = dark or seen < LEAST_SHARE or too_small or area > MOST_OF_PICTURE * mask.size
     return {
         "category_id": class_id,
         "bbox": [x, y, w, h],

@@ -45,7 +45,6 @@ def test_an_empty_mask_has_no_box() -> None:
 def label(seen: int, inside: int, whole: int, side: int = 20) -> dict[str, Any] | None:
     """`seen` pixels of a square mask of 20 rows."""
     mask = np.zeros((100, 100), dtype=bool)
-    mask[:side, :].reshape(-1)[:0] = True
     rows = -(-seen // side)
     mask[10 : 10 + rows, 10 : 10 + side] = True
     extra = rows * side - seen
@@ -82,6 +81,16 @@ def test_what_is_too_small_to_be_judged_is_ignored_and_a_few_pixels_are_no_label
     assert small is not None
     assert small["ignore"] == 1
     assert label(4, 4, 4, side=2) is None
+
+
+# share of the rows of the picture -> ignored
+@pytest.mark.parametrize(("rows", "ignored"), [(90, 0), (95, 0), (96, 1), (100, 1)])
+def test_what_fills_the_picture_is_ignored(rows: int, ignored: int) -> None:
+    mask = np.zeros((100, 100), dtype=bool)
+    mask[:rows] = True
+    entry = annotation(mask=mask, alone=Silhouette(rows * 100, 10_000), class_id=4, instance="x", distance_m=0.1)
+    assert entry is not None
+    assert entry["ignore"] == ignored
 
 
 def test_categories_have_the_project_s_class_ids() -> None:

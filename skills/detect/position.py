@@ -64,6 +64,14 @@ class Position:
     extents: Extents
     fore: Foreground
 
+    @property
+    def spanned_m(self) -> float:
+        """How long the longer side of the box is at the depth of the thing."""
+        window = self.fore.window
+        u0, v0, u1, v1 = window.box
+        depth_m = float((window.R_OC.T @ (self.p_OT - window.p_OC))[2])
+        return depth_m * max((u1 - u0) / window.lens.fx, (v1 - v0) / window.lens.fy)
+
 
 def position_of(image: Image, detection: Detection, taken: Mask | None = None) -> Position | None:
     """Where the thing of a box is; None where no depth is seen there. Raises KeyError for a class without a form.

@@ -19,6 +19,7 @@ _SURFACE_MARGIN_M = 0.05
 _SURFACE_HEIGHT_M = 0.10
 FLOOR = "floor"
 _FLOOR_HEIGHT_M = 0.08
+_FAR_TOO_LARGE = 1.5
 
 
 @dataclass(frozen=True)
@@ -52,14 +53,22 @@ class Sighting:
 def sightings(
     image: Image, localisation: LocalisationEstimate, detections: Iterable[Detection], surfaces: Sequence[Surface]
 ) -> tuple[Sighting, ...]:
-    """The detections that have a place; those where no depth is seen, or of classes without a form, are left out."""
+    """The detections that have a place.
+
+    Left out are those where no depth is seen, of classes without a form, and those that span far more than the longest
+    things of their class do.
+    """
     known = [detection for detection in detections if detection.class_name in class_forms()]
     placed = zip(known, _positions(image, known), strict=True)
     return tuple(
         _sighting(image, localisation, detection, position, surfaces)
         for detection, position in placed
-        if position is not None
+        if position is not None and not _is_far_too_large(detection, position)
     )
+
+
+def _is_far_too_large(detection: Detection, position: Position) -> bool:
+    return position.spanned_m > _FAR_TOO_LARGE * class_forms()[detection.class_name].length_m[1]
 
 
 def _positions(image: Image, detections: Sequence[Detection]) -> list[Position | None]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
-from table_scene import BLUE, COKE, RED, TABLE, Can, scene, seen_as
+from table_scene import BLUE, CAMERA, COKE, LENS, RED, TABLE, Can, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate, Surface
 from skills.detect.looking import in_plain_view
@@ -50,6 +50,17 @@ def test_a_detection_without_depth_or_of_a_class_without_form_is_left_out():
     image.depth_m[:] = 0.0
     assert sightings(image, SURE, [seen_as("coke", image)], [TABLE]) == ()
     assert sightings(scene([COKE]), SURE, [Detection("unicorn", 0.9, (1.0, 1.0, 9.0, 9.0))], [TABLE]) == ()
+
+
+# class -> whether it can span 0.6 m, where the longest are (forms.yaml) 0.30, 0.36, 0.60 and 1.00 m long
+@pytest.mark.parametrize(("name", "possible"), [("coke", False), ("beer", False), ("wrench", True), ("hammer", True)])
+def test_what_spans_far_more_than_such_things_do_is_left_out(name, possible):
+    image = scene([COKE])
+    u0, v0, u1, v1 = seen_as("coke", image).box
+    half_px = 0.3 * LENS.fx / float(np.linalg.norm(COKE_W - CAMERA))
+    middle = 0.5 * (u0 + u1)
+    wide = Detection(name, 0.9, (middle - half_px, v0, middle + half_px, v1))
+    assert bool(sightings(image, SURE, [wide], [TABLE])) is possible
 
 
 SHELF = Surface("shelf", TABLE.polygon_W, 0.40)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -20,11 +19,18 @@ from skills.detect.detector_file import load_model, load_regions, load_third
 from skills.detect.network_file import ModelFileError, Network
 from skills.detect.training.command import exit_code_of
 from skills.detect.training.labels import TrainingDataError
-from skills.detect.training.onnx_files import EIGHT_BITS, facts_of, in_full, learnt_weights, write_sealed
+from skills.detect.training.onnx_files import (
+    EIGHT_BITS,
+    facts_of,
+    in_full,
+    learnt_weights,
+    offsets_fact,
+    offsets_in,
+    write_sealed,
+)
 
 __all__ = ["average", "main"]
 
-_OFFSETS = "score_offsets"
 _ALIKE = ("format", "class_names", "first", "second")
 _MEND = "name files that errand dataset train or refine wrote"
 
@@ -33,7 +39,7 @@ def average(files: Sequence[Path], out: Path) -> None:
     """Write the mean of networks of one kind that stand beside the same one before them; whole or not at all.
 
     One at least must reckon with floats, as what is written does. It tells what the first of those tells, but for the
-    shifts of scores, which are the mean too. Raises TrainingDataError.
+    shifts of scores, which are the mean too; `recalibrate` makes better ones. Raises TrainingDataError.
     """
     told = [_told(file) for file in files]
     floats = next((k for k, network in enumerate(told) if EIGHT_BITS not in network.metadata), None)
@@ -53,11 +59,8 @@ def average(files: Sequence[Path], out: Path) -> None:
             kind = onnx.numpy_helper.to_array(one).dtype
             mean = np.mean([found[name].astype(np.float64) for found in weights], axis=0)
             one.CopyFrom(onnx.numpy_helper.from_array(mean.astype(kind), one.name))
-    facts = facts_of(made)
-    if all(_OFFSETS in network.metadata for network in told):
-        shifts = np.mean([json.loads(network.metadata[_OFFSETS]) for network in told], axis=0)
-        facts[_OFFSETS] = json.dumps([round(float(value), 4) for value in shifts])
-    write_sealed(made, out, facts)
+    shifts = np.mean([offsets_in(network.metadata, len(network.class_names)) for network in told], axis=0)
+    write_sealed(made, out, {**facts_of(made), **offsets_fact(shifts)})
 
 
 def _told(file: Path) -> Network:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,17 +16,22 @@ from skills.detect.network_file import sealed
 
 __all__ = [
     "EIGHT_BITS",
+    "OFFSETS",
     "compact",
     "facts_of",
     "in_32_bits",
     "in_full",
     "learnt_weights",
+    "offsets_fact",
+    "offsets_in",
     "shorten_names",
     "write_sealed",
 ]
 
 EIGHT_BITS: Final = "eight_bits"
 """What a file has among its metadata when its network reckons with 8 bits."""
+OFFSETS: Final = "score_offsets"
+"""What it tells there of what was added to the logits of each class."""
 _SEAL: Final = "sha256"
 _LEARNT: Final = "network."
 _SCALE: Final = "_scale"
@@ -43,6 +49,16 @@ def write_sealed(model: onnx.ModelProto, file: Path, facts: Mapping[str, str]) -
     fresh = file.with_name(f".{file.name}.new")
     fresh.write_bytes(sealed(model.SerializeToString(deterministic=True)))
     fresh.replace(file)
+
+
+def offsets_fact(offsets: Iterable[float]) -> dict[str, str]:
+    """What a file tells of what was added to the logits of each class."""
+    return {OFFSETS: json.dumps([round(float(value), 4) for value in offsets])}
+
+
+def offsets_in(facts: Mapping[str, str], classes: int) -> list[float]:
+    """What a file tells of it; zeros, where nothing was added."""
+    return [float(value) for value in json.loads(facts[OFFSETS])] if OFFSETS in facts else [0.0] * classes
 
 
 def facts_of(model: onnx.ModelProto) -> dict[str, str]:

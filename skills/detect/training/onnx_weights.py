@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from skills.detect.training.chip_network import ChipNetwork
 from skills.detect.training.export import normalised_layers
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.network import Backbone, DetectorNetwork
-from skills.detect.training.onnx_files import learnt_weights
+from skills.detect.training.onnx_files import learnt_weights, offsets_in
 from skills.detect.training.region_network import RegionNetwork
 from skills.detect.training.third_network import USED, ThirdNetwork
 
@@ -71,7 +70,7 @@ def _take_shares(backbone: Backbone) -> None:
 @torch.no_grad()
 def _take(network: nn.Module, file: Path, told: Network, score_biases: Sequence[Tensor]) -> None:
     kept, left = _content(file), dict(network.named_parameters())
-    offsets = json.loads(told.metadata.get("score_offsets", json.dumps([0.0] * len(told.class_names))))
+    offsets = offsets_in(told.metadata, len(told.class_names))
     try:
         for name, unit in normalised_layers(network):
             _fill(unit[0].weight, kept[f"{name}.0.weight"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from skills.detect.regions import Regions
 from skills.detect.scales import Scales
 from skills.detect.training.labels import LearningPicture, TrainingDataError, category_names, digest_of, read_split
 from skills.detect.training.loop import CHECKPOINT, Loop, Stepped, figures_of
+from skills.detect.training.onnx_files import offsets_fact
 from skills.detect.training.options import RefineOptions
 from skills.detect.training.peers import Peers
 from skills.detect.training.region_chips import RegionFeed
@@ -34,12 +34,11 @@ from skills.detect.training.region_table import RegionTable, first_look, second_
 from skills.detect.training.store import PictureStore, open_store
 from skills.detect.training.together import Told, learn_together
 from skills.detect.training.train import MODEL, PICTURES
-from skills.detect.training.validate import Examination, examination, examine, offsets_by
+from skills.detect.training.validate import CALIBRATED_BY, Examination, examination, examine, offsets_by
 
 __all__ = ["refine"]
 
 TABLE: Final = "regions.npz"
-_CALIBRATED_BY: Final = 900
 _SETTLED_BY: Final = 24
 
 
@@ -179,9 +178,9 @@ def export_refined(learner: ChipLearner, options: RefineOptions, *, calibrated: 
     write = partial(export_regions, learner.average.network, stage.file(first), form=stage.form, class_names=names)
     write(facts=facts)
     if calibrated:
-        exam = examination(options.data, "train", names, _CALIBRATED_BY)
+        exam = examination(options.data, "train", names, CALIBRATED_BY)
         offsets = offsets_by(first, exam, networks=stage.networks)
         write(
-            facts={**facts, "score_offsets": json.dumps([round(value, 4) for value in offsets])},
+            facts={**facts, **offsets_fact(offsets)},
             score_offsets=offsets,
         )

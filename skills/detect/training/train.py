@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,18 +15,18 @@ from skills.detect.training.export import export
 from skills.detect.training.labels import category_names, digest_of, read_split
 from skills.detect.training.learner import ONNX, Learner
 from skills.detect.training.loop import CHECKPOINT, Loop, Stepped, figures_of
+from skills.detect.training.onnx_files import offsets_fact
 from skills.detect.training.onnx_weights import settle
 from skills.detect.training.options import TrainOptions
 from skills.detect.training.peers import Peers
 from skills.detect.training.store import open_store
 from skills.detect.training.together import Report, Told, learn_together
-from skills.detect.training.validate import Examination, examination, examine, offsets_by
+from skills.detect.training.validate import CALIBRATED_BY, Examination, examination, examine, offsets_by
 
 __all__ = ["MODEL", "Report", "TrainOptions", "train"]
 
 MODEL: Final = "errand_detector.onnx"
 PICTURES: Final = "pictures"
-_CALIBRATED_BY: Final = 900
 _SETTLED_BY: Final = 24
 
 
@@ -116,6 +115,6 @@ def export_model(learner: Learner, options: TrainOptions, *, calibrated: bool) -
     facts = {"seed": str(options.seed), "data": digest_of(options.data)}
     export(network, file, class_names=names, facts=facts)
     if calibrated:
-        offsets = offsets_by(file, examination(options.data, "train", names, _CALIBRATED_BY), networks=1)
-        told = {**facts, "score_offsets": json.dumps([round(value, 4) for value in offsets])}
+        offsets = offsets_by(file, examination(options.data, "train", names, CALIBRATED_BY), networks=1)
+        told = {**facts, **offsets_fact(offsets)}
         export(network, file, class_names=names, facts=told, score_offsets=offsets)

@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import cv2
 import numpy as np
@@ -19,9 +20,11 @@ from skills.detect.training.calibrate import score_offsets
 from skills.detect.training.labels import TrainingDataError
 from skills.detection import Detection
 
-__all__ = ["Examination", "examination", "examine", "offsets_by", "read_picture"]
+__all__ = ["CALIBRATED_BY", "Examination", "examination", "examine", "offsets_by", "read_picture"]
 
 LEAST_SCORE = 0.02
+CALIBRATED_BY: Final = 900
+"""By how many pictures the shifts of scores are found."""
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,10 @@
     python -m skills.detect.training.eight_bits DIR/errand_detector.onnx --data PICTURES --out FOLDER
 
 Weights have 8 bits in the file, those of each output in steps of their own; learning can go on from them. What passes
-between layers gets its range from some pictures that were learnt from. The first convolution, which sees the picture,
-and the last ones, which tell scores and boxes, stay as they are. After Jacob et al., "Quantization and Training of
-Neural Networks for Efficient Integer-Arithmetic-Only Inference" (2018). Needs no torch.
+between layers gets its range from some pictures that were learnt from. The first convolution, which sees the picture
+(with a separable one right after it), and the last ones, which tell scores and boxes, stay as they are. After Jacob et
+al., "Quantization and Training of Neural Networks for Efficient Integer-Arithmetic-Only Inference" (2018). Needs no
+torch.
 """
 
 from __future__ import annotations
@@ -146,11 +147,26 @@ def _whole_strides(count: int) -> int:
 
 
 def _between_convolutions(graph: onnx.GraphProto) -> list[str]:
-    """Names of the nodes that have a convolution both somewhere before them and somewhere after them."""
+    """Names of the nodes that have a convolution both somewhere before them and somewhere after them.
+
+    Before them are those that open the network; of these there are several where the second one takes each channel by
+    itself: some of its channels are so much weaker than others that 8 bits for all would lose them.
+    """
     convolutions = [node for node in graph.node if node.op_type == "Conv"]
     before = _upstream(graph, convolutions)
-    after = _downstream(graph, convolutions)
+    after = _downstream(graph, convolutions[_last_opening(convolutions) :])
     return [node.name for node in graph.node if node.op_type in _KINDS and node.name in before & after]
+
+
+def _last_opening(convolutions: Sequence[onnx.NodeProto]) -> int:
+    """The number of the last convolution of the opening: the first, or the one that joins the channels again."""
+    separate = len(convolutions) > 2 and _groups(convolutions[1]) > 1
+    return 2 if separate else 0
+
+
+def _groups(convolution: onnx.NodeProto) -> int:
+    """In how many groups a convolution takes its channels."""
+    return next((int(told.i) for told in convolution.attribute if told.name == "group"), 1)
 
 
 def _upstream(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto]) -> set[str]:

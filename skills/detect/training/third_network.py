@@ -1,8 +1,9 @@
 """The third network: what the second one saw in a chip, judged by one that knew the world's pictures before ours.
 
 It begins with a backbone's weights of ImageNet, and with the second one's opinion, to which it adds. In use it adds
-half of what it would: it is surer of what it has learnt from than of what is new. (As the mean of weights before and
-after learning, after Wortsman et al., "Robust fine-tuning of zero-shot models", 2022, but of the last layers alone.)
+three quarters of what it would: it is surer of what it has learnt from than of what is new. (As the mean of weights
+before and after learning, after Wortsman et al., "Robust fine-tuning of zero-shot models", 2022, but of the last layers
+alone.)
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ __all__ = ["USED", "ThirdNetwork"]
 _CELLS_16, _CELLS_32 = CHIP_PX // 16, CHIP_PX // 32
 _SQUEEZED_16, _SQUEEZED_32, _JOINED = 24, 96, 192
 _SIDES_SCALE = 0.1
-USED = 0.5
+USED = 0.75
 """The share of what it adds to the second network's opinion that it adds in use."""
 
 
@@ -63,7 +64,7 @@ class ThirdNetwork(ChipNetwork):
         return self.trust * before + self.scores(known), moved(boxes, _SIDES_SCALE * self.sides(known).float())
 
     def stop_learning(self) -> None:
-        """Add half of what it adds while learning."""
+        """Add only a part of what it adds while learning: `USED`."""
         self.add(USED)
 
     @torch.no_grad()

@@ -22,10 +22,14 @@ from skills.detect.training.onnx_files import learnt_weights  # noqa: E402
 CELLS = 15 * 20
 
 
-def convolutions() -> "onnx.ModelProto":
-    """A first network of three convolutions, to a box and scores at each of 300 cells."""
+def convolutions(*, separable: bool = False) -> "onnx.ModelProto":
+    """A first network of three convolutions, to a box and scores at each of 300 cells.
+
+    One that is `separable` has two more after the first: of each channel by itself, and of all.
+    """
     random, classes = np.random.default_rng(5), len(CLASSES)
     sizes = {"first": (16, 3, 32), "second": (24, 16, 3), "last": (4 + classes, 24, 1)}
+    sizes |= {"alone": (16, 1, 3), "joined": (16, 16, 1)} if separable else {}
     constants = {
         f"network.{name}.weight": random.normal(0, 1 / np.sqrt(inputs * size * size), (outputs, inputs, size, size))
         for name, (outputs, inputs, size) in sizes.items()
@@ -42,7 +46,8 @@ def convolutions() -> "onnx.ModelProto":
         helper.make_node("Cast", ["images"], ["values"], to=TensorProto.FLOAT),
         helper.make_node("Transpose", ["values"], ["planes"], perm=[0, 3, 1, 2]),
         convolution("first", "planes", strides=[32, 32]),
-        helper.make_node("Relu", ["first"], ["one"]),
+        helper.make_node("Relu", ["first"], ["opened" if separable else "one"]),
+        *(_separable("opened", "one") if separable else []),
         convolution("second", "one", pads=[1, 1, 1, 1]),
         helper.make_node("Relu", ["second"], ["two"]),
         convolution("last", "two"),
@@ -68,7 +73,16 @@ def convolutions() -> "onnx.ModelProto":
     return model
 
 
-def convolution(name: str, given: str, **told: list[int]) -> "onnx.NodeProto":
+def _separable(given: str, output: str) -> list["onnx.NodeProto"]:
+    return [
+        convolution("alone", given, pads=[1, 1, 1, 1], group=16),
+        helper.make_node("Relu", ["alone"], ["alone_on"]),
+        convolution("joined", "alone_on"),
+        helper.make_node("Relu", ["joined"], [output]),
+    ]
+
+
+def convolution(name: str, given: str, **told: list[int] | int) -> "onnx.NodeProto":
     return helper.make_node("Conv", [given, f"network.{name}.weight", f"network.{name}.bias"], [name], **told)
 
 
@@ -112,6 +126,12 @@ def test_the_convolutions_at_both_ends_stay_as_they_are(made: "onnx.ModelProto")
     given = [nodes.get(node.input[1]) for node in made.graph.node if node.op_type == "Conv"]
     # the first, whose weights are many: made whole from 16 bits; the second; the last, whose weights are few
     assert given == ["Cast", "DequantizeLinear", None]
+
+
+def test_a_separable_convolution_right_after_the_first_stays_as_it_is_too() -> None:
+    made = in_eight_bits(convolutions(separable=True), [{"images": noise(k)[None]} for k in range(4)])
+    kept = {one.name for one in made.graph.initializer if one.name.endswith("weight_quantized")}
+    assert kept == {"network.second.weight_quantized"}
 
 
 def test_weights_are_told_as_they_were_but_for_half_a_step_of_8_bits(

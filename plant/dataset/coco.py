@@ -52,13 +52,13 @@ def box_of(mask: Mask) -> tuple[int, int, int, int]:
 
 
 def annotation(
-    *, mask: Mask, alone: Silhouette, class_id: int, instance: str, distance_m: float, dark: bool = False
+    *, mask: Mask, alone: Silhouette, class_id: int, instance: str, distance_m: float, unseeable: bool = False
 ) -> dict[str, Any] | None:
     """One label without ids, or None when next to nothing is seen.
 
     `visibility` is the share seen of what the thing alone would show in the picture, `truncation` the share of the
-    thing beyond the picture's edge. Too little seen, too small, too `dark`, or all over the picture, without an
-    outline: `ignore` is 1, and `iscrowd`, by which COCO's tools pass over it.
+    thing beyond the picture's edge. Too little seen, too small, all over the picture, without an outline, or
+    `unseeable` for other reasons: `ignore` is 1, and `iscrowd`, by which COCO's tools pass over it.
     """
     area = int(mask.sum())
     if area < LEAST_NOTED_PX:
@@ -68,7 +68,7 @@ def annotation(
     truncation = 1.0 - alone.inside_px / max(alone.whole_px, alone.inside_px, 1)
     seen = visibility * (1.0 - truncation)
     too_small = max(w, h) < LEAST_LONG_PX or min(w, h) < LEAST_SHORT_PX
-    ignored = dark or seen < LEAST_SHARE or too_small or area > MOST_OF_PICTURE * mask.size
+    ignored = unseeable or seen < LEAST_SHARE or too_small or area > MOST_OF_PICTURE * mask.size
     return {
         "category_id": class_id,
         "bbox": [x, y, w, h],

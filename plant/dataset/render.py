@@ -254,11 +254,16 @@ def label_view(
             class_id=model.class_id,
             instance=model.name,
             distance_m=distance,
-            dark=lost_in_the_dark(picture, mask),
+            unseeable=lost_in_the_dark(picture, mask) or _surrounds_camera(points_C),
         )
         if entry is not None:
             found.append(entry)
     return found
+
+
+def _surrounds_camera(points_C: NDArray[np.float64]) -> bool:
+    """Whether the camera is within the box of a thing's points (N, 3): then it sees through the thing."""
+    return bool(np.all(points_C.min(axis=0) < 0.0) and np.all(points_C.max(axis=0) > 0.0))
 
 
 __all__ = ["Placed", "Shot", "is_validation", "label_view", "render_scene", "views_in"]

@@ -79,6 +79,16 @@ def test_what_stands_before_a_thing_takes_from_its_visibility(
     assert 0.1 < found["cube_000"]["visibility"] < 0.9  # type: ignore[operator]
 
 
+# how far the middle of the cube is from the camera, in sides of it -> ignored
+@pytest.mark.parametrize(("sides", "ignored"), [(0.25, 1), (0.45, 1), (1.5, 0)])
+def test_a_thing_that_the_camera_is_in_is_to_be_ignored(
+    cubes: tuple[ObjectModel, ObjectModel], sides: float, ignored: int, tmp_path: Path
+) -> None:
+    cube = cubes[0]
+    (found,) = labels_of((Placed(cube, RigidTransform(EYE + [0.0, sides * cube.size_m[1], 0.0])),), tmp_path)
+    assert found["ignore"] == ignored
+
+
 def test_distractors_have_no_label(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ERRAND_MODEL_CACHE", str(tmp_path / "models"))
     mug = instance("mug", 0)

@@ -97,17 +97,29 @@ class ArmSkill(RoutineSkill[InputsT]):
         self._scene.set_jaw(max(0.0, self.context.robot.gripper().opening_rad))
         return self._scene
 
-    def move_to(self, goal: Goal, message: str, speed_rad_s: float = 1.2) -> Routine[None]:
-        """Plan to the configuration that `goal(scene, q_now)` gives, and go there."""
+    def move_to(self, goal: Goal, message: str, speed_rad_s: float = 1.2) -> Routine[FloatArray]:
+        """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration."""
 
-        def plan() -> ArmTrajectory:
+        def plan() -> tuple[ArmTrajectory, FloatArray]:
             scene, start = self.prepared_scene(), self.q_rad()
             path = plan_joint_path(scene, start, goal(scene, start), self._rng)
-            return time_path(path, speed_rad_s=speed_rad_s, scene=scene)
+            return time_path(path, speed_rad_s=speed_rad_s, scene=scene), path[-1]
 
-        trajectory = yield from self.compute(
+        trajectory, q_goal_rad = yield from self.compute(
             plan, latency_s=PLANNING_LATENCY_S, name="plan arm motion", message=message
         )
+        yield from self.follow(trajectory, message)
+        return q_goal_rad
+
+    def move_straight_from(self, q_rad: FloatArray, offset_B: FloatArray, message: str) -> Routine[None]:
+        """Move the hand straight by an offset, from where it is with joint angles that the arm about has."""
+
+        def plan() -> ArmTrajectory:
+            X_BH = self.model.X_BH(q_rad)
+            X_BH_to = RigidTransform(X_BH.rotation(), X_BH.translation() + offset_B)
+            return time_path(plan_line(self.model, q_rad, X_BH_to), speed_rad_s=LINE_SPEED_RAD_S)
+
+        trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)
         yield from self.follow(trajectory, message)
 
     def move_straight(self, p_BH: FloatArray, message: str, scene: ArmScene | None = None) -> Routine[None]:

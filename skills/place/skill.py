@@ -69,10 +69,10 @@ class Place(ArmSkill[PlaceInputs]):
         carried = self._carried()
         yield from self._go_near(surface)
         view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
-        yield from self._go_above(surface, view, carried)
+        q_above_rad = yield from self._go_above(surface, view, carried)
         spot_W = self._below_hand_W()
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
-        yield from self._lower(surface)
+        yield from self._lower(surface, q_above_rad)
         yield from self._let_go()
         yield from self._check(surface, spot_W)
         yield from self.stow()
@@ -141,8 +141,8 @@ class Place(ArmSkill[PlaceInputs]):
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         return view
 
-    def _go_above(self, surface: Surface, view: SurfaceView, carried: RotationMatrix) -> Routine[None]:
-        """Bring the thing above the best free spot."""
+    def _go_above(self, surface: Surface, view: SurfaceView, carried: RotationMatrix) -> Routine[FloatArray]:
+        """Bring the thing above the best free spot; gives the joint angles that the arm is to have there."""
         X_WB = self.X_WB()
         free = free_spots(view, spots(surface))
         if len(free) == 0:
@@ -151,15 +151,17 @@ class Place(ArmSkill[PlaceInputs]):
         tops = [X_BW @ np.array([x, y, view.plane.height_m + ABOVE_M]) for x, y in _by_distance(free, X_WB)]
         self.boxes = [*surface_boxes([surface], X_WB), *cluster_boxes(view.clusters, X_WB)]
         goal = above_goal(tops, carried)
-        yield from self.move_to(goal, f"bringing the thing over the {surface.name}", speed_rad_s=0.8)
+        return (yield from self.move_to(goal, f"bringing the thing over the {surface.name}", speed_rad_s=0.8))
 
-    def _lower(self, surface: Surface) -> Routine[None]:
+    def _lower(self, surface: Surface, q_above_rad: FloatArray) -> Routine[None]:
         """Go down in small steps until the arm is held up, by contact, or the height is that of the surface.
 
+        The way down begins at the angles for which it was found to be possible, and not at those that the arm has: they
+        differ a little, and near a singular posture that may make the difference between a way and none.
         After contact the arm no longer presses, or it would dip onto the surface as the jaw lets go.
         """
         message = f"putting the thing down on the {surface.name}"
-        yield from self.shift_hand(np.array([0.0, 0.0, _SURELY_FREE_M - ABOVE_M]), message)
+        yield from self.move_straight_from(q_above_rad, np.array([0.0, 0.0, _SURELY_FREE_M - ABOVE_M]), message)
         q_wanted = self.q_rad()
         X_BH = self.model.X_BH(q_wanted)
         rest_m = float(X_BH.translation()[2]) - self._hand_z()

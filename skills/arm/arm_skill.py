@@ -111,22 +111,16 @@ class ArmSkill(RoutineSkill[InputsT]):
         yield from self.follow(trajectory, message)
         return q_goal_rad
 
-    def move_straight_from(self, q_rad: FloatArray, offset_B: FloatArray, message: str) -> Routine[None]:
-        """Move the hand straight by an offset, from where it is with joint angles that the arm about has."""
+    def move_straight(
+        self, p_BH: FloatArray, message: str, scene: ArmScene | None = None, q_from_rad: FloatArray | None = None
+    ) -> Routine[None]:
+        """Move the hand straight to p_BH with the orientation that it has.
+
+        The line begins at the joint angles of the arm, or at `q_from_rad`, which the arm about has.
+        """
 
         def plan() -> ArmTrajectory:
-            X_BH = self.model.X_BH(q_rad)
-            X_BH_to = RigidTransform(X_BH.rotation(), X_BH.translation() + offset_B)
-            return time_path(plan_line(self.model, q_rad, X_BH_to), speed_rad_s=LINE_SPEED_RAD_S)
-
-        trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)
-        yield from self.follow(trajectory, message)
-
-    def move_straight(self, p_BH: FloatArray, message: str, scene: ArmScene | None = None) -> Routine[None]:
-        """Move the hand straight to p_BH with the orientation that it has."""
-
-        def plan() -> ArmTrajectory:
-            q = self.q_rad()
+            q = self.q_rad() if q_from_rad is None else q_from_rad
             X_BH = RigidTransform(self.model.X_BH(q).rotation(), p_BH)
             return time_path(plan_line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
 

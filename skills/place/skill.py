@@ -161,7 +161,8 @@ class Place(ArmSkill[PlaceInputs]):
         After contact the arm no longer presses, or it would dip onto the surface as the jaw lets go.
         """
         message = f"putting the thing down on the {surface.name}"
-        yield from self.move_straight_from(q_above_rad, np.array([0.0, 0.0, _SURELY_FREE_M - ABOVE_M]), message)
+        p_BH = self.model.X_BH(q_above_rad).translation() - [0.0, 0.0, ABOVE_M - _SURELY_FREE_M]
+        yield from self.move_straight(p_BH, message, q_from_rad=q_above_rad)
         q_wanted = self.q_rad()
         X_BH = self.model.X_BH(q_wanted)
         rest_m = float(X_BH.translation()[2]) - self._hand_z()

@@ -150,7 +150,7 @@ def _between_convolutions(graph: onnx.GraphProto) -> list[str]:
     """Names of the nodes that have a convolution both somewhere before them and somewhere after them.
 
     Before them are those that open the network; of these there are several where the second one takes each channel by
-    itself: some of its channels are so much weaker than others that 8 bits for all would lose them.
+    itself: in 8 bits this is where the third network lost, presumably in channels much weaker than others.
     """
     convolutions = [node for node in graph.node if node.op_type == "Conv"]
     before = _upstream(graph, convolutions)

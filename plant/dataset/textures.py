@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from plant.models.builder.pictures import FloatArray, Picture, cloth, noise, speckle, to_picture, wood
 from plant.models.families.model import held_out
 
-TEXTURES = 256
+TEXTURES = 1024
 """How many textures each role has."""
 VALIDATION_BELOW = 64
 """Validation takes held-out textures below this number, so that its pictures stay the same when more are added."""

@@ -88,7 +88,7 @@ def _aim(thing: Placed) -> FloatArray:
     return np.asarray(thing.X_WO @ middle)
 
 
-def _distance(rng: np.random.Generator, thing: Placed, focal: float) -> float:
+def distance_to(rng: np.random.Generator, thing: Placed, focal: float) -> float:
     """Evenly in its logarithm, from where the thing fills the picture to where it is but some pixels long."""
     size = float(max(thing.model.size_m))
     near = max(NEAREST_M, 0.55 * size)
@@ -104,16 +104,16 @@ def _varied(rng: np.random.Generator, camera: Intrinsics) -> Intrinsics:
 
 def _hand_view(rng: np.random.Generator, room: Room, thing: Placed, spec: CameraSpec) -> View | None:
     camera, aim = _varied(rng, spec.intrinsics()), _aim(thing)
-    distance, around = _distance(rng, thing, camera.fx), float(rng.uniform(0, 2 * np.pi))
+    distance, around = distance_to(rng, thing, camera.fx), float(rng.uniform(0, 2 * np.pi))
     above = float(np.radians(rng.uniform(-5, 75) if thing.model.family != "person" else rng.uniform(-25, 25)))
     eye = aim + distance * np.array([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)])
     if not _free(eye, room) or not 0.12 < eye[2] < 1.8:
         return None
     roll = float(rng.normal(0, 0.05) if rng.random() < 0.8 else rng.normal(0, 0.7))
-    return View("hand", _off_centre(rng, look_at(eye, aim), camera, roll), camera, bool(rng.random() < 0.08), False)
+    return View("hand", off_centre(rng, look_at(eye, aim), camera, roll), camera, bool(rng.random() < 0.08), False)
 
 
-def _off_centre(rng: np.random.Generator, X_WC: RigidTransform, camera: Intrinsics, roll: float) -> RigidTransform:
+def off_centre(rng: np.random.Generator, X_WC: RigidTransform, camera: Intrinsics, roll: float) -> RigidTransform:
     """The camera turned so that its target stands anywhere in the picture."""
     yaw = float(rng.uniform(-0.8, 0.8)) * np.arctan(camera.width / 2 / camera.fx)
     pitch = float(rng.uniform(-0.8, 0.8)) * np.arctan(camera.height / 2 / camera.fy)
@@ -126,7 +126,7 @@ def _body_view(rng: np.random.Generator, room: Room, thing: Placed, specs: Mappi
     spec = specs[str(rng.choice([name for name in specs if name != "hand"]))]
     shrink = 1 if rng.random() < FULL_SIZE_SHARE else spec.picture_shrink
     camera = _varied(rng, spec.model_copy(update={"picture_shrink": shrink}).intrinsics())
-    aim, distance, bearing = _aim(thing), _distance(rng, thing, camera.fx) + 0.3, float(rng.uniform(0, 2 * np.pi))
+    aim, distance, bearing = _aim(thing), distance_to(rng, thing, camera.fx) + 0.3, float(rng.uniform(0, 2 * np.pi))
     x, y = aim[:2] + distance * np.array([np.cos(bearing), np.sin(bearing)])
     height = STANDING_HEIGHT_M + float(rng.normal(0, 0.04))
     if not (0.4 < x < room.size_m[0] - 0.4 and 0.4 < y < room.size_m[1] - 0.4):

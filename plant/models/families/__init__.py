@@ -37,11 +37,11 @@ __all__ = [
 
 Maker = Callable[[Draft], tuple[Finished, str, str]]
 
-INSTANCES = 240
+INSTANCES = 960
 """How many instances of each class there are for the data set, but of people."""
 PEOPLE = 48
 """How many people: each takes seconds to make."""
-DISTRACTOR_INSTANCES = 32
+DISTRACTOR_INSTANCES = 96
 """How many of each kind of distractor there are."""
 VALIDATION_BELOW, DISTRACTOR_VALIDATION_BELOW = 48, 8
 """Validation takes held-out instances below these numbers, so that its pictures stay the same when more are added."""

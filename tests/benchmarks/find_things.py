@@ -113,8 +113,8 @@ def in_flat(seed: int, number: int) -> Iterator[Asked]:
     pose = Pose2D(view.x, view.y, view.yaw)
     classes = [str(each) for each in rng.permutation(LYING_ABOUT)]
     there, absent = classes[:2], classes[2]
-    models = [_instance(rng, each) for each in (*there, *rng.choice(DISTRACTORS, 3))]
-    things = list(_scattered(rng, models, surface, pose))
+    models = [held_out_instance(rng, each) for each in (*there, *rng.choice(DISTRACTORS, 3))]
+    things = list(scattered(rng, models, surface, pose))
     loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(things)]
     built = build_diagram(
         directives=world.directives_path,
@@ -139,11 +139,11 @@ def in_flat(seed: int, number: int) -> Iterator[Asked]:
     yield asked("flat", number, bench, surface, absent, [])
 
 
-def _instance(rng: np.random.Generator, family: str) -> ObjectModel:
+def held_out_instance(rng: np.random.Generator, family: str) -> ObjectModel:
     return instance(str(family), int(rng.choice(numbers(str(family), for_training=False))))
 
 
-def _scattered(
+def scattered(
     rng: np.random.Generator, models: Sequence[ObjectModel], surface: Surface, pose: Pose2D
 ) -> Iterator[Placed]:
     """Things laid on a surface where they fit, clear of each other and not too far from the robot."""

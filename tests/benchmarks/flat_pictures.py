@@ -1,0 +1,236 @@
+"""Labelled pictures of held-out things in the world `flat`, as the robot's cameras show them in the plant.
+
+`python -m tests.benchmarks.flat_pictures OUT --scenes 40 --seed 1` writes pictures and OUT/val.json, which
+`errand dataset score --data OUT/val.json` reads. In each scene things of the classes and others lie on four surfaces,
+an extinguisher and a person stand on the floor; every tenth scene holds others only. Eight pictures are taken of each,
+three in five by the hand camera, the rest by the body's cameras; noise and light are the plant's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import QueryObject
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from executive.cli.assembly import knowledge_of, open_world
+from plant.dataset.coco import document
+from plant.dataset.compose import ONLY_DISTRACTORS_EVERY, Placed
+from plant.dataset.render import label_view
+from plant.dataset.resting import choose, resting_poses
+from plant.dataset.silhouette import project
+from plant.dataset.views import BODY_SHARE, STANDING_HEIGHT_M, View, camera_specs, distance_to, off_centre, roll_deg
+from plant.diagram import LooseModel, WorldDiagram, build_diagram
+from plant.models.families import DISTRACTORS, ObjectModel
+from plant.pictures import look_at
+from plant.scene import RENDERER
+from plant.sensors.camera_noise import PictureDegrader, PictureNoise
+from plant.sensors.camera_spec import colour_render_camera
+from plant.worlds.lights import render_parameters
+from plant.worlds.world import World
+from skills.api import Surface
+from skills.estimate.grid_map import GridMap, load_grid_map
+from skills.robot import Pose2D
+from tests.benchmarks.find_things import LYING_ABOUT, held_out_instance, scattered
+
+VIEWS = 8
+SURFACES_IN_USE = 4
+"""So many surfaces hold something."""
+ROOM_FOR_FEET_M, ROOM_FOR_PEOPLE_M = 0.45, 0.3
+HAND_HEIGHTS_M = (0.3, 1.5)
+REACH_M = 0.9
+LEAST_SHOWN_PX = 40
+TRIES = 100
+
+FloatArray = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The flat with things in it; `labelled` are those of the classes by their label in Drake's label images."""
+
+    built: WorldDiagram
+    query: QueryObject
+    labelled: dict[int, tuple[ObjectModel, RigidTransform, bool]]
+    things: tuple[Placed, ...]
+
+    def take(self, view: View) -> tuple[Picture, NDArray[np.int16]]:
+        """Clean picture (H, W, 3) and labels (H, W)."""
+        camera = colour_render_camera(view.intrinsics, RENDERER)
+        world = self.built.scene_graph.world_frame_id()
+        colour = self.query.RenderColorImage(camera, world, view.X_WC)
+        labels = self.query.RenderLabelImage(camera, world, view.X_WC)
+        return np.ascontiguousarray(colour.data[..., :3]), np.array(labels.data[..., 0], dtype=np.int16)
+
+
+def stage(rng: np.random.Generator, world: World, free: GridMap, *, bare: bool) -> Stage:
+    """The flat with held-out things on some surfaces and on the floor; of no class if `bare`."""
+    things = [*_on_surfaces(rng, world, bare=bare), *(() if bare else _on_the_floor(rng, free))]
+    loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(things)]
+    built = build_diagram(
+        directives=world.directives_path,
+        models=loose,
+        robot_names=(),
+        looks=False,
+        renderer_parameters=render_parameters(),
+    )
+    assert built.scene is not None
+    query = built.scene.query_at(built.plant.GetPositions(built.plant.CreateDefaultContext()))
+    labelled = {}
+    for k, thing in enumerate(things):
+        if thing.model.class_id:
+            (body,) = built.plant.GetBodyIndices(built.models[f"thing{k}"])[:1]
+            labelled[int(body)] = (thing.model, thing.X_WO, False)
+    return Stage(built, query, labelled, tuple(things))
+
+
+def _on_surfaces(rng: np.random.Generator, world: World, *, bare: bool) -> Iterator[Placed]:
+    facts = knowledge_of(world).surfaces
+    for name in rng.choice(sorted(facts), min(SURFACES_IN_USE, len(facts)), replace=False):
+        fact = facts[str(name)]
+        surface = Surface(str(name), tuple((float(x), float(y)) for x, y in fact.polygon), fact.height)
+        seen_from = fact.viewpoints[int(rng.integers(len(fact.viewpoints)))]
+        classes = [] if bare else [str(each) for each in rng.choice(LYING_ABOUT, 3)]
+        models = [held_out_instance(rng, each) for each in (*classes, *rng.choice(DISTRACTORS, 2 + 3 * bare))]
+        yield from scattered(rng, models, surface, Pose2D(seen_from.x, seen_from.y, seen_from.yaw))
+
+
+def _on_the_floor(rng: np.random.Generator, free: GridMap) -> Iterator[Placed]:
+    taken: list[FloatArray] = []
+    for family in ("person", "extinguisher", str(rng.choice(LYING_ABOUT))):
+        model = held_out_instance(rng, family)
+        rest = choose(rng, model, resting_poses(model))
+        places = rng.permutation(_floor_points(free, ROOM_FOR_PEOPLE_M))
+        xy = next((p for p in places if _clear_of(p, taken)), None)
+        if xy is None or model.kind == "sitting":
+            continue
+        taken.append(xy)
+        turned = RotationMatrix.MakeZRotation(float(rng.uniform(0, 2 * np.pi))).matrix() @ rest.R
+        yield Placed(model, RigidTransform(RotationMatrix.ProjectToRotationMatrix(turned), [*xy, rest.height_m]))
+
+
+def _clear_of(p: FloatArray, taken: list[FloatArray]) -> bool:
+    return all(float(np.linalg.norm(p - other)) > 0.8 for other in taken)
+
+
+def _floor_points(free: GridMap, room_m: float) -> FloatArray:
+    """Points (N, 2) on the floor with so much room around."""
+    known = np.ones_like(free.occupied) if free.unknown is None else ~free.unknown
+    return free.centres(np.argwhere((free.distance > room_m) & known))
+
+
+def views(rng: np.random.Generator, stage: Stage, free: GridMap) -> Iterator[View]:
+    """Views in which things of the classes show, by turns; other things where there are none."""
+    targets = [thing for thing in stage.things if thing.model.class_id] or list(stage.things)
+    order = rng.permutation(len(targets))
+    floor = _floor_points(free, ROOM_FOR_FEET_M)
+    for k in range(VIEWS):
+        thing = targets[order[k % len(order)]]
+        by_body = bool(rng.random() < BODY_SHARE)
+        tried = (_body_view(rng, floor, thing) if by_body else _hand_view(rng, floor, thing) for _ in range(TRIES))
+        view = next((each for each in tried if each is not None and _shows(stage, each, thing)), None)
+        if view is not None:
+            yield view
+
+
+def _shows(stage: Stage, view: View, thing: Placed) -> bool:
+    """Whether the thing shows in the picture; one of no class need only lie before the camera."""
+    aim = view.X_WC.inverse() @ _middle(thing)
+    u, v = project(np.asarray(aim)[None], view.intrinsics)[0]
+    if aim[2] < 0.15 or not (0 <= u < view.intrinsics.width and 0 <= v < view.intrinsics.height):
+        return False
+    label = next((k for k, (model, X, _) in stage.labelled.items() if model is thing.model and X is thing.X_WO), None)
+    return label is None or int((stage.take(view)[1] == label).sum()) >= LEAST_SHOWN_PX
+
+
+def _middle(thing: Placed) -> FloatArray:
+    points = thing.model.surface.points
+    return np.asarray(thing.X_WO @ (0.5 * (points.min(axis=0) + points.max(axis=0))))
+
+
+def _hand_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> View | None:
+    """The hand before the thing, within the reach of a robot that stands where there is room; None where there is not.
+
+    The thing is anywhere in the picture, from as near as fits in to where it is but some pixels long.
+    """
+    camera, aim = camera_specs()["hand"].intrinsics(), _middle(thing)
+    distance, around = distance_to(rng, thing, camera.fx), float(rng.uniform(0, 2 * np.pi))
+    above = float(np.radians(rng.uniform(-5, 75) if thing.model.family != "person" else rng.uniform(-25, 25)))
+    eye = aim + distance * np.array([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)])
+    body = np.linalg.norm(floor - eye[:2], axis=1).min()
+    if not HAND_HEIGHTS_M[0] < eye[2] < HAND_HEIGHTS_M[1] or body > REACH_M:
+        return None
+    X_WC = off_centre(rng, look_at(eye, aim), camera, float(rng.normal(0, 0.05)))
+    return View("hand", X_WC, camera, False, False)
+
+
+def _body_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> View:
+    """The robot stands so that one of its body cameras looks about towards the thing."""
+    specs, aim = camera_specs(), _middle(thing)
+    spec = specs[str(rng.choice([name for name in specs if name != "hand"]))]
+    camera, X_BC = spec.intrinsics(), spec.X_link_camera()
+    wished = distance_to(rng, thing, camera.fx) + 0.3
+    near = np.argsort(np.abs(np.linalg.norm(floor - aim[:2], axis=1) - wished))
+    xy = floor[near[int(rng.integers(min(len(near), 50)))]]
+    out_B = X_BC.rotation().matrix()[:, 2]
+    yaw = float(np.arctan2(*(aim[:2] - xy)[::-1]) - np.arctan2(out_B[1], out_B[0]) + rng.normal(0, 0.35))
+    X_WB = RigidTransform(RollPitchYaw(rng.normal(0, 0.02), rng.normal(0, 0.05), yaw), [*xy, STANDING_HEIGHT_M])
+    return View(spec.name, X_WB @ X_BC, camera, not spec.colour, False)
+
+
+def taken(rng: np.random.Generator, stage: Stage, view: View) -> tuple[Picture, list[dict[str, Any]]]:
+    """The picture (H, W, 3) RGB or (H, W) grey as the plant's camera gives it, and its labels."""
+    clean, labels = stage.take(view)
+    spec = camera_specs()[view.camera]
+    noise = PictureDegrader(rng, view.intrinsics.height, view.intrinsics.width, PictureNoise(), spec.picture_shrink)
+    colour = noise.colour(clean)
+    picture = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8) if view.grey else colour
+    return picture, label_view(stage.labelled, labels, view, RigidTransform(), picture)
+
+
+def shots(out: Path, seed: int, scenes: int) -> Iterator[dict[str, Any]]:
+    """Pictures written to a folder, with their entries; the same for the same seed."""
+    world = open_world("flat")
+    free = load_grid_map(world.keepout_map_path)
+    for index in range(scenes):
+        rng = np.random.default_rng([seed, index, 17])
+        bare = index % ONLY_DISTRACTORS_EVERY == ONLY_DISTRACTORS_EVERY - 1
+        here = stage(rng, world, free, bare=bare)
+        for number, view in enumerate(list(views(rng, here, free))):
+            picture, labels = taken(rng, here, view)
+            name = f"{index:04d}_{number}.png"
+            if not cv2.imwrite(str(out / name), picture if view.grey else cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)):
+                raise OSError(f"{out / name} cannot be written")
+            facts = {"file_name": name, "width": view.intrinsics.width, "height": view.intrinsics.height}
+            facts |= {"camera": view.camera, "grey": view.grey, "roll_deg": round(roll_deg(view.X_WC), 1)}
+            yield {"image": {**facts, "scene": index, "split": "val"}, "annotations": labels}
+        sys.stderr.write(f"scene {index + 1} of {scenes}\n")
+
+
+def main() -> None:
+    """Write the pictures and their labels."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--scenes", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    every = list(shots(args.out, args.seed, args.scenes))
+    told = document({"description": "Errand: held-out things in the flat", "seed": args.seed, "split": "val"}, every)
+    (args.out / "val.json").write_text(json.dumps(told), encoding="utf-8")
+    counted = sum(not label["ignore"] for shot in every for label in shot["annotations"])
+    sys.stdout.write(f"{args.out / 'val.json'}: {len(every)} pictures, {counted} labels that count\n")
+
+
+if __name__ == "__main__":
+    main()

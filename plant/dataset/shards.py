@@ -15,6 +15,7 @@ import multiprocessing
 import os
 import shutil
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -145,7 +146,9 @@ def _rendered(out: Path, seed: int, missing: list[int], jobs: int) -> Iterator[i
             write_scene(out, seed, index)
             yield index
         return
-    pool = ProcessPoolExecutor(min(jobs, len(missing)), mp_context=multiprocessing.get_context("spawn"))
+    pool = ProcessPoolExecutor(
+        min(jobs, len(missing)), mp_context=multiprocessing.get_context("spawn"), initializer=end_with_starter
+    )
     try:
         tasks = {pool.submit(write_scene, out, seed, index): index for index in missing}
         for task in as_completed(tasks):
@@ -153,6 +156,19 @@ def _rendered(out: Path, seed: int, missing: list[int], jobs: int) -> Iterator[i
             yield tasks[task]
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def end_with_starter() -> None:
+    """Let this process end when the one that started it is gone: one that is killed cannot end its own."""
+    starter = multiprocessing.parent_process()
+    if starter is None:
+        return
+
+    def outlive() -> None:
+        starter.join()
+        os._exit(1)
+
+    threading.Thread(target=outlive, name="end-with-starter", daemon=True).start()
 
 
 def write_scene(out: Path, seed: int, index: int) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -149,3 +151,28 @@ def test_a_full_disk_is_told_and_leaves_whole_scenes_only(tmp_path: Path, monkey
     with pytest.raises(DatasetError, match="the disk is full; make room; the same command goes on"):
         run(tmp_path / "set", images=48)
     assert [path.name for path in (tmp_path / "set" / "scenes").iterdir()] == ["000000"]
+
+
+ENDLESS = """
+import sys, threading
+from pathlib import Path
+from plant.dataset import shards
+
+def endless(seed, index):
+    print("rendering", flush=True)
+    threading.Event().wait()
+
+shards.render_scene = endless  # in the workers, too: they import this file
+if __name__ == "__main__":
+    shards.render(Path(sys.argv[1]), images=48, seed=1, jobs=2, progress=lambda done, total: None)
+"""
+
+
+def test_processes_end_when_the_one_that_started_them_is_killed(tmp_path: Path) -> None:
+    (tmp_path / "endless.py").write_text(ENDLESS)
+    command = [sys.executable, str(tmp_path / "endless.py"), str(tmp_path / "set")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as started:
+        assert started.stdout is not None
+        assert started.stdout.readline() == "rendering\n"
+        started.kill()
+        started.communicate(timeout=30)  # returns when none of them holds the pipe any more

@@ -23,7 +23,7 @@ from skills.detection import Detection
 __all__ = ["CALIBRATED_BY", "Examination", "examination", "examine", "offsets_by", "read_picture"]
 
 LEAST_SCORE = 0.02
-CALIBRATED_BY: Final = 900
+CALIBRATED_BY: Final = 3600
 """By how many pictures the shifts of scores are found."""
 
 

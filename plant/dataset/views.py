@@ -102,11 +102,17 @@ def _varied(rng: np.random.Generator, camera: Intrinsics) -> Intrinsics:
     return Intrinsics(camera.width, camera.height, camera.fx * scale, camera.fy * scale, camera.cx + cx, camera.cy + cy)
 
 
+def eye_about(rng: np.random.Generator, thing: Placed, aim: FloatArray, focal: float) -> FloatArray:
+    """A place (3,) of the hand camera to see a thing at `aim` from: mostly from above, people from about level."""
+    distance, around = distance_to(rng, thing, focal), float(rng.uniform(0, 2 * np.pi))
+    above = float(np.radians(rng.uniform(-5, 75) if thing.model.family != "person" else rng.uniform(-25, 25)))
+    direction = np.array([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)])
+    return np.asarray(aim + distance * direction)
+
+
 def _hand_view(rng: np.random.Generator, room: Room, thing: Placed, spec: CameraSpec) -> View | None:
     camera, aim = _varied(rng, spec.intrinsics()), _aim(thing)
-    distance, around = distance_to(rng, thing, camera.fx), float(rng.uniform(0, 2 * np.pi))
-    above = float(np.radians(rng.uniform(-5, 75) if thing.model.family != "person" else rng.uniform(-25, 25)))
-    eye = aim + distance * np.array([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)])
+    eye = eye_about(rng, thing, aim, camera.fx)
     if not _free(eye, room) or not 0.12 < eye[2] < 1.8:
         return None
     roll = float(rng.normal(0, 0.05) if rng.random() < 0.8 else rng.normal(0, 0.7))

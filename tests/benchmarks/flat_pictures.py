@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,9 +28,18 @@ from plant.dataset.compose import ONLY_DISTRACTORS_EVERY, Placed
 from plant.dataset.render import label_view
 from plant.dataset.resting import choose, resting_poses
 from plant.dataset.silhouette import project
-from plant.dataset.views import BODY_SHARE, STANDING_HEIGHT_M, View, camera_specs, distance_to, off_centre, roll_deg
+from plant.dataset.views import (
+    BODY_SHARE,
+    STANDING_HEIGHT_M,
+    View,
+    camera_specs,
+    distance_to,
+    eye_about,
+    off_centre,
+    roll_deg,
+)
 from plant.diagram import LooseModel, WorldDiagram, build_diagram
-from plant.models.families import DISTRACTORS, ObjectModel
+from plant.models.families import DISTRACTORS
 from plant.pictures import look_at
 from plant.scene import RENDERER
 from plant.sensors.camera_noise import PictureDegrader, PictureNoise
@@ -40,11 +49,10 @@ from plant.worlds.world import World
 from skills.api import Surface
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.robot import Pose2D
-from tests.benchmarks.find_things import LYING_ABOUT, held_out_instance, scattered
+from tests.benchmarks.find_things import LYING_ABOUT, held_out_instance, middle, scattered
 
 VIEWS = 8
 SURFACES_IN_USE = 4
-"""So many surfaces hold something."""
 ROOM_FOR_FEET_M, ROOM_FOR_PEOPLE_M = 0.45, 0.3
 HAND_HEIGHTS_M = (0.3, 1.5)
 REACH_M = 0.9
@@ -57,12 +65,16 @@ Picture = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Stage:
-    """The flat with things in it; `labelled` are those of the classes by their label in Drake's label images."""
+    """The flat with things in it, by their labels in Drake's label images."""
 
     built: WorldDiagram
     query: QueryObject
-    labelled: dict[int, tuple[ObjectModel, RigidTransform, bool]]
-    things: tuple[Placed, ...]
+    things: Mapping[int, Placed]
+
+    @property
+    def of_classes(self) -> dict[int, Placed]:
+        """Those that are of the nine classes."""
+        return {label: thing for label, thing in self.things.items() if thing.model.class_id}
 
     def take(self, view: View) -> tuple[Picture, NDArray[np.int16]]:
         """Clean picture (H, W, 3) and labels (H, W)."""
@@ -73,7 +85,7 @@ class Stage:
         return np.ascontiguousarray(colour.data[..., :3]), np.array(labels.data[..., 0], dtype=np.int16)
 
 
-def stage(rng: np.random.Generator, world: World, free: GridMap, *, bare: bool) -> Stage:
+def furnished(rng: np.random.Generator, world: World, free: GridMap, *, bare: bool) -> Stage:
     """The flat with held-out things on some surfaces and on the floor; of no class if `bare`."""
     things = [*_on_surfaces(rng, world, bare=bare), *(() if bare else _on_the_floor(rng, free))]
     loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(things)]
@@ -86,12 +98,8 @@ def stage(rng: np.random.Generator, world: World, free: GridMap, *, bare: bool) 
     )
     assert built.scene is not None
     query = built.scene.query_at(built.plant.GetPositions(built.plant.CreateDefaultContext()))
-    labelled = {}
-    for k, thing in enumerate(things):
-        if thing.model.class_id:
-            (body,) = built.plant.GetBodyIndices(built.models[f"thing{k}"])[:1]
-            labelled[int(body)] = (thing.model, thing.X_WO, False)
-    return Stage(built, query, labelled, tuple(things))
+    bodies = [built.plant.GetBodyIndices(built.models[each.name])[0] for each in loose]
+    return Stage(built, query, {int(body): thing for body, thing in zip(bodies, things, strict=True)})
 
 
 def _on_surfaces(rng: np.random.Generator, world: World, *, bare: bool) -> Iterator[Placed]:
@@ -131,31 +139,27 @@ def _floor_points(free: GridMap, room_m: float) -> FloatArray:
 
 def views(rng: np.random.Generator, stage: Stage, free: GridMap) -> Iterator[View]:
     """Views in which things of the classes show, by turns; other things where there are none."""
-    targets = [thing for thing in stage.things if thing.model.class_id] or list(stage.things)
+    targets = list(stage.of_classes) or list(stage.things)
     order = rng.permutation(len(targets))
     floor = _floor_points(free, ROOM_FOR_FEET_M)
     for k in range(VIEWS):
-        thing = targets[order[k % len(order)]]
+        label = targets[order[k % len(order)]]
+        thing = stage.things[label]
         by_body = bool(rng.random() < BODY_SHARE)
         tried = (_body_view(rng, floor, thing) if by_body else _hand_view(rng, floor, thing) for _ in range(TRIES))
-        view = next((each for each in tried if each is not None and _shows(stage, each, thing)), None)
+        view = next((each for each in tried if each is not None and _shows(stage, each, label)), None)
         if view is not None:
             yield view
 
 
-def _shows(stage: Stage, view: View, thing: Placed) -> bool:
-    """Whether the thing shows in the picture; one of no class need only lie before the camera."""
-    aim = view.X_WC.inverse() @ _middle(thing)
+def _shows(stage: Stage, view: View, label: int) -> bool:
+    """Whether a thing shows in the picture; one of no class need only lie before the camera."""
+    thing = stage.things[label]
+    aim = view.X_WC.inverse() @ middle(thing)
     u, v = project(np.asarray(aim)[None], view.intrinsics)[0]
     if aim[2] < 0.15 or not (0 <= u < view.intrinsics.width and 0 <= v < view.intrinsics.height):
         return False
-    label = next((k for k, (model, X, _) in stage.labelled.items() if model is thing.model and X is thing.X_WO), None)
-    return label is None or int((stage.take(view)[1] == label).sum()) >= LEAST_SHOWN_PX
-
-
-def _middle(thing: Placed) -> FloatArray:
-    points = thing.model.surface.points
-    return np.asarray(thing.X_WO @ (0.5 * (points.min(axis=0) + points.max(axis=0))))
+    return not thing.model.class_id or int((stage.take(view)[1] == label).sum()) >= LEAST_SHOWN_PX
 
 
 def _hand_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> View | None:
@@ -163,10 +167,8 @@ def _hand_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> Vi
 
     The thing is anywhere in the picture, from as near as fits in to where it is but some pixels long.
     """
-    camera, aim = camera_specs()["hand"].intrinsics(), _middle(thing)
-    distance, around = distance_to(rng, thing, camera.fx), float(rng.uniform(0, 2 * np.pi))
-    above = float(np.radians(rng.uniform(-5, 75) if thing.model.family != "person" else rng.uniform(-25, 25)))
-    eye = aim + distance * np.array([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)])
+    camera, aim = camera_specs()["hand"].intrinsics(), middle(thing)
+    eye = eye_about(rng, thing, aim, camera.fx)
     body = np.linalg.norm(floor - eye[:2], axis=1).min()
     if not HAND_HEIGHTS_M[0] < eye[2] < HAND_HEIGHTS_M[1] or body > REACH_M:
         return None
@@ -176,7 +178,7 @@ def _hand_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> Vi
 
 def _body_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> View:
     """The robot stands so that one of its body cameras looks about towards the thing."""
-    specs, aim = camera_specs(), _middle(thing)
+    specs, aim = camera_specs(), middle(thing)
     spec = specs[str(rng.choice([name for name in specs if name != "hand"]))]
     camera, X_BC = spec.intrinsics(), spec.X_link_camera()
     wished = distance_to(rng, thing, camera.fx) + 0.3
@@ -195,7 +197,8 @@ def taken(rng: np.random.Generator, stage: Stage, view: View) -> tuple[Picture, 
     noise = PictureDegrader(rng, view.intrinsics.height, view.intrinsics.width, PictureNoise(), spec.picture_shrink)
     colour = noise.colour(clean)
     picture = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8) if view.grey else colour
-    return picture, label_view(stage.labelled, labels, view, RigidTransform(), picture)
+    labelled = {label: (thing.model, thing.X_WO, False) for label, thing in stage.of_classes.items()}
+    return picture, label_view(labelled, labels, view, RigidTransform(), picture)
 
 
 def shots(out: Path, seed: int, scenes: int) -> Iterator[dict[str, Any]]:
@@ -205,7 +208,7 @@ def shots(out: Path, seed: int, scenes: int) -> Iterator[dict[str, Any]]:
     for index in range(scenes):
         rng = np.random.default_rng([seed, index, 17])
         bare = index % ONLY_DISTRACTORS_EVERY == ONLY_DISTRACTORS_EVERY - 1
-        here = stage(rng, world, free, bare=bare)
+        here = furnished(rng, world, free, bare=bare)
         for number, view in enumerate(list(views(rng, here, free))):
             picture, labels = taken(rng, here, view)
             name = f"{index:04d}_{number}.png"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skills.detect.letterbox import PADDING
 
-__all__ = ["Scales", "halved"]
+__all__ = ["Scales", "cut_out", "halved"]
 
 Picture = NDArray[np.uint8]
 _HALF_BELOW: Final = 0.7
@@ -29,10 +29,16 @@ class Scales:
         picture, to_canvas = self.full, affine.astype(np.float64)
         if np.sqrt(abs(np.linalg.det(to_canvas[:, :2]))) < _HALF_BELOW:
             picture, to_canvas = self.half, to_canvas @ np.diag([2.0, 2.0, 1.0])
-        to_canvas[:, 2] += to_canvas[:, :2] @ (0.5, 0.5) - 0.5
-        grey = (PADDING, PADDING, PADDING)
-        cut = cv2.warpAffine(picture, to_canvas, size_px, flags=cv2.INTER_LINEAR, borderValue=grey)
-        return np.asarray(cut, dtype=np.uint8)
+        return cut_out(picture, to_canvas, size_px)
+
+
+def cut_out(picture: Picture, affine: NDArray[np.floating], size_px: tuple[int, int]) -> Picture:
+    """What an affine map (2, 3) of a picture's pixel edges brings into a canvas of (width, height), with padding."""
+    to_canvas = affine.astype(np.float64)
+    to_canvas[:, 2] += to_canvas[:, :2] @ (0.5, 0.5) - 0.5
+    grey = (PADDING, PADDING, PADDING)
+    cut = cv2.warpAffine(picture, to_canvas, size_px, flags=cv2.INTER_LINEAR, borderValue=grey)
+    return np.asarray(cut, dtype=np.uint8)
 
 
 def halved(picture: Picture) -> Picture:

@@ -31,9 +31,10 @@ from skills.detect.training.region_chips import RegionFeed
 from skills.detect.training.region_export import export_regions
 from skills.detect.training.region_learner import ChipLearner, RegionLearner, ThirdLearner
 from skills.detect.training.region_table import RegionTable, first_look, second_look, table_of
-from skills.detect.training.store import PictureStore, open_store
+from skills.detect.training.store import read_scales
+from skills.detect.training.surroundings import Surroundings, kept_surroundings
 from skills.detect.training.together import Told, learn_together
-from skills.detect.training.train import MODEL, PICTURES
+from skills.detect.training.train import MODEL
 from skills.detect.training.validate import CALIBRATED_BY, Examination, examination, examine, offsets_by
 
 __all__ = ["refine"]
@@ -81,9 +82,9 @@ def refine(options: RefineOptions, told: Told) -> Path:
     _copy(options.model, first, options)
     if options.third:
         _copy(regions_file(options.model), regions_file(first), options)
-    store = open_store(options.out / PICTURES, pictures)
-    if not options.resume or not (options.out / TABLE).is_file():
-        _look_at_all(options, names, pictures, store)
+    if not options.resume or not (options.out / TABLE).is_file() or not Surroundings.are_in(options.out):
+        (options.out / TABLE).unlink(missing_ok=True)
+        _look_at_all(options, names, pictures)
     learn_together(partial(_learn, options), options.processes, options.out, told)
     return _stage(options).file(first)
 
@@ -99,9 +100,7 @@ def _copy(model: Path, file: Path, options: RefineOptions) -> None:
         ) from error
 
 
-def _look_at_all(
-    options: RefineOptions, names: tuple[str, ...], pictures: tuple[LearningPicture, ...], store: PictureStore
-) -> None:
+def _look_at_all(options: RefineOptions, names: tuple[str, ...], pictures: tuple[LearningPicture, ...]) -> None:
     """Write down what the networks before find. Raises TrainingDataError."""
     stage = _stage(options)
     try:
@@ -112,7 +111,9 @@ def _look_at_all(
         raise TrainingDataError(
             f"{options.model}: knows other classes than {options.data}", mend="render the data anew"
         )
-    table = table_of(partial(stage.look, model), pictures, store)
+    with kept_surroundings(options.out) as kept:
+        seen = ((read_scales(picture.file), picture.labels) for picture in pictures)
+        table = table_of(partial(stage.look, model), seen, kept)
     if not (table.classes >= 0).any() or not (table.classes < 0).any():
         raise TrainingDataError(
             f"{options.model}: finds nothing to tell apart in {options.data}", mend="train it for longer first"
@@ -124,10 +125,9 @@ def _learn(options: RefineOptions, peers: Peers, device: torch.device, told: Tol
     """One process's part in learning."""
     names = category_names(options.data)
     learner = _stage(options).learner.new(len(names), options.seed, device)
-    store = open_store(options.out / PICTURES, read_split(options.data, "train"))
-    table = RegionTable.read(options.out / TABLE)
-    _begin(learner, options, RegionFeed(table, store, options.seed, 0, 1))
-    feed = RegionFeed(table, store, options.seed, peers.rank, peers.count)
+    table, about = RegionTable.read(options.out / TABLE), Surroundings.read(options.out)
+    _begin(learner, options, RegionFeed(table, about, options.seed, 0, 1))
+    feed = RegionFeed(table, about, options.seed, peers.rank, peers.count)
     exam = examination(options.data, "val", names, options.examined)
     Loop(_Regions(options, learner, peers, feed, exam), options.budget, peers, options.out, told).run()
 

@@ -15,9 +15,9 @@ from skills.detect.training.photometry import as_seen_otherwise
 from skills.detect.training.placing import turning
 from skills.detect.training.region_table import RegionTable
 from skills.detect.training.schedule import shuffled
-from skills.detect.training.store import PictureStore
+from skills.detect.training.surroundings import Surroundings
 
-__all__ = ["RegionBatch", "RegionFeed"]
+__all__ = ["RegionBatch", "RegionFeed", "changed_map"]
 
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
@@ -52,7 +52,7 @@ class RegionFeed:
     """
 
     table: RegionTable
-    store: PictureStore
+    surroundings: Surroundings
     seed: int
     rank: int
     processes: int
@@ -87,12 +87,20 @@ class RegionFeed:
     def _chip(self, row: int, random: np.random.Generator) -> tuple[Picture, Floats]:
         """A chip, and (2, 4) the region's box and the thing's in it."""
         table = self.table
-        region = _spread(table.boxes[row], random)
-        affine = _changed(chip_map(region), region, random)
-        chip = self.store.scales(int(table.pictures[row])).cut(affine, (CHIP_PX, CHIP_PX))
+        affine, region = changed_map(table.boxes[row], random)
+        chip = self.surroundings.cut(row, affine)
         if random.random() < _CHANGED:
             chip = as_seen_otherwise(chip, random)
         return chip, mapped(np.stack([region, table.wanted[row]]), affine)
+
+
+def changed_map(box: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
+    """The map (2, 3) to the chip of a box (4,) that fits a little otherwise, changed; and that box.
+
+    It shows nothing farther off than `REACH_PX`.
+    """
+    region = _spread(box, random)
+    return _changed(chip_map(region), region, random), region
 
 
 def _spread(box: Floats, random: np.random.Generator) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -14,9 +14,9 @@ from skills.detect.detector_file import DetectorModel
 from skills.detect.regions import RegionOptions, Regions, regions_of
 from skills.detect.scales import Scales
 from skills.detect.scoring_matching import overlaps
-from skills.detect.training.labels import Labels, LearningPicture
+from skills.detect.training.labels import Labels
 from skills.detect.training.looks import seen_by_first, seen_by_second
-from skills.detect.training.store import PictureStore
+from skills.detect.training.surroundings import SurroundingsWriter
 
 __all__ = ["NEAR", "Look", "RegionTable", "first_look", "second_look", "table_of"]
 
@@ -72,11 +72,14 @@ def second_look(model: DetectorModel, scales: Scales) -> Regions:
     return regions_of(*seen_by_second(model, scales), _SEEN)
 
 
-def table_of(look: Look, pictures: Sequence[LearningPicture], store: PictureStore) -> RegionTable:
-    """The regions of all pictures. Those on what is to be ignored are left out."""
-    rows = [_rows(look(store.scales(number)), number, picture.labels) for number, picture in enumerate(pictures)]
+def table_of(look: Look, pictures: Iterable[tuple[Scales, Labels]], kept: SurroundingsWriter) -> RegionTable:
+    """The regions of all pictures, of which what is about them is kept. Those on what is to be ignored are left out."""
+    tables: list[RegionTable] = []
+    for number, (scales, labels) in enumerate(pictures):
+        tables.append(_rows(look(scales), number, labels))
+        kept.add(scales, tables[-1].boxes)
     names = RegionTable.__dataclass_fields__
-    return RegionTable(**{name: np.concatenate([vars(row)[name] for row in rows]) for name in names})
+    return RegionTable(**{name: np.concatenate([vars(table)[name] for table in tables]) for name in names})
 
 
 def _rows(regions: Regions, number: int, labels: Labels) -> RegionTable:

@@ -16,7 +16,7 @@ from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX, fill_letterbox
 from skills.detect.scales import Scales, halved
 from skills.detect.training.labels import LearningPicture, TrainingDataError
 
-__all__ = ["PictureStore", "open_store", "read_picture"]
+__all__ = ["PictureStore", "open_store", "read_scales"]
 
 Picture = NDArray[np.uint8]
 _FULL: Final = "full.u8"
@@ -36,14 +36,14 @@ class PictureStore:
         return Scales(self.full[index], self.half[index])
 
 
-def read_picture(file: Path) -> Picture:
-    """A picture's letterbox (480, 640, 3), RGB. Raises TrainingDataError."""
+def read_scales(file: Path) -> Scales:
+    """A picture's letterbox, RGB, and its half. Raises TrainingDataError."""
     found = cv2.imread(str(file), cv2.IMREAD_COLOR_RGB)
     if found is None:
         raise TrainingDataError(f"{file}: is no picture, or damaged", mend="render the data set anew")
     filled = np.empty((HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
     fill_letterbox(np.asarray(found, dtype=np.uint8), filled)
-    return filled
+    return Scales(filled, halved(filled))
 
 
 def open_store(folder: Path, pictures: Sequence[LearningPicture]) -> PictureStore:
@@ -68,5 +68,5 @@ def _mapped(folder: Path, count: int, mode: str) -> PictureStore:
 
 def _fill(store: PictureStore, pictures: Sequence[LearningPicture]) -> None:
     for k, picture in enumerate(pictures):
-        store.full[k] = read_picture(picture.file)
-        store.half[k] = halved(store.full[k])
+        scales = read_scales(picture.file)
+        store.full[k], store.half[k] = scales.full, scales.half

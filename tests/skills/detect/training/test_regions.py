@@ -14,7 +14,7 @@ pytest.importorskip("onnx")
 
 from skills.detect.detector_file import REGIONS_FORMAT, load_model, regions_file  # noqa: E402
 from skills.detect.regions import CHIP_PX  # noqa: E402
-from skills.detect.scales import halved  # noqa: E402
+from skills.detect.scales import Scales, halved  # noqa: E402
 from skills.detect.training.chip_network import covered, moved  # noqa: E402
 from skills.detect.training.export import export  # noqa: E402
 from skills.detect.training.labels import Labels, LearningPicture, TrainingDataError  # noqa: E402
@@ -27,15 +27,11 @@ from skills.detect.training.region_learner import RegionLearner  # noqa: E402
 from skills.detect.training.region_losses import region_losses  # noqa: E402
 from skills.detect.training.region_network import RegionNetwork, surest_about  # noqa: E402
 from skills.detect.training.region_table import RegionTable, first_look, table_of  # noqa: E402
-from skills.detect.training.store import PictureStore  # noqa: E402
+from skills.detect.training.surroundings import Surroundings, kept_surroundings  # noqa: E402
 
 ALONE = Peers(0, 1)
 CPU = torch.device("cpu")
 THING, FAR = (100, 100, 200, 200), (300, 300, 400, 400)
-
-
-def store_of(*pictures: np.ndarray) -> PictureStore:
-    return PictureStore(np.stack(pictures), np.stack([halved(picture) for picture in pictures]))
 
 
 def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> LearningPicture:
@@ -47,7 +43,9 @@ def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> Learni
 
 def table(file: Path, picture: LearningPicture, *things: tuple[str, float, tuple[float, ...]]) -> RegionTable:
     look = partial(first_look, load_model(write_model(file)))
-    return table_of(look, [picture], store_of(picture_of(*things)))
+    seen = picture_of(*things)
+    with kept_surroundings(file.parent) as kept:
+        return table_of(look, [(Scales(seen, halved(seen)), picture.labels)], kept)
 
 
 def test_a_place_on_a_thing_wants_its_class_and_box_and_another_nothing(tmp_path: Path) -> None:
@@ -79,7 +77,7 @@ def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def feed() -> RegionFeed:
+def feed(tmp_path: Path) -> RegionFeed:
     """A bright thing in one of two dark pictures, and as many places on it as elsewhere."""
     dark = np.full((480, 640, 3), 40, np.uint8)
     bright = dark.copy()
@@ -89,7 +87,11 @@ def feed() -> RegionFeed:
     boxes = np.where(on[:, None], THING, FAR).astype(np.float32)
     logits = np.zeros((rows, len(CLASSES)), np.float32)
     classes = np.where(on, 1, -1)
-    return RegionFeed(RegionTable(np.where(on, 0, 1), boxes, logits, boxes, classes), store_of(bright, dark), 5, 0, 1)
+    with kept_surroundings(tmp_path) as kept:
+        for seen, box in zip([bright, dark] * (rows // 2), boxes, strict=True):
+            kept.add(Scales(seen, halved(seen)), box[None])
+    told = RegionTable(np.where(on, 0, 1), boxes, logits, boxes, classes)
+    return RegionFeed(told, Surroundings.read(tmp_path), 5, 0, 1)
 
 
 def test_half_of_a_batch_is_about_things(feed: RegionFeed) -> None:
@@ -109,8 +111,8 @@ def test_the_boxes_of_a_chip_are_where_the_thing_is_however_it_was_turned(feed: 
 
 
 def test_the_same_seed_gives_the_same_chips_and_each_process_others(feed: RegionFeed) -> None:
-    again = RegionFeed(feed.table, feed.store, 5, 0, 1).batch(8, 8)
-    other = RegionFeed(feed.table, feed.store, 5, 1, 2).batch(0, 8)
+    again = RegionFeed(feed.table, feed.surroundings, 5, 0, 1).batch(8, 8)
+    other = RegionFeed(feed.table, feed.surroundings, 5, 1, 2).batch(0, 8)
     assert torch.equal(feed.batch(8, 8).chips, again.chips)
     assert torch.equal(again.chips, other.chips)
     assert not torch.equal(feed.batch(0, 8).chips, again.chips)

@@ -24,6 +24,7 @@ from skills.detect.careful_detector import CarefulDetector
 from skills.detect.onnx_detector import DetectorOptions, OnnxDetector
 from skills.detect.scoring import judged, picture_errors, score
 from skills.detect.scoring_labels import LabelledPicture, pictures_of_coco
+from skills.detect.upside_down import turned, turned_back
 from skills.detection import Detection
 
 __all__ = ["score_command"]
@@ -115,9 +116,17 @@ def _all_found(work: _Work, console: Console) -> list[Found]:
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("pictures", total=len(work.files))
         for group in _groups(len(work.files)):
-            found += _looked(work.detector, [_read(work, k) for k in group], work.careful)
+            found += _found(work, group)
             bar.update(task, completed=len(found))
     return found
+
+
+def _found(work: _Work, group: range) -> list[Found]:
+    """What is in some pictures. Those that stand on their heads are turned first, as on the robot."""
+    taken, told = [_read(work, k) for k in group], [work.pictures[k] for k in group]
+    upright = [turned(picture) if one.on_its_head else picture for picture, one in zip(taken, told, strict=True)]
+    seen = zip(_looked(work.detector, upright, work.careful), taken, told, strict=True)
+    return [turned_back(found, *picture.shape[1::-1]) if one.on_its_head else found for found, picture, one in seen]
 
 
 def _looked(detector: OnnxDetector, pictures: Sequence[Picture], careful: bool) -> list[Found]:

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from skills.detect.upside_down import LEAST_ROLL_DEG
+
 __all__ = ["LEAST_LONG_PX", "LEAST_SHORT_PX", "LEAST_VISIBILITY", "Label", "LabelledPicture", "pictures_of_coco"]
 
 LEAST_LONG_PX: Final = 24.0
@@ -53,11 +55,15 @@ class Label:
 
 @dataclass(frozen=True)
 class LabelledPicture:
-    """A picture's file, as named by its data set, all that is known to be in it, and its width and height if told."""
+    """A picture's file, as named by its data set, all that is known to be in it, and its width and height if told.
+
+    `on_its_head`: its camera hung upside down, as the data set tells.
+    """
 
     file: str
     labels: tuple[Label, ...] = ()
     size_px: tuple[int, int] | None = None
+    on_its_head: bool = False
 
     @property
     def only_distractors(self) -> bool:
@@ -79,7 +85,8 @@ def pictures_of_coco(document: Mapping[str, Any], class_names: Sequence[str]) ->
     """The pictures of a COCO file in the order of their ids, with the labels of the named classes.
 
     Categories go by their names, in any case of letters; their ids may be any. Labels of other categories are left
-    out. `visibility`, `distance_m`, `iscrowd` and `ignore` need not be there. Raises ValueError, naming the entry.
+    out. `visibility`, `distance_m`, `iscrowd` and `ignore` of labels, and `roll_deg` of pictures need not be there.
+    Raises ValueError, naming the entry.
     """
     names = _category_names(document, class_names)
     files = {_number_of(image, "id", "images", k): image for k, image in enumerate(_entries(document, "images"))}
@@ -98,6 +105,7 @@ def pictures_of_coco(document: Mapping[str, Any], class_names: Sequence[str]) ->
             file=str(_value(files[number], "file_name", "images", k)),
             labels=tuple(labels[number]),
             size_px=_size(files[number]),
+            on_its_head=_on_its_head(files[number], k),
         )
         for k, number in enumerate(order)
     )
@@ -138,6 +146,13 @@ def _label(entry: Mapping[str, Any], name: str, k: int) -> Label:
 def _size(image: Mapping[str, Any]) -> tuple[int, int] | None:
     width, height = image.get("width"), image.get("height")
     return (width, height) if isinstance(width, int) and isinstance(height, int) else None
+
+
+def _on_its_head(image: Mapping[str, Any], k: int) -> bool:
+    roll_deg = image.get("roll_deg", 0.0)
+    if not isinstance(roll_deg, int | float):
+        raise ValueError(f"images[{k}]: 'roll_deg' is a number of degrees, not {roll_deg!r}")
+    return abs(roll_deg) > LEAST_ROLL_DEG
 
 
 def _number(value: Any) -> float | None:

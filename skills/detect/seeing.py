@@ -7,7 +7,6 @@ What is dim is made brighter, as a camera's automatic exposure would.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 import cv2
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from skills.api import Detection, Detector
 from skills.detect.careful_detector import LooksCarefully
+from skills.detect.upside_down import LEAST_ROLL_DEG, turned, turned_back
 from skills.robot import Image
 
 __all__ = ["DETECTION_LATENCY_S", "brightened", "detections_in", "is_dark", "on_its_head", "seen_in_grey"]
@@ -24,7 +24,7 @@ DETECTION_LATENCY_S: Final = 0.3
 """Thirteen looks at a picture, and where the things are, on two processor cores."""
 _DARK_MEAN, _DARK_SPREAD = 6.0, 4.0
 _DIM_MEAN, _BRIGHT_MEAN, _MOST_GAIN = 70.0, 100.0, 8.0
-_DOWN_IS_UP = 0.5
+_DOWN_IS_UP = -float(np.cos(np.radians(LEAST_ROLL_DEG)))
 
 Picture = NDArray[np.uint8]
 Found = tuple[Detection, ...]
@@ -66,8 +66,7 @@ def brightened(picture: Picture) -> Picture:
 
 def _to_be_seen(image: Image, picture: Picture) -> Picture:
     """The picture upright and bright enough."""
-    upright = np.ascontiguousarray(picture[::-1, ::-1]) if on_its_head(image) else picture
-    return brightened(upright)
+    return brightened(turned(picture) if on_its_head(image) else picture)
 
 
 def _turned_back(image: Image, found: Found) -> Found:
@@ -75,5 +74,4 @@ def _turned_back(image: Image, found: Found) -> Found:
     if not on_its_head(image):
         return found
     height, width = image.grey.shape
-    boxes = [(width - u1, height - v1, width - u0, height - v0) for u0, v0, u1, v1 in (one.box for one in found)]
-    return tuple(replace(one, box=box) for one, box in zip(found, boxes, strict=True))
+    return turned_back(found, width, height)

@@ -115,6 +115,22 @@ def test_what_careful_looks_find_is_judged_when_asked_for(score, data, monkeypat
     assert told(score("--data", data, "--json"))["recall"] == pytest.approx(3 / 4)
 
 
+# roll_deg    seen and judged as
+# none, 100   it lies
+# 172, -172   turned by half a turn, and the boxes turned back
+@pytest.mark.parametrize(("roll_deg", "recall"), [(None, 0.0), (100.0, 0.0), (172.0, 1.0), (-172.0, 1.0)])
+def test_a_picture_whose_camera_hung_upside_down_is_turned_first(score, tmp_path, roll_deg, recall):
+    u0, v0, u1, v1 = HAMMER[2]
+    cv2.imwrite(str(tmp_path / "a.png"), picture_of(HAMMER)[::-1, ::-1, ::-1])
+    image = {"id": 1, "file_name": "a.png", "width": 640, "height": 480}
+    document = {
+        "images": [image if roll_deg is None else {**image, "roll_deg": roll_deg}],
+        "categories": [{"id": 70, "name": "hammer"}],
+        "annotations": [label(1, 70, (640 - u1, 480 - v1, 640 - u0, 480 - v0))],
+    }
+    assert told(score("--data", written(tmp_path / "data.json", document), "--json"))["recall"] == recall
+
+
 def test_only_so_many_pictures_are_taken(score, data):
     figures = told(score("--data", data, "--limit", "1", "--json"))
     assert (figures["pictures"], figures["recall"], figures["false_per_100_distractor_pictures"]) == (1, 1.0, None)

@@ -61,6 +61,10 @@ def test_what_counts(width, height, visibility, crowd, ignore, counts):
             {"annotations": [{"image_id": None, "category_id": 90}]},
             r"annotations\[0\]: 'image_id' is a number, not None",
         ),
+        (
+            {"images": [{"id": 7, "file_name": "a.jpg", "roll_deg": "over"}], "annotations": []},
+            r"images\[0\]: 'roll_deg' is a number of degrees, not 'over'",
+        ),
         ({"images": [{"id": 7}], "annotations": []}, r"images\[0\]: it has no 'file_name'"),
         ({"annotations": [{"image_id": 8, "category_id": 90}]}, r"annotations\[0\]: it names image 8"),
         ({"annotations": [{"image_id": 7, "category_id": 90}]}, r"annotations\[0\]: it has no 'bbox'"),

@@ -18,6 +18,7 @@ from typing import Any, Final
 import torch
 from torch import Tensor, nn
 
+from skills.detect.training.depthwise import before_first, filtered, padded
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.network import EarlyLayers
 
@@ -56,35 +57,16 @@ _TO_32: Final = (_Stage(4, 5, 2, 6, AT_16, 192), _Stage(1, 3, 1, 6, 192, AT_32))
 
 
 class _Halving(torch.autograd.Function):
-    """A convolution of stride 2 with one row more of padding below than above, and so at the sides.
-
-    As one node of a file. With the gradient of a depthwise one's input alone, by a convolution of stride 1: on
-    processor cores the library's own takes ten times as long.
-    """
+    """A convolution of stride 2 with one row more of padding below than above, as one node of an ONNX file."""
 
     @staticmethod
     def forward(context: Any, x: Tensor, weight: Tensor, bias: Tensor | None, kernel: int, groups: int) -> Tensor:
-        weight = weight.to(x.dtype)
-        context.save_for_backward(weight)
-        context.size = x.shape[2:]
-        return nn.functional.conv2d(_padded(x, kernel), weight, bias, 2, 0, 1, groups)
-
-    @staticmethod
-    def backward(context: Any, *gradients: Tensor) -> tuple[Tensor, None, None, None, None]:
-        (weight,), (gradient,) = context.saved_tensors, gradients
-        count, channels, height, width = gradient.shape
-        apart = gradient.new_zeros((count, channels, 2 * height - 1, 2 * width - 1))
-        apart = apart.contiguous(memory_format=torch.channels_last)
-        apart[:, :, ::2, ::2] = gradient
-        around, before = weight.shape[-1] - 1, _before(weight.shape[-1])
-        of_padded = nn.functional.conv2d(apart, weight.flip(2, 3), None, 1, around, 1, len(weight))
-        rows, columns = (slice(before, before + length) for length in context.size)
-        return of_padded[:, :, rows, columns], None, None, None, None
+        return nn.functional.conv2d(padded(x, kernel, 2), weight, bias, 2, 0, 1, groups)
 
     @staticmethod
     def symbolic(graph: Any, x: Any, weight: Any, bias: Any, kernel: int, groups: int) -> Any:
         """The node in an ONNX file, in which normalisation has become a bias."""
-        before = _before(kernel)
+        before = before_first(kernel, 2)
         return graph.op(
             "Conv",
             *(x, weight, bias),
@@ -93,15 +75,6 @@ class _Halving(torch.autograd.Function):
             pads_i=[before, before, before + 1, before + 1],
             group_i=groups,
         )
-
-
-def _before(kernel: int) -> int:
-    return (kernel - 2) // 2
-
-
-def _padded(x: Tensor, kernel: int) -> Tensor:
-    before = _before(kernel)
-    return nn.functional.pad(x, (before, before + 1, before, before + 1))
 
 
 class PaddedConv(nn.Conv2d):
@@ -119,22 +92,23 @@ class PaddedConv(nn.Conv2d):
         if self.stride[0] == 1:
             return super().forward(x)
         kernel = self.kernel_size[0]
-        if self._learns_through(x) or torch.onnx.is_in_onnx_export():
+        if torch.onnx.is_in_onnx_export():
             halved: Tensor = _Halving.apply(x, self.weight, self.bias, kernel, self.groups)
             return halved
-        return super().forward(_padded(x, kernel))
-
-    def _learns_through(self, x: Tensor) -> bool:
-        """Whether learning needs the gradient of its input, but not that of its weights."""
-        return self.training and x.requires_grad and not self.weight.requires_grad
+        return super().forward(padded(x, kernel, 2))
 
 
 class PaddedDepthwise(PaddedConv):
-    """The same of each channel by itself. Its weights are not learnt: their gradients would take most of the time."""
+    """The same of each channel by itself, without the library's gradients where those of `depthwise` are quicker."""
 
     def __init__(self, channels: int, kernel: int, stride: int) -> None:
         super().__init__(channels, channels, kernel, stride, groups=channels)
-        self.weight.requires_grad_(False)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(N, channels, H, W) to (N, channels, H or H / 2, W or W / 2)."""
+        if self.training and torch.is_grad_enabled() and self.bias is None:
+            return filtered(x, self.weight, self.stride[0])
+        return super().forward(x)
 
 
 def _unit(layer: nn.Conv2d, *then: nn.Module) -> nn.Sequential:

@@ -127,7 +127,8 @@ class ThirdLearner(ChipLearner):
         """A network that has learnt nothing yet."""
         torch.manual_seed(seed)
         network = ThirdNetwork(classes).to(device, memory_format=torch.channels_last)
-        return cls(network, WeightAverage(network), optimisers_of(network, [network.place]), device)
+        apart = [network.place, *(block.filter[0] for block in network.backbone.blocks())]
+        return cls(network, WeightAverage(network), optimisers_of(network, apart), device)
 
     def begin(self, first: Path, batches: Iterable[RegionBatch]) -> None:
         """Take over the backbone's weights of ImageNet. Raises TrainingDataError."""

@@ -37,7 +37,8 @@ from skills.detect.training.command import exit_code_of
 from skills.detect.training.labels import TrainingDataError
 from skills.detect.training.looks import seen_by_first, seen_by_second
 from skills.detect.training.onnx_files import EIGHT_BITS, compact, facts_of, in_32_bits, shorten_names, write_sealed
-from skills.detect.training.validate import examination, read_picture
+from skills.detect.training.store import read_picture
+from skills.detect.training.validate import examination
 
 __all__ = ["detector_in_eight_bits", "in_eight_bits", "main", "write_in_eight_bits"]
 

@@ -16,7 +16,7 @@ from skills.detect.letterbox import HEIGHT_PX, WIDTH_PX, fill_letterbox
 from skills.detect.scales import Scales, halved
 from skills.detect.training.labels import LearningPicture, TrainingDataError
 
-__all__ = ["PictureStore", "open_store", "read_scales"]
+__all__ = ["PictureStore", "open_store", "read_picture", "read_scales"]
 
 Picture = NDArray[np.uint8]
 _FULL: Final = "full.u8"
@@ -36,13 +36,18 @@ class PictureStore:
         return Scales(self.full[index], self.half[index])
 
 
-def read_scales(file: Path) -> Scales:
-    """A picture's letterbox, RGB, and its half. Raises TrainingDataError."""
+def read_picture(file: Path) -> Picture:
+    """A picture (H, W, 3) of a data set, RGB. Raises TrainingDataError."""
     found = cv2.imread(str(file), cv2.IMREAD_COLOR_RGB)
     if found is None:
         raise TrainingDataError(f"{file}: is no picture, or damaged", mend="render the data set anew")
+    return np.asarray(found, dtype=np.uint8)
+
+
+def read_scales(file: Path) -> Scales:
+    """A picture's letterbox, RGB, and its half. Raises TrainingDataError."""
     filled = np.empty((HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
-    fill_letterbox(np.asarray(found, dtype=np.uint8), filled)
+    fill_letterbox(read_picture(file), filled)
     return Scales(filled, halved(filled))
 
 

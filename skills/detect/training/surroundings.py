@@ -18,7 +18,7 @@ from skills.detect.scales import Scales, cut_out, halved
 __all__ = ["REACH_PX", "Surroundings", "SurroundingsWriter", "kept_surroundings"]
 
 REACH_PX: Final = 108.0
-"""How far from a place's middle, in pixels of its chip, is kept."""
+"""How far from a place's middle, in pixels of its chip, is kept: as far as `changed_map` may show any of it."""
 _PICTURES: Final = "chips.u8"
 _INDEX: Final = "chips.npz"
 _COLUMNS: Final = ("ends", "corners", "shrinks")

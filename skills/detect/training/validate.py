@@ -8,19 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-
 from skills.detect.detector_file import load_model
 from skills.detect.onnx_detector import DetectorOptions, OnnxDetector
 from skills.detect.scoring import Score, score
 from skills.detect.scoring_labels import LabelledPicture, pictures_of_coco
 from skills.detect.training.calibrate import score_offsets
 from skills.detect.training.labels import TrainingDataError
+from skills.detect.training.store import read_picture
 from skills.detection import Detection
 
-__all__ = ["CALIBRATED_BY", "Examination", "examination", "examine", "offsets_by", "read_picture"]
+__all__ = ["CALIBRATED_BY", "Examination", "examination", "examine", "offsets_by"]
 
 LEAST_SCORE = 0.02
 CALIBRATED_BY: Final = 3600
@@ -65,11 +62,3 @@ def offsets_by(model: Path, exam: Examination, *, networks: int) -> tuple[float,
 def _found(model: Path, exam: Examination, networks: int) -> list[tuple[Detection, ...]]:
     detector = OnnxDetector(load_model(model, networks=networks), DetectorOptions(threshold=LEAST_SCORE))
     return [detector.detect([read_picture(exam.folder / picture.file)])[0] for picture in exam.pictures]
-
-
-def read_picture(file: Path) -> NDArray[np.uint8]:
-    """A picture (H, W, 3) of a data set. Raises TrainingDataError."""
-    picture = cv2.imread(str(file), cv2.IMREAD_COLOR_RGB)
-    if picture is None:
-        raise TrainingDataError(f"{file}: is no picture, or damaged", mend="render the data set anew")
-    return np.asarray(picture, dtype=np.uint8)

@@ -139,7 +139,7 @@
 
   if (recorded) {
     take(recorded.messages);
-    if (recorded.scene) scene.show(URL.createObjectURL(new Blob([recorded.scene], { type: "text/html" })), true);
+    if (recorded.scene) scene.showText(recorded.scene);
     timeline.go(timeline.store.end);
     setInterval(() => scene.seek(timeline.t), 500);
   } else {

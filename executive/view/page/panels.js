@@ -112,9 +112,18 @@
       if (!address || address === this.address) return;
       this.address = address;
       this.recorded = recorded;
-      const frame = element("iframe");
-      frame.title = recorded ? "3D recording of the run" : "3D scene";
-      frame.src = address;
+      this.put({ title: recorded ? "3D recording of the run" : "3D scene", src: address });
+    }
+
+    // A recording that the page brings with it. As the frame's own text it has the page's origin, also in a page that
+    // was opened as a file; by an address of its own it would have another there, and could not be made to follow.
+    showText(text) {
+      this.recorded = true;
+      this.put({ title: "3D recording of the run", srcdoc: text });
+    }
+
+    put(properties) {
+      const frame = Object.assign(element("iframe"), properties);
       this.box.replaceChildren(frame);
       this.frame = frame;
     }

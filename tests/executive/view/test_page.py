@@ -375,6 +375,21 @@ def test_a_replay_of_one_file_works_without_a_server(page, log_path, tmp_path):
     playwright_api.expect(page.locator("#mode-text")).to_have_text("running")
 
 
+def test_the_recording_in_a_replay_of_one_file_follows_the_slider(page, log_path, tmp_path):
+    # slider at the end (past the recording's 0.5 s) -> 0.5; at the beginning -> 0
+    viewer = "animator: {duration: 0.5, pause() { this.held = true; }, seek(t) { this.t = t; }}"
+    recording, html = tmp_path / "recording.html", tmp_path / "replay.html"
+    recording.write_text(f"<script>var viewer = {{{viewer}}};</script>", encoding="utf-8")
+    html.write_text(to_html(read_history(log_path).events, recording), encoding="utf-8")
+    page.goto(html.as_uri())
+    animator = "document.querySelector('#scene iframe').contentWindow.viewer.animator"
+    shown_at = f"t => {{ const animator = {animator}; return animator.held && animator.t === t; }}"
+    page.wait_for_function(shown_at, arg=0.5)
+    page.locator("#slider").focus()
+    page.keyboard.press("Home")
+    page.wait_for_function(shown_at, arg=0)
+
+
 def test_everything_that_acts_has_a_name_and_the_page_fits(page, live):
     _, _, url = live
     page.goto(url)

@@ -141,9 +141,10 @@
     take(recorded.messages);
     if (recorded.scene) scene.showText(recorded.scene);
     timeline.go(timeline.store.end);
-    setInterval(() => scene.seek(timeline.t), 500);
   } else {
     connect();
   }
+  // A recording that loads when all else is drawn follows, too, and shows textures that come still later.
+  setInterval(() => scene.seek(timeline.t), 500);
   window.errand.page = { store, timeline, delays };
 })();

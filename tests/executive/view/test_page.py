@@ -375,19 +375,44 @@ def test_a_replay_of_one_file_works_without_a_server(page, log_path, tmp_path):
     playwright_api.expect(page.locator("#mode-text")).to_have_text("running")
 
 
-def test_the_recording_in_a_replay_of_one_file_follows_the_slider(page, log_path, tmp_path):
-    # slider at the end (past the recording's 0.5 s) -> 0.5; at the beginning -> 0
-    viewer = "animator: {duration: 0.5, pause() { this.held = true; }, seek(t) { this.t = t; }}"
-    recording, html = tmp_path / "recording.html", tmp_path / "replay.html"
-    recording.write_text(f"<script>var viewer = {{{viewer}}};</script>", encoding="utf-8")
-    html.write_text(to_html(read_history(log_path).events, recording), encoding="utf-8")
-    page.goto(html.as_uri())
-    animator = "document.querySelector('#scene iframe').contentWindow.viewer.animator"
-    shown_at = f"t => {{ const animator = {animator}; return animator.held && animator.t === t; }}"
-    page.wait_for_function(shown_at, arg=0.5)
+@pytest.fixture
+def recording(tmp_path) -> Path:
+    """What stands for a 3D recording of half a second: it loads late, plays by itself and can be held and sought."""
+    animator = "{duration: 0.5, playing: true, pause() { this.playing = false; }, seek(t) { this.t = t; }}"
+    path = tmp_path / "recording.html"
+    path.write_text(f"<script>setTimeout(() => {{ window.viewer = {{animator: {animator}}}; }}, 800);</script>")
+    return path
+
+
+def expect_scene_follows_slider(page) -> None:
+    # slider at the end, past the recording's 0.5 s -> held at 0.5; at the beginning -> held at 0
+    viewer = "document.querySelector('#scene iframe').contentWindow.viewer"
+    shows = f"t => {{ const v = {viewer}; return Boolean(v) && !v.animator.playing && v.animator.t === t; }}"
+    page.wait_for_function(shows, arg=0.5)
     page.locator("#slider").focus()
     page.keyboard.press("Home")
-    page.wait_for_function(shown_at, arg=0)
+    page.wait_for_function(shows, arg=0)
+
+
+def test_the_recording_in_a_replay_of_one_file_follows_the_slider(page, log_path, recording, tmp_path):
+    html = tmp_path / "replay.html"
+    html.write_text(to_html(read_history(log_path).events, recording), encoding="utf-8")
+    page.goto(html.as_uri())
+    expect_scene_follows_slider(page)
+
+
+def test_the_recording_in_a_served_replay_follows_the_slider(page, log_path, recording):
+    with PageServer(PageContent(fed(read_history(log_path).events), recording=recording)) as server:
+        page.goto(server.url)
+        expect_scene_follows_slider(page)
+
+
+def test_the_recording_that_is_there_when_a_run_has_ended_follows_the_slider(page, log_path, recording):
+    with PageServer(PageContent(fed(read_history(log_path).events))) as server:
+        page.goto(server.url)
+        playwright_api.expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
+        server.offer_recording(recording)
+        expect_scene_follows_slider(page)
 
 
 def test_everything_that_acts_has_a_name_and_the_page_fits(page, live):

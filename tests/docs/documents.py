@@ -1,11 +1,17 @@
-"""Reads our Markdown pages: their code blocks in order, with the marks that stand before them."""
+"""Reads our Markdown pages: their code blocks in order, with the marks that stand before them, and their commands."""
 
 import re
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
+import typer.main
+
+from executive.cli.main import app
+
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
+_COMMANDS = typer.main.get_command(app).commands
 _BLOCK = re.compile(r"(?:^<!-- (?P<mark>[^>]*) -->\n+)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -24,3 +30,15 @@ def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
     found = _BLOCK.finditer(text)
     return [Block(m["kind"], m["text"], m["mark"] or "", text[: m.start()].count("\n") + 1) for m in found]
+
+
+def unknown_command(line: str) -> str | None:
+    """What is wrong with a command line of ours, or None."""
+    words = shlex.split(line, comments=True)
+    if words[1] not in _COMMANDS:
+        return f"no command {words[1]}"
+    command, rest = _COMMANDS[words[1]], words[2:]
+    while rest and rest[0] in getattr(command, "commands", {}):
+        command, rest = command.commands[rest[0]], rest[1:]
+    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    return next((f"{command.name} has no {word}" for word in rest if word.startswith("-") and word not in known), None)

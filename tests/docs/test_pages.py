@@ -2,20 +2,15 @@
 
 import ast
 import re
-import shlex
 import sys
 from pathlib import Path
 
 import pytest
-import typer.main
 
 sys.path.insert(0, str(Path(__file__).parent))
-from documents import DOCS, ROOT, blocks
-
-from executive.cli.main import app
+from documents import DOCS, ROOT, blocks, unknown_command
 
 PAGES = sorted(DOCS.rglob("*.md"))
-COMMANDS = typer.main.get_command(app).commands
 _TEST = re.compile(r"`(tests/[\w/.]+\.py)(?:::(\w+))?`")
 _LINK = re.compile(r"\]\((?!https?:)([^)#]*)(#[^)]*)?\)")
 _FILE = re.compile(r"`((?:executive|skills|plant|missions|docs)/[\w/.]+\.(?:py|yaml|json|md))`")
@@ -41,18 +36,6 @@ def missing_tests(text):
         path = ROOT / file
         if not path.is_file() or (name and name not in names_in(path)):
             yield f"{file}::{name}"
-
-
-def unknown_command(line):
-    """What is wrong with a command line of ours, or None."""
-    words = shlex.split(line, comments=True)
-    if words[1] not in COMMANDS:
-        return f"no command {words[1]}"
-    command, rest = COMMANDS[words[1]], words[2:]
-    while rest and rest[0] in getattr(command, "commands", {}):
-        command, rest = command.commands[rest[0]], rest[1:]
-    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
-    return next((f"{command.name} has no {word}" for word in rest if word.startswith("-") and word not in known), None)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_id)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -34,6 +35,7 @@ class Transition:
 
 Snapshot = Mapping[str, NodeState]
 _IDLE = NodeState()
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 class Observed:
@@ -62,6 +64,16 @@ def transitions(before: Snapshot, after: Snapshot) -> Iterator[Transition]:
         old = before.get(path_id, _IDLE)
         if old is not state and (old.status, old.cause) != (state.status, state.cause):
             yield Transition(path_id, old, state)
+
+
+def activities(before: Snapshot, after: Snapshot) -> Iterator[tuple[str, NodeState]]:
+    """The nodes that go on and say something new, in the order of the tree; mere new numbers do not count."""
+    for path_id, state in after.items():
+        old = before.get(path_id, _IDLE)
+        if old is state or not old.status is state.status is Status.RUNNING or old.cause is not state.cause:
+            continue
+        if _NUMBER.sub("", old.message) != _NUMBER.sub("", state.message):
+            yield path_id, state
 
 
 def walk(root: Behaviour) -> Iterator[Behaviour]:

@@ -16,8 +16,8 @@ from executive.behaviours.suspension import suspend
 from executive.compiler import CompiledTree
 from executive.journal import Journal, TickNote
 from executive.outcome import Outcome, RobotResult
-from executive.record.schemas import TRANSITIONS, TREE
-from executive.snapshot import Observed, Snapshot, Transition, transitions
+from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
+from executive.snapshot import NodeState, Observed, Snapshot, Transition, activities, transitions
 from executive.view.model import node_view
 from skills.api import Cause
 from skills.robot import Pose2D
@@ -43,6 +43,7 @@ class TreeRun:
         self.journal = journal
         self.root = tree.build(context)
         self._observed = Observed(self.root)
+        self._skills = frozenset(node.path_id for node in self._observed.nodes if isinstance(node, SkillLeaf))
         self.states: Snapshot = self._observed.snapshot()
         self._gates: dict[str, Gate] = {}
         self._breakpoints: frozenset[str] = frozenset()
@@ -79,11 +80,14 @@ class TreeRun:
         suspend(self.root)
 
     def log_changes(self) -> Sequence[Transition]:
-        """Log the transitions since the last time."""
+        """Log the transitions since the last time, and what running skills do by now; the transitions."""
         before, self.states = self.states, self._observed.snapshot()
         changes = tuple(transitions(before, self.states))
         for change in changes:
             self.context.publish(TRANSITIONS, self._transition(change))
+        for path_id, state in activities(before, self.states):
+            if path_id in self._skills:
+                self.context.publish(ACTIVITY, self._activity(path_id, state))
         return changes
 
     def halt(self, attempt: Attempt) -> None:
@@ -137,14 +141,15 @@ class TreeRun:
     def _transition(self, change: Transition) -> dict[str, object]:
         after = change.after
         return {
-            "t": round(self.context.clock.now(), 6),
-            "robot": self.tree.robot_name,
-            "node": change.path_id,
+            **self._activity(change.path_id, after),
             "from": change.before.status.value,
             "to": after.status.value,
             "cause": after.cause,
-            "message": after.message,
         }
+
+    def _activity(self, path_id: str, state: NodeState) -> dict[str, object]:
+        now_s = round(self.context.clock.now(), 6)
+        return {"t": now_s, "robot": self.tree.robot_name, "node": path_id, "message": state.message}
 
 
 _OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}

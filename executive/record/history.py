@@ -11,7 +11,7 @@ from py_trees.common import Status
 
 from executive.errors import InputError
 from executive.record.reader import Event, read_events
-from executive.record.schemas import TRANSITIONS, TREE
+from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.snapshot import NodeState
 from executive.view.model import NodeView, logged_view
 from skills.api import Cause
@@ -44,6 +44,8 @@ class History:
                 found.append((event.data, {}))
             elif event.topic == TRANSITIONS and found:
                 _latest(found, event.data.get("robot"))[event.data["node"]] = logged_state(event.data)
+            elif event.topic == ACTIVITY and found:
+                _latest(found, event.data.get("robot"))[event.data["node"]] = logged_activity(event.data)
         if not found:
             raise InputError("the log holds no tree", mend="it ended before the mission began", file=self.file)
         try:
@@ -61,6 +63,11 @@ def logged_state(transition: dict[str, Any]) -> NodeState:
     """The state that a logged transition led to."""
     cause = transition.get("cause")
     return NodeState(Status(transition["to"]), None if not cause else Cause(cause), transition.get("message") or "")
+
+
+def logged_activity(activity: dict[str, Any]) -> NodeState:
+    """The state of a node that goes on, from what it was logged to do by then."""
+    return NodeState(Status.RUNNING, None, activity.get("message") or "")
 
 
 def _before(events: Iterable[Event], until_s: float | None) -> Iterator[Event]:

@@ -11,6 +11,7 @@ from executive.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
 
 TREE: Final = "tree"
 TRANSITIONS: Final = "transitions"
+ACTIVITY: Final = "activity"
 POSE: Final = "pose"
 OUTCOME: Final = "outcome"
 RUN: Final = "run"
@@ -76,6 +77,7 @@ SCHEMAS: Final[Mapping[str, Schema]] = MappingProxyType(
             "errand.Transition",
             {**_NODE, **_fields("string", "from", "to", "cause", "message"), **_fields("number", "t")},
         ),
+        ACTIVITY: Schema("errand.Activity", {**_NODE, **_fields("string", "message"), **_fields("number", "t")}),
         POSE: Schema(
             "foxglove.PoseInFrame",
             {

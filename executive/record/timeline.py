@@ -8,9 +8,9 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from executive.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
-from executive.record.history import logged_state
+from executive.record.history import logged_activity, logged_state
 from executive.record.reader import Event
-from executive.record.schemas import CONTROL, ERRORS, OUTCOME, RUN, TRANSITIONS, TREE, WALL
+from executive.record.schemas import ACTIVITY, CONTROL, ERRORS, OUTCOME, RUN, TRANSITIONS, TREE, WALL
 from executive.snapshot import NodeState
 
 
@@ -40,6 +40,9 @@ def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[
             entry = _transition(event)
             if not leaves_only or entry.about not in inner or (entry.state is not None and entry.state.cause):
                 yield entry
+        elif event.topic == ACTIVITY:
+            state = logged_activity(event.data)
+            yield Entry(event.data.get("t", event.stamp_s), event.data["node"], state.message, state)
         elif event.topic == TASK_TOPIC:
             yield Entry(event.stamp_s, event.topic, _task(event.data, commands))
         elif event.topic in _TEXTS and not (leaves_only and event.topic == WALL and "wall_time_s" not in event.data):

@@ -152,11 +152,15 @@ class EmptyCostmap:
 
 @dataclass
 class Script:
-    """What the scripted skills do: `ends[name]` gives the last step; `seen_on` the surfaces where things are seen."""
+    """What the scripted skills do: `ends[name]` gives the last step; `seen_on` the surfaces where things are seen.
+
+    `says` gives a skill's sentence from its name and how many steps are left.
+    """
 
     ends: dict[str, Callable[[Any], SkillStep]] = field(default_factory=dict)
     seen_on: tuple[str, ...] = ("counter",)
     steps: int = 3
+    says: Callable[[str, int], str] = lambda name, left: f"{name} goes on"
     begun: list[str] = field(default_factory=list)
     ended: list[str] = field(default_factory=list)
 
@@ -184,7 +188,7 @@ def scripted_skill(
             robot.drive(0.1, 0.0, 0.0, until_s=self.context.clock.now() + 0.5, lease=lease)
             self.left -= 1
             if self.left > 0:
-                return Running(f"{skill_name} goes on")
+                return Running(script.says(skill_name, self.left))
             return script.ends.get(skill_name, default_end(script, skill_name))(self)
 
         def end(self) -> None:

@@ -30,6 +30,7 @@
 
     entry({ topic, data, t }) {
       if (topic === "transitions") return this.change(data, t);
+      if (topic === "activity") return this.change({ ...data, to: "RUNNING", cause: null }, t);
       if (topic === "outcome") {
         const look = data.outcome === "success" ? "success" : data.outcome === "cancelled" ? "cancelled" : "failure";
         return { t, look, what: `${data.robot}: ${data.outcome}`, why: [data.cause, data.message].filter(Boolean).join(": ") };

@@ -33,6 +33,10 @@
     transitions(view, data, t) {
       view.states.set(data.node, { status: data.to, cause: data.cause, message: data.message, t });
     },
+    activity(view, data) {
+      const state = view.states.get(data.node);
+      if (state && state.status === "RUNNING") view.states.set(data.node, { ...state, message: data.message });
+    },
     pose(view, data) {
       const robot = robotOf(view, data.robot), { position, orientation } = data.pose;
       robot.pose = { x: position.x, y: position.y, yaw: 2 * Math.atan2(orientation.z, orientation.w) };

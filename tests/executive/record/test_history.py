@@ -56,6 +56,40 @@ def test_transitions_have_the_keys_of_the_contract(failed_run):
     json.dumps(changes)
 
 
+@pytest.fixture
+def telling_run(tmp_path, compiled, run_tree, make, script, clock):
+    """The log of a mission whose skills say in each step what they do: "turning", then "going, 2 m to go" and 1 m."""
+    script.steps, script.says = 4, lambda name, left: "turning" if left == 3 else f"going, {left} m to go"
+    log = EventLog(tmp_path / "log.mcap", clock)
+    run_tree(compiled(*make.FETCH), publish=log)
+    log.close()
+    return read_history(log.path)
+
+
+def test_new_sentences_of_running_skills_are_logged_once(telling_run):
+    # navigate begins "turning" (a transition), then goes on "going, 2 m to go"; that 1 m is left is nothing new
+    told = [event.data for event in telling_run.events if event.topic == "activity"]
+    first = told[0]["node"]
+    assert first.endswith("navigate")
+    assert [each["message"] for each in told if each["node"] == first] == ["going, 2 m to go"]
+
+
+def test_the_state_at_a_time_tells_what_was_being_done_then(telling_run):
+    told = next(event.data for event in telling_run.events if event.topic == "activity")
+    messages = []
+    for time_s in (told["t"] - 0.01, told["t"]):
+        (tree,) = telling_run.trees(time_s)
+        messages.append(next(node.state.message for _, node in tree.walk() if node.path_id == told["node"]))
+    assert messages == ["turning", "going, 2 m to go"]
+
+
+def test_the_timeline_tells_what_running_skills_do(telling_run):
+    told = next(event.data for event in telling_run.events if event.topic == "activity")
+    entries = [entry for entry in timeline(telling_run.events, leaves_only=True) if entry.about == told["node"]]
+    assert [entry.text for entry in entries][:2] == ["turning", "going, 2 m to go"]
+    assert entries[1].state is not None and entries[1].state.status is Status.RUNNING
+
+
 def test_the_timeline_tells_skills_failures_and_the_outcome(failed_run):
     entries = list(timeline(read_history(failed_run[0]).events, leaves_only=True))
     texts = [entry.text for entry in entries]

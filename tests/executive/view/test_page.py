@@ -181,6 +181,19 @@ def test_states_causes_and_sentences_stand_on_the_nodes(page, live):
     assert "failure, PLANNING" in (page.locator(f'li[data-id="{second}"]').get_attribute("aria-label") or "")
 
 
+def test_what_a_running_node_says_meanwhile_stands_on_it_and_in_the_events(page, live):
+    feed, tree, url = live
+    node = leaf_ids(tree)[0]
+    page.goto(url)
+    change(feed, node, "RUNNING", 1.0)
+    feed("activity", 2.0, {"t": 2.0, "robot": "Alice", "node": node, "message": "stopping at the goal"})
+    playwright_api.expect(row(page, node)).to_contain_text("stopping at the goal")
+    playwright_api.expect(page.locator("#events li").last).to_contain_text("stopping at the goal")
+    change(feed, node, "SUCCESS", 3.0, message="there")
+    page.evaluate("t => window.errand.page.timeline.go(t)", 1.5)
+    playwright_api.expect(row(page, node)).not_to_contain_text("stopping at the goal")
+
+
 def test_buttons_and_keys_reach_the_control(page, live, control):
     _, _, url = live
     page.goto(url)

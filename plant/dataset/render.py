@@ -42,7 +42,7 @@ from plant.dataset.views import View, any_view, camera_specs, hand_view, roll_de
 from plant.models.builder.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture
 from plant.models.families import ObjectModel
-from plant.sensors.camera_spec import colour_render_camera
+from plant.sensors.camera_spec import NEAR_M, colour_render_camera
 
 Picture = NDArray[np.uint8]
 
@@ -254,16 +254,19 @@ def label_view(
             class_id=model.class_id,
             instance=model.name,
             distance_m=distance,
-            unseeable=lost_in_the_dark(picture, mask) or _surrounds_camera(points_C),
+            unseeable=lost_in_the_dark(picture, mask) or _opened_by_camera(points_C),
         )
         if entry is not None:
             found.append(entry)
     return found
 
 
-def _surrounds_camera(points_C: NDArray[np.float64]) -> bool:
-    """Whether the camera is within the box of a thing's points (N, 3): then it sees through the thing."""
-    return bool(np.all(points_C.min(axis=0) < 0.0) and np.all(points_C.max(axis=0) > 0.0))
+def _opened_by_camera(points_C: NDArray[np.float64]) -> bool:
+    """Whether the camera, or what is nearer to it than it shows, is within the box of a thing's points (N, 3).
+
+    Then the picture shows what is behind the thing, and the label image its inside.
+    """
+    return bool(np.all(points_C.min(axis=0) < (0.0, 0.0, NEAR_M)) and np.all(points_C.max(axis=0) > 0.0))
 
 
 __all__ = ["Placed", "Shot", "is_validation", "label_view", "render_scene", "views_in"]

@@ -89,6 +89,18 @@ def test_a_thing_that_the_camera_is_in_is_to_be_ignored(
     assert found["ignore"] == ignored
 
 
+# how far the camera is before the cube's side, which it shows from 0.05 m on -> ignored
+@pytest.mark.parametrize(("before_m", "ignored"), [(0.02, 1), (0.04, 1), (0.1, 0)])
+def test_a_thing_that_is_too_near_to_be_shown_whole_is_to_be_ignored(
+    cubes: tuple[ObjectModel, ObjectModel], before_m: float, ignored: int, tmp_path: Path
+) -> None:
+    # ahead and to the left of the camera, so that the right half of the picture is free
+    cube, X_WC = cubes[0], look_at(EYE, (0, 0, 0.05))
+    x, _, z = cube.size_m
+    (found,) = labels_of((Placed(cube, X_WC @ RigidTransform([-0.45 * x, 0.0, before_m + 0.5 * z])),), tmp_path)
+    assert found["ignore"] == ignored
+
+
 def test_distractors_have_no_label(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ERRAND_MODEL_CACHE", str(tmp_path / "models"))
     mug = instance("mug", 0)

@@ -88,6 +88,7 @@ def task_messages(
         return (NOTHING_ID,) if thing is None else tuple(CLASS_IDS[name] for name in classes(thing.name))
 
     def message(index: int, command: Command) -> TaskMessage:
+        """The message of one of the commands."""
         item, target = types(command.item), types(command.object)
         goal_x, goal_y = position(command)
         return TaskMessage(

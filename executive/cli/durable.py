@@ -138,6 +138,7 @@ def _journal(store: MissionStore, mission: StoredMission) -> StoreJournal:
     """The journal of a mission; what takes its place by a correction is kept in its stead."""
 
     def order_of(tree: CompiledTree) -> Order:
+        """The order of a tree that takes the mission's place."""
         commands, nodes = tuple(map(str, tree.commands)), fingerprint(tree)
         return replace(
             mission.order,

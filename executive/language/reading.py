@@ -49,6 +49,7 @@ class _Reader(Row):
     """Reads the row from left to right."""
 
     def read(self) -> Iterable[Item]:
+        """The items of the row in order; the first way of reading that fits takes its words."""
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
             *(partial(step, self) for step in (where_is, how_many, told, narrated, needed, belongs, goes_on)),

@@ -20,6 +20,8 @@ def control_actions(control: Control) -> Mapping[str, Action]:
     """The actions of a run by name; each takes the page's values and gives one sentence, or raises RefusedError."""
 
     def bound(call: Callable[[Control, Mapping[str, Any]], None], said: str) -> Action:
+        """An action that makes a call on the control and says what was done."""
+
         def action(values: Mapping[str, Any]) -> str:
             try:
                 call(control, values)

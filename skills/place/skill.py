@@ -224,6 +224,7 @@ def above_goal(tops_B: list[FloatArray], carried: RotationMatrix) -> Callable[[A
     side = abs(carried.matrix()[2, 2]) < 0.5
 
     def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
+        """Arm angles above the first spot that can be reached and gone down to. Raises PlanningError."""
         for p_BT in tops_B:
             azimuth = math.atan2(p_BT[1] - scene.model.p_BS[1], p_BT[0] - scene.model.p_BS[0])
             for rotation in _side(carried, azimuth) if side else _from_above(azimuth):

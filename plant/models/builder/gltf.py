@@ -38,6 +38,7 @@ class _File:
         self._images: list[str] = []
 
     def primitive(self, material: Material, points: FloatArray, normals: FloatArray, uvs: FloatArray) -> dict[str, Any]:
+        """Triangles of one material: points and normals (N, 3), texture coordinates (N, 2), three rows a triangle."""
         flipped = np.column_stack([uvs[:, 0], 1.0 - uvs[:, 1]])
         rows = np.round(np.column_stack([points, normals, flipped]), 5).astype(np.float32)
         unique, order = np.unique(rows, axis=0, return_inverse=True)
@@ -76,6 +77,7 @@ class _File:
         return len(self._materials) - 1
 
     def document(self, primitives: list[dict[str, Any]]) -> dict[str, Any]:
+        """The whole glTF document of some primitives, with all bytes in it."""
         data = base64.b64encode(bytes(self._bytes)).decode("ascii")
         uri = f"data:application/octet-stream;base64,{data}"
         document: dict[str, Any] = {

@@ -58,6 +58,7 @@ def join(fields: Sequence[Field], blend_m: float = 0.0) -> Field:
     """The union, smooth over about `blend_m`."""
 
     def field(p: FloatArray) -> FloatArray:
+        """The distance of points to the union."""
         total = fields[0](p)
         for other in fields[1:]:
             d = other(p)

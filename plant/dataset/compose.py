@@ -72,7 +72,7 @@ def compose(rng: np.random.Generator, index: int, *, for_training: bool) -> Scen
         _any_instance(rng, str(name), for_training)
         for name in rng.choice(DISTRACTORS, int(rng.integers(6, 16)) * rounds)
     ]
-    table = _Table(room, rng)
+    table = _Table(room, rng, toppled=for_training)
     crowded = list(rng.permutation(len(room.supports)))[: int(rng.integers(2, 5))] if room.supports else []
     for model in [*wanted, *others]:
         table.place(model, [room.supports[k] for k in crowded])
@@ -114,15 +114,15 @@ def _hold(rng: np.random.Generator, other: ObjectModel | None, *, for_training: 
 class _Table:
     """What stands where already."""
 
-    def __init__(self, room: Room, rng: np.random.Generator) -> None:
-        self._room, self._rng = room, rng
+    def __init__(self, room: Room, rng: np.random.Generator, *, toppled: bool) -> None:
+        self._room, self._rng, self._toppled = room, rng, toppled
         self._taken: list[tuple[float, FloatArray]] = []
         self.things: list[Placed] = []
         self.seats: list[tuple[float, float, float, float]] = []
 
     def place(self, model: ObjectModel, supports: Sequence[Support]) -> None:
         """Put a thing on a support or on the floor where it fits; leave it away when it fits nowhere."""
-        pose = choose(self._rng, model, resting_poses(model))
+        pose = choose(self._rng, model, resting_poses(model), toppled=self._toppled)
         points = model.surface.points @ pose.R.T
         outline = points[ConvexHull(points[:, :2]).vertices, :2]
         tall = float(np.ptp(points[:, 2]))

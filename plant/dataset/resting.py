@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ FloatArray = NDArray[np.float64]
 
 LEAST_MARGIN = 0.05
 _UPRIGHT = {"person": 1.0, "extinguisher": 0.9, "beer": 0.7, "coke": 0.72, "cylinder": 0.6}
+TOPPLED_SHARE: Final = 0.75
+"""How much more seldom things stand in pictures to learn from than is usual."""
 
 
 @dataclass(frozen=True)
@@ -94,11 +97,15 @@ def _to_down(normal: FloatArray) -> FloatArray:
     return np.asarray(np.eye(3) + K + K @ K / (1 + cosine))
 
 
-def choose(rng: np.random.Generator, model: ObjectModel, poses: Sequence[Resting]) -> Resting:
-    """One of the poses: upright as often as is usual for such things, else by how easily they stay."""
+def choose(rng: np.random.Generator, model: ObjectModel, poses: Sequence[Resting], *, toppled: bool = False) -> Resting:
+    """One of the poses: upright as often as is usual for such things, else by how easily they stay.
+
+    `toppled`: what usually stands lies more often than that, but people, so that it is learnt that way, too.
+    """
     standing = [pose for pose in poses if pose.upright]
     lying = [pose for pose in poses if not pose.upright]
     share = _UPRIGHT.get(model.family, 0.75 if model.class_id == 0 else 0.5)
+    share *= TOPPLED_SHARE if toppled and model.family != "person" else 1.0
     group = standing if standing and (not lying or rng.random() < share) else lying or standing
     weights = np.array([pose.margin + 1e-3 for pose in group])
     return group[int(rng.choice(len(group), p=weights / weights.sum()))]

@@ -21,6 +21,7 @@ from plant.models.families.hammers import hammer
 from plant.models.families.model import ObjectModel, Surface, held_out, read_model, write_model
 from plant.models.families.people import person
 from plant.models.families.screwdrivers import screwdriver
+from plant.models.families.sketches import SKETCH_MAKERS, plainly_painted
 from plant.models.families.wrenches import wrench
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "instance",
     "make",
     "numbers",
+    "sketched",
     "sources_digest",
 ]
 
@@ -39,12 +41,30 @@ Maker = Callable[[Draft], tuple[Finished, str, str]]
 
 INSTANCES = 960
 """How many instances of each class there are for the data set, but of people."""
-PEOPLE = 48
-"""How many people: each takes seconds to make."""
+PEOPLE = 72
+"""How many people: each but the sketched ones takes seconds to make."""
 DISTRACTOR_INSTANCES = 96
 """How many of each kind of distractor there are."""
 VALIDATION_BELOW, DISTRACTOR_VALIDATION_BELOW = 48, 8
 """Validation takes held-out instances below these numbers, so that its pictures stay the same when more are added."""
+SKETCHED_OF_FIVE = (0, 2)
+"""Of the instances that validation does not take, those whose number leaves these when divided by five are sketches."""
+_PLAIN_AS_A_CLASS = frozenset(
+    {
+        "battery",
+        "candle",
+        "food_can",
+        "jar",
+        "paint_tin",
+        "pipe",
+        "sauce_bottle",
+        "soda_can",
+        "spray_can",
+        "tissue_box",
+        "wine_bottle",
+    }
+)
+"""What would pass for a cylinder, a cube or a bottle of beer without its picture."""
 
 _CLASS_MAKERS: Mapping[str, Maker] = {
     "beer": beer,
@@ -73,14 +93,29 @@ def numbers(family: str, *, for_training: bool) -> list[int]:
     return [number for number in range(count) if not held_out(number)]
 
 
+def sketched(family: str, seed: int) -> bool:
+    """Whether an instance is a sketch: in plain colours, and one of a class of a few solids.
+
+    So are all people from number 48 on.
+    """
+    below = VALIDATION_BELOW if family in _CLASS_MAKERS else DISTRACTOR_VALIDATION_BELOW
+    if seed < below or family in _PLAIN_AS_A_CLASS:
+        return False
+    return family == "person" or seed % 5 in SKETCHED_OF_FIVE
+
+
 def make(family: str, seed: int) -> tuple[Finished, str, str]:
     """Make an instance without writing it: the model, its kind and its main colour. Raises KeyError, ValueError."""
-    maker = _CLASS_MAKERS.get(family) or DISTRACTOR_MAKERS.get(family)
+    plain = sketched(family, seed)
+    makers = SKETCH_MAKERS if plain else _CLASS_MAKERS
+    maker = makers.get(family) or DISTRACTOR_MAKERS.get(family)
     if maker is None:
         raise KeyError(f"no family {family!r}; there are {', '.join((*CLASSES, *DISTRACTORS))}")
     if seed < 0:
         raise ValueError(f"an instance's number is 0 or more, not {seed}")
-    return maker(Draft(np.random.default_rng([seed, *family.encode()])))
+    draft = Draft(np.random.default_rng([seed, *family.encode()]))
+    made, kind, colour = maker(draft)
+    return (plainly_painted(made, draft.rng) if plain and family in DISTRACTOR_MAKERS else made), kind, colour
 
 
 def instance(family: str, seed: int) -> ObjectModel:

@@ -4,6 +4,8 @@
 `errand dataset score --data OUT/val.json` reads. In each scene things of the classes and others lie on four surfaces,
 an extinguisher and a person stand on the floor; every tenth scene holds others only. Eight pictures are taken of each,
 three in five by the hand camera, the rest by the body's cameras; noise and light are the plant's.
+
+With `--foreign FOLDER` they are things that others modelled (`foreign_models.py`), which are written to that folder.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -39,7 +41,7 @@ from plant.dataset.views import (
     roll_deg,
 )
 from plant.diagram import LooseModel, WorldDiagram, build_diagram
-from plant.models.families import DISTRACTORS
+from plant.models.families import DISTRACTORS, ObjectModel
 from plant.pictures import look_at
 from plant.scene import RENDERER
 from plant.sensors.camera_noise import PictureDegrader, PictureNoise
@@ -50,6 +52,7 @@ from skills.api import Surface
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.robot import Pose2D
 from tests.benchmarks.find_things import LYING_ABOUT, held_out_instance, middle, scattered
+from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, supplied
 
 VIEWS = 8
 SURFACES_IN_USE = 4
@@ -61,6 +64,28 @@ TRIES = 100
 
 FloatArray = NDArray[np.float64]
 Picture = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Supply:
+    """Where things come from: the families that may lie about, those of no class, and one of a family by chance."""
+
+    lying_about: Sequence[str]
+    others: Sequence[str]
+    take: Callable[[np.random.Generator, str], ObjectModel]
+
+
+HELD_OUT = Supply(LYING_ABOUT, DISTRACTORS, held_out_instance)
+
+
+def foreign(folder: Path, catalogues: Path) -> Supply:
+    """Things that others modelled, written to a folder."""
+    models = supplied(folder, catalogues)
+
+    def take(rng: np.random.Generator, family: str) -> ObjectModel:
+        return models[family][int(rng.integers(len(models[family])))]
+
+    return Supply([name for name in LYING_ABOUT if name in models], (OTHERS,), take)
 
 
 @dataclass(frozen=True)
@@ -85,9 +110,9 @@ class Stage:
         return np.ascontiguousarray(colour.data[..., :3]), np.array(labels.data[..., 0], dtype=np.int16)
 
 
-def furnished(rng: np.random.Generator, world: World, free: GridMap, *, bare: bool) -> Stage:
-    """The flat with held-out things on some surfaces and on the floor; of no class if `bare`."""
-    things = [*_on_surfaces(rng, world, bare=bare), *(() if bare else _on_the_floor(rng, free))]
+def furnished(rng: np.random.Generator, world: World, free: GridMap, supply: Supply, *, bare: bool) -> Stage:
+    """The flat with things on some surfaces and on the floor; of no class if `bare`."""
+    things = [*_on_surfaces(rng, world, supply, bare=bare), *(() if bare else _on_the_floor(rng, free, supply))]
     loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(things)]
     built = build_diagram(
         directives=world.directives_path,
@@ -102,21 +127,21 @@ def furnished(rng: np.random.Generator, world: World, free: GridMap, *, bare: bo
     return Stage(built, query, {int(body): thing for body, thing in zip(bodies, things, strict=True)})
 
 
-def _on_surfaces(rng: np.random.Generator, world: World, *, bare: bool) -> Iterator[Placed]:
+def _on_surfaces(rng: np.random.Generator, world: World, supply: Supply, *, bare: bool) -> Iterator[Placed]:
     facts = knowledge_of(world).surfaces
     for name in rng.choice(sorted(facts), min(SURFACES_IN_USE, len(facts)), replace=False):
         fact = facts[str(name)]
         surface = Surface(str(name), tuple((float(x), float(y)) for x, y in fact.polygon), fact.height)
         seen_from = fact.viewpoints[int(rng.integers(len(fact.viewpoints)))]
-        classes = [] if bare else [str(each) for each in rng.choice(LYING_ABOUT, 3)]
-        models = [held_out_instance(rng, each) for each in (*classes, *rng.choice(DISTRACTORS, 2 + 3 * bare))]
+        classes = [] if bare else [str(each) for each in rng.choice(supply.lying_about, 3)]
+        models = [supply.take(rng, str(each)) for each in (*classes, *rng.choice(supply.others, 2 + 3 * bare))]
         yield from scattered(rng, models, surface, Pose2D(seen_from.x, seen_from.y, seen_from.yaw))
 
 
-def _on_the_floor(rng: np.random.Generator, free: GridMap) -> Iterator[Placed]:
+def _on_the_floor(rng: np.random.Generator, free: GridMap, supply: Supply) -> Iterator[Placed]:
     taken: list[FloatArray] = []
-    for family in ("person", "extinguisher", str(rng.choice(LYING_ABOUT))):
-        model = held_out_instance(rng, family)
+    for family in ("person", "extinguisher", str(rng.choice(supply.lying_about))):
+        model = supply.take(rng, family)
         rest = choose(rng, model, resting_poses(model))
         places = rng.permutation(_floor_points(free, ROOM_FOR_PEOPLE_M))
         xy = next((p for p in places if _clear_of(p, taken)), None)
@@ -201,14 +226,14 @@ def taken(rng: np.random.Generator, stage: Stage, view: View) -> tuple[Picture, 
     return picture, label_view(labelled, labels, view, RigidTransform(), picture)
 
 
-def shots(out: Path, seed: int, scenes: int) -> Iterator[dict[str, Any]]:
+def shots(out: Path, seed: int, scenes: int, supply: Supply) -> Iterator[dict[str, Any]]:
     """Pictures written to a folder, with their entries; the same for the same seed."""
     world = open_world("flat")
     free = load_grid_map(world.keepout_map_path)
     for index in range(scenes):
         rng = np.random.default_rng([seed, index, 17])
         bare = index % ONLY_DISTRACTORS_EVERY == ONLY_DISTRACTORS_EVERY - 1
-        here = furnished(rng, world, free, bare=bare)
+        here = furnished(rng, world, free, supply, bare=bare)
         for number, view in enumerate(list(views(rng, here, free))):
             picture, labels = taken(rng, here, view)
             name = f"{index:04d}_{number}.png"
@@ -226,10 +251,13 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--scenes", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--foreign", type=Path)
+    parser.add_argument("--catalogues", type=Path, default=CATALOGUES)
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
-    every = list(shots(args.out, args.seed, args.scenes))
-    told = document({"description": "Errand: held-out things in the flat", "seed": args.seed, "split": "val"}, every)
+    supply = HELD_OUT if args.foreign is None else foreign(args.foreign, args.catalogues)
+    every = list(shots(args.out, args.seed, args.scenes, supply))
+    told = document({"description": "Errand: things in the flat", "seed": args.seed, "split": "val"}, every)
     (args.out / "val.json").write_text(json.dumps(told), encoding="utf-8")
     counted = sum(not label["ignore"] for shot in every for label in shot["annotations"])
     sys.stdout.write(f"{args.out / 'val.json'}: {len(every)} pictures, {counted} labels that count\n")

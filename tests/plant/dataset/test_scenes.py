@@ -53,6 +53,14 @@ def test_a_bottle_stands_or_lies_and_a_person_only_stands() -> None:
     assert 0.5 < np.mean(upright) < 0.9
 
 
+def test_things_to_learn_from_lie_more_often_than_is_usual_and_people_do_not() -> None:
+    # Of 400 by chance: an extinguisher stands 0.9 of the time, toppled 0.675.
+    thing, person, rng = instance("extinguisher", 0), instance("person", 48), np.random.default_rng(1)
+    standing = [choose(rng, thing, resting_poses(thing), toppled=True).upright for _ in range(400)]
+    assert np.mean(standing) == pytest.approx(0.675, abs=0.06)
+    assert all(choose(rng, person, resting_poses(person), toppled=True).upright for _ in range(60))
+
+
 @pytest.mark.parametrize("family", ["cube", "cylinder", "coke"])
 def test_drake_leaves_a_standing_thing_where_it_was_put(family: str) -> None:
     model = instance(family, 1)

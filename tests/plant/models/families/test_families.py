@@ -11,7 +11,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from plant.models.catalogue import load_catalogue
-from plant.models.families import CLASSES, DISTRACTORS, held_out, instance, make, numbers
+from plant.models.families import CLASSES, DISTRACTORS, held_out, instance, make, numbers, sketched
 
 SMALL = tuple(name for name in CLASSES if name != "person")
 
@@ -73,6 +73,39 @@ def test_validation_sees_the_same_instances_however_many_there_are() -> None:
     # family: held-out numbers
     expected = {"hammer": list(range(3, 48, 4)), "person": list(range(3, 48, 4)), "mug": [3, 7]}
     assert {family: numbers(family, for_training=False) for family in expected} == expected
+
+
+def test_validation_sees_no_sketches() -> None:
+    assert not any(
+        sketched(family, n) for family in (*CLASSES, *DISTRACTORS) for n in numbers(family, for_training=False)
+    )
+
+
+def test_two_fifths_of_the_later_instances_are_sketches_and_so_are_all_later_people() -> None:
+    later = [number for number in numbers("hammer", for_training=True) if number >= 48]
+    assert sum(sketched("hammer", number) for number in later) / len(later) == pytest.approx(0.4, abs=0.01)
+    assert all(sketched("person", number) for number in numbers("person", for_training=True) if number >= 48)
+
+
+@pytest.mark.parametrize("family", CLASSES)
+def test_a_sketch_has_plain_colours_alone_and_the_size_of_the_real_thing(family: str) -> None:
+    masses, sides = RANGES[family]
+    for seed in [number for number in range(48, 120) if sketched(family, number)][:12]:
+        made, kind, _ = make(family, seed)
+        assert (kind, made.pictures) == ("sketch", {})
+        assert masses[0] <= made.mass.mass_kg <= masses[1], (seed, made.mass.mass_kg)
+        assert sides[0] <= max(made.size_m) <= sides[1], (seed, made.size_m)
+
+
+def test_a_sketch_of_a_thing_of_no_class_keeps_its_form_and_loses_its_pictures() -> None:
+    made, kind, _ = make("cereal_box", 10)
+    assert sketched("cereal_box", 10)
+    assert (kind, made.pictures) == ("cereal box", {})
+    assert all(material.texture is None for material in made.mesh.materials.values())
+
+
+def test_what_would_pass_for_a_class_without_its_picture_keeps_it() -> None:
+    assert not any(sketched(family, 10) for family in ("food_can", "wine_bottle", "tissue_box"))
 
 
 def test_there_are_nine_classes_with_thirty_instances_and_forty_distractors() -> None:

@@ -2,7 +2,8 @@
 
 Boxes of one thing in several looks are fused after Solovyev et al., "Weighted boxes fusion" (2021); parts that are
 shown larger serve small things, after Akyon et al., "Slicing aided hyper inference" (2022). A thing is judged by the
-looks that show all of it, neither small nor very large. It takes as many times longer as there are looks.
+looks that show all of it, neither small nor very large; a person by those at the whole picture. It takes as many times
+longer as there are looks.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ Box = tuple[float, float, float, float]
 _SAME_THING = 0.55
 _LEAST_SCORE = 0.05
 _LEAST_SIDE_PX, _MOST_SIDE_PX = 64.0, 240.0
+_LARGE_CLASSES: Final = frozenset({"person"})
+_LEAST_LARGE_SIDE_PX: Final = 140.0
 _MARGIN = 0.003
 _WHOLE: Final = (0.0, 0.0, 1.0, 1.0)
 _CORNERS: Final = (
@@ -74,11 +77,19 @@ class Variant:
 
         Sizes are those in the letterbox, which the network sees.
         """
-        u0, v0, u1, v1 = self._edges_px(shape)
-        larger = Letterbox(width_px=u1 - u0, height_px=v1 - v0).scale_xy[0]
-        side_px = max(box[2] - box[0], box[3] - box[1]) * self.scale * larger
+        side_px = self._side_px(box, shape)
         large_enough = self.scale == 1.0 or side_px >= _LEAST_SIDE_PX
         return large_enough and side_px <= _MOST_SIDE_PX and self.shows_all(box, shape)
+
+    def suits_large(self, box: Box, shape: Sequence[int]) -> bool:
+        """Whether it is of the whole picture, and does not make a thing of a large kind with a box in it small."""
+        return self.part == _WHOLE and (self.scale == 1.0 or self._side_px(box, shape) >= _LEAST_LARGE_SIDE_PX)
+
+    def _side_px(self, box: Box, shape: Sequence[int]) -> float:
+        """The longer side, in the letterbox, of what has a box in the picture."""
+        u0, v0, u1, v1 = self._edges_px(shape)
+        larger = Letterbox(width_px=u1 - u0, height_px=v1 - v0).scale_xy[0]
+        return max(box[2] - box[0], box[3] - box[1]) * self.scale * larger
 
     def shows_all(self, box: Box, shape: Sequence[int]) -> bool:
         """Whether the part does not cut off what has a box in the picture."""
@@ -174,7 +185,8 @@ class CarefulDetector:
         Where none suits, all are asked.
         """
         looks = range(len(self.variants))
-        suiting = [number for number in looks if self.variants[number].suits(group.box, shape)] or looks
+        suits = Variant.suits_large if group.class_name in _LARGE_CLASSES else Variant.suits
+        suiting = [number for number in looks if suits(self.variants[number], group.box, shape)] or looks
         seen = [group.seen[number] for number in suiting if number in group.seen]
         told = seen or list(group.seen.values())
         box = np.average([box for _, box in told], axis=0, weights=[score for score, _ in told])

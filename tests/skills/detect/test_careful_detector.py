@@ -19,7 +19,7 @@ VARIANTS = (Variant(), Variant(mirrored=True), Variant(scale=0.5))
 def looked(tmp_path, monkeypatch):
     model = load_detector(write_model(tmp_path / "tiny.onnx")).model
 
-    def look(*answers, variants=VARIANTS, least_score=None):
+    def look(*answers, variants=VARIANTS, least_score=None, model=model):
         monkeypatch.setattr(OnnxDetector, "detect", lambda self, pictures: [tuple(found) for found in answers])
         return CarefulDetector(OnnxDetector(model), variants).detect_carefully(SEEN, least_score)
 
@@ -66,6 +66,20 @@ def test_what_is_very_large_is_judged_where_it_is_smaller(looked):
         [Detection("hammer", 0.8, (50.0, 25.0, 250.0, 75.0))],
     )
     assert [(one.class_name, one.score) for one in found] == [("hammer", pytest.approx(0.8))]
+
+
+def test_a_person_is_judged_at_the_whole_picture_unless_that_makes_them_small(looked, tmp_path):
+    # 400 pixels high, 200 at half the size, 80 at a fifth, which counts as little as the part that shows all of them
+    box = (100.0, 40.0, 200.0, 440.0)
+    variants = (Variant(), Variant(scale=0.5), Variant(scale=0.2), Variant(part=(0.0, 0.0, 0.5, 1.0)))
+    (found,) = looked(
+        [Detection("person", 0.9, box)],
+        [Detection("person", 0.7, (50.0, 20.0, 100.0, 220.0))],
+        [],
+        [],
+        variants=variants,
+    )
+    assert (found.class_name, found.score) == ("person", pytest.approx(0.8))
 
 
 def test_a_look_at_a_part_that_shows_all_of_a_thing_counts(looked):

@@ -72,13 +72,9 @@ def test_a_person_is_judged_at_the_whole_picture_unless_that_makes_them_small(lo
     # 400 pixels high, 200 at half the size, 80 at a fifth, which counts as little as the part that shows all of them
     box = (100.0, 40.0, 200.0, 440.0)
     variants = (Variant(), Variant(scale=0.5), Variant(scale=0.2), Variant(part=(0.0, 0.0, 0.5, 1.0)))
-    (found,) = looked(
-        [Detection("person", 0.9, box)],
-        [Detection("person", 0.7, (50.0, 20.0, 100.0, 220.0))],
-        [],
-        [],
-        variants=variants,
-    )
+    model = load_detector(write_model(tmp_path / "people.onnx", classes=("beer", "person"))).model
+    half = Detection("person", 0.7, (50.0, 20.0, 100.0, 220.0))
+    (found,) = looked([Detection("person", 0.9, box)], [half], [], [], variants=variants, model=model)
     assert (found.class_name, found.score) == ("person", pytest.approx(0.8))
 
 

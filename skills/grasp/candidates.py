@@ -16,7 +16,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.robot import FloatArray
 
-_ABOVE_SURFACE_M = 0.006
+_ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M = 0.009, 0.006
 _LEAST_GRIP_M = 0.014
 _LEAST_BEYOND_M = 0.004
 
@@ -154,10 +154,12 @@ def _candidate(
         cost = station.cost + 0.4 * abs(tilt - np.radians(10.0))
     else:
         height = 0.5 * target.height_m
-        above = _ABOVE_SURFACE_M + 0.4 * max(0.0, target.height_m - 0.03)
-        beyond = (height - above - _tip_drop(R_BH, station.width_m, jaw)) / -R_BH.matrix()[2, 0]
+        down = -R_BH.matrix()[2, 0]
         least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
-        if beyond < least or height + beyond * -R_BH.matrix()[2, 0] < _LEAST_GRIP_M:
+        room = height - _tip_drop(R_BH, station.width_m, jaw)
+        above = _above_surface(target.height_m, room - least * down)
+        beyond = (room - above) / down
+        if beyond < least or height + beyond * down < _LEAST_GRIP_M:
             return None
         depth = jaw.tip_x - beyond
         cost = station.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
@@ -166,6 +168,12 @@ def _candidate(
     p_BT = np.array([*station.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
     return GraspCandidate(X_BH, station.width_m, float(cost), tilt)
+
+
+def _above_surface(height_m: float, spare_m: float) -> float:
+    """How far the fingertips stay above the surface (m): more for what is high, less where a flat thing spares less."""
+    usual = _ABOVE_SURFACE_M + 0.4 * max(0.0, height_m - 0.03)
+    return float(np.clip(spare_m - 1e-6, _LEAST_ABOVE_SURFACE_M, usual))
 
 
 def _tip_drop(R_BH: RotationMatrix, width_m: float, jaw: JawGeometry) -> float:

@@ -63,6 +63,21 @@ def test_fingertips_keep_off_the_surface():
                 assert (candidate.X_BH @ np.array([jaw.tip_x, y, jaw.fixed_z]))[2] > target.base_m + 0.002
 
 
+@pytest.mark.parametrize(("height_m", "room_m"), [(0.030, 0.009), (0.022, 0.006)])
+def test_fingertips_stay_further_off_the_surface_where_a_thing_is_high_enough(height_m, room_m):
+    # a plain rod, straight from above: half of 30 mm leaves 9 mm and a grip, half of 22 mm less, but 6 mm at least
+    jaw, base = JawGeometry(), 0.2
+    straight = [
+        candidate
+        for candidate in grasp_candidates(_target(0.25, 0.02, height_m, base=base), MODEL.p_BS)
+        if candidate.X_BH.rotation().matrix()[2, 0] < -0.999
+    ]
+    assert straight
+    for candidate in straight:
+        tip = (candidate.X_BH @ np.array([jaw.tip_x, 0.0, jaw.fixed_z]))[2] - base
+        assert room_m - 1e-6 <= tip < room_m + 0.002
+
+
 def test_a_thing_wider_than_the_jaw_has_no_candidates():
     assert grasp_candidates(_target(0.25, 0.2, 0.05), MODEL.p_BS) == []
 

@@ -1,4 +1,4 @@
-"""Catalogues of models that others made are read as they are told: sizes, turns, faces, colours."""
+"""Catalogues of models that others made are read as they are told: classes, sizes, faces."""
 
 from __future__ import annotations
 
@@ -57,9 +57,7 @@ def test_tools_are_of_their_class_small_things_of_none_and_lamps_and_furniture_a
     assert {entry.name: entry.family for entry in entries(catalogues / "Some.sh3f")} == expected
 
 
-def test_a_model_has_the_size_that_its_catalogue_tells_with_z_up_and_its_colour(
-    catalogues: Path, tmp_path: Path
-) -> None:
+def test_a_model_has_the_size_that_its_catalogue_tells_with_z_up(catalogues: Path, tmp_path: Path) -> None:
     made = supplied(tmp_path / "models", catalogues)
     (hammer,) = made["hammer"]
     assert hammer.size_m == pytest.approx((0.30, 0.12, 0.05))

@@ -124,14 +124,14 @@ def hammer(draft: Draft) -> tuple[Finished, str, str]:
         _coloured(draft, "head")
     x = half - wide
     _rod(draft, "colour", -half, x if rng.random() < 0.7 else half + wide, thick, WOOD)
-    for part, R in _hammer_head(draft, reach, wide, x):
+    for part, R in _hammer_head(draft, reach, wide):
         draft.solid(part, STEEL * 0.6, R, (x, 0, 0))
     draft.collide_box((-half, -thick, -thick), (x, thick, thick))
     draft.collide_box((x - wide, -reach, -wide), (x + wide, reach, wide))
     return draft.finish(), KIND, word
 
 
-def _hammer_head(draft: Draft, reach: float, wide: float, x: float) -> list[tuple[Mesh, FloatArray]]:
+def _hammer_head(draft: Draft, reach: float, wide: float) -> list[tuple[Mesh, FloatArray]]:
     """Parts of a head about the origin, each with its turn."""
     rng, part = draft.rng, draft.part()
     style = str(rng.choice(["block", "drum", "ends", "wedge", "ball"], p=[0.22, 0.22, 0.26, 0.2, 0.1]))
@@ -220,7 +220,7 @@ def _fork(draft: Draft, x: float, way: float, head: float, thick: float) -> None
 
 
 def extinguisher(draft: Draft) -> tuple[Finished, str, str]:
-    """A red cylinder with a dome, a neck, a black handle, and sometimes a hose, a band or a foot."""
+    """A red cylinder with a dome, a neck, a black handle, and sometimes a hose, a horn or a band."""
     rng = draft.rng
     r = float(rng.uniform(0.045, 0.095))
     h = r * float(rng.uniform(3.4, 5.6))
@@ -276,11 +276,8 @@ def beer(draft: Draft) -> tuple[Finished, str, str]:
     )
     draft.paint("cap", pick(rng, (0.75, 0.62, 0.2), (0.75, 0.75, 0.77), (0.7, 0.1, 0.1), (0.08, 0.08, 0.08)))
     r, h = float(rng.uniform(0.028, 0.037)), float(rng.uniform(0.19, 0.27))
-    mouth, shoulder, neck = (
-        r * float(rng.uniform(0.35, 0.45)),
-        float(rng.uniform(0.5, 0.66)),
-        float(rng.uniform(0.7, 0.8)),
-    )
+    mouth = r * float(rng.uniform(0.35, 0.45))
+    shoulder, neck = float(rng.uniform(0.5, 0.66)), float(rng.uniform(0.7, 0.8))
     part = draft.part()
     part.add_lathe("glass", [(0, 0), (r, 0), (r, shoulder * h), (mouth, neck * h), (mouth, h), (0, h)], sides=32)
     draft.solid(part, 0.5 * GLASS)

@@ -21,7 +21,7 @@ from plant.models.families.hammers import hammer
 from plant.models.families.model import ObjectModel, Surface, held_out, read_model, write_model
 from plant.models.families.people import person
 from plant.models.families.screwdrivers import screwdriver
-from plant.models.families.sketches import SKETCH_MAKERS, plainly_painted
+from plant.models.families.sketches import SKETCH_MAKERS, in_one_colour, plainly_painted
 from plant.models.families.wrenches import wrench
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "instance",
     "make",
     "numbers",
+    "repainted",
     "sketched",
     "sources_digest",
 ]
@@ -49,6 +50,10 @@ VALIDATION_BELOW, DISTRACTOR_VALIDATION_BELOW = 48, 8
 """Validation takes held-out instances below these numbers, so that its pictures stay the same when more are added."""
 SKETCHED_OF_FIVE = (0, 2)
 """Of the instances that validation does not take, those whose number leaves these when divided by five are sketches."""
+REPAINTED_OF_FIVE = 4
+"""Of those of some classes, the ones whose number leaves this are detailed in form and plain in colour."""
+_ONE_COLOUR: Mapping[str, float] = {"extinguisher": 0.0, "hammer": 0.4, "screwdriver": 0.4, "wrench": 0.4}
+"""Those classes, and how often they are of a single colour: not what is told by its colours."""
 _PLAIN_AS_A_CLASS = frozenset(
     {
         "battery",
@@ -104,6 +109,11 @@ def sketched(family: str, seed: int) -> bool:
     return family == "person" or seed % 5 in SKETCHED_OF_FIVE
 
 
+def repainted(family: str, seed: int) -> bool:
+    """Whether an instance of a class is of its usual form, but in plain colours without pictures."""
+    return family in _ONE_COLOUR and seed >= VALIDATION_BELOW and seed % 5 == REPAINTED_OF_FIVE
+
+
 def make(family: str, seed: int) -> tuple[Finished, str, str]:
     """Make an instance without writing it: the model, its kind and its main colour. Raises KeyError, ValueError."""
     plain = sketched(family, seed)
@@ -115,7 +125,14 @@ def make(family: str, seed: int) -> tuple[Finished, str, str]:
         raise ValueError(f"an instance's number is 0 or more, not {seed}")
     draft = Draft(np.random.default_rng([seed, *family.encode()]))
     made, kind, colour = maker(draft)
-    return (plainly_painted(made, draft.rng) if plain and family in DISTRACTOR_MAKERS else made), kind, colour
+    if plain and family in DISTRACTOR_MAKERS:
+        made = plainly_painted(made, draft.rng)
+    if repainted(family, seed) and draft.rng.random() < _ONE_COLOUR[family]:
+        made, colour = in_one_colour(made, draft.rng)
+        return made, kind, colour
+    if repainted(family, seed):
+        made = plainly_painted(made, draft.rng, own_colours=1.0)
+    return made, kind, colour
 
 
 def instance(family: str, seed: int) -> ObjectModel:

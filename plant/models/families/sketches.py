@@ -9,6 +9,7 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +33,7 @@ from plant.models.families.draft import (
     varied,
 )
 
-__all__ = ["SKETCH_MAKERS", "plainly_painted"]
+__all__ = ["SKETCH_MAKERS", "in_one_colour", "plainly_painted"]
 
 FloatArray = NDArray[np.float64]
 Maker = Callable[[Draft], tuple[Finished, str, str]]
@@ -61,9 +62,9 @@ _GREYS: tuple[Colour, ...] = (
 )
 
 
-def plainly_painted(made: Finished, rng: np.random.Generator) -> Finished:
-    """The same thing with every picture on it replaced by its mean colour, or by any plain one."""
-    own = rng.random() < 0.5
+def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: float = 0.5) -> Finished:
+    """The same thing with every picture on it replaced by its mean colour (so often), or by any plain one."""
+    own = rng.random() < own_colours
     painted: dict[str, Material] = {}
     for name, material in made.mesh.materials.items():
         picture = made.pictures.get(material.texture or "")
@@ -74,6 +75,17 @@ def plainly_painted(made: Finished, rng: np.random.Generator) -> Finished:
     mesh = Mesh(painted)
     mesh.add_mesh(made.mesh)
     return replace(made, mesh=mesh, pictures={})
+
+
+def in_one_colour(made: Finished, rng: np.random.Generator) -> tuple[Finished, str]:
+    """The same thing in a single plain colour, as it comes from a drawing; what one would call that."""
+    word, colour = _COLOURS[int(rng.integers(len(_COLOURS)))]
+    if rng.random() < 0.6:
+        word, colour = "grey", pick(rng, *_GREYS)
+    paint = Material(varied(rng, colour, 0.04), None, None, float(rng.uniform(0.0, 0.6)), 0.0)
+    mesh = Mesh(dict.fromkeys(made.mesh.materials, paint))
+    mesh.add_mesh(made.mesh)
+    return replace(made, mesh=mesh, pictures={}), word
 
 
 def _coloured(draft: Draft, name: str = "colour") -> str:
@@ -97,8 +109,10 @@ def _drum(part: Mesh, material: str, radius: float, z0: float, z1: float, *, sid
 
 
 def _rod(draft: Draft, material: str, x0: float, x1: float, radius: float, density: float) -> None:
-    """A box, a cylinder, a prism or a capsule along x."""
-    part, style = draft.part(), str(draft.rng.choice(["cylinder", "capsule", "box", "flat", "prism"]))
+    """A box, a cylinder, a prism, a capsule or a stack of drums along x."""
+    part, style = draft.part(), str(draft.rng.choice(["cylinder", "capsule", "box", "flat", "prism", "stack"]))
+    if style == "stack":
+        return _stack(draft, material, x0, x1, radius, density)
     if style in ("box", "flat"):
         half = radius * (0.55 if style == "flat" else 0.9)
         part.add_box(material, (x0, -radius, -half), (x1, radius, half))
@@ -110,6 +124,25 @@ def _rod(draft: Draft, material: str, x0: float, x1: float, radius: float, densi
     else:
         _drum(part, material, radius, x0, x1, sides=32 if style == "cylinder" else int(draft.rng.choice([6, 8])))
     return draft.solid(part, density, UP_TO_X)
+
+
+def _stack(draft: Draft, material: str, x0: float, x1: float, radius: float, density: float) -> None:
+    """Two to five drums along x, of other radii; some of another colour."""
+    rng = draft.rng
+    _coloured(draft, "collar")
+    inner = np.sort(rng.uniform(0.1, 0.9, int(rng.integers(1, 5))))
+    breaks = x0 + (x1 - x0) * np.concatenate([[0.0], inner, [1.0]])
+    for low, high in pairwise(breaks):
+        part = draft.part()
+        _drum(part, "collar" if rng.random() < 0.3 else material, radius * float(rng.uniform(0.6, 1.15)), low, high)
+        draft.solid(part, density, UP_TO_X)
+
+
+def _patch(part: Mesh, material: str, radius: float, z_m: tuple[float, float], about_deg: tuple[float, float]) -> None:
+    """A label on a cylinder along z: over these heights, from one angle about it to another."""
+    outer = arc((0, 0), radius * 1.006, about_deg[0], about_deg[1], 16)
+    inner = arc((0, 0), radius * 0.99, about_deg[1], about_deg[0], 16)
+    add_extruded(part, material, np.concatenate([outer, inner]), *z_m)
 
 
 def hammer(draft: Draft) -> tuple[Finished, str, str]:
@@ -282,9 +315,12 @@ def beer(draft: Draft) -> tuple[Finished, str, str]:
     part.add_lathe("glass", [(0, 0), (r, 0), (r, shoulder * h), (mouth, neck * h), (mouth, h), (0, h)], sides=32)
     draft.solid(part, 0.5 * GLASS)
     looks = draft.part()
-    if rng.random() < 0.75:
-        low = float(rng.uniform(0.08, 0.25))
-        looks.add_lathe("label", [(r * 1.006, low * h), (r * 1.006, (shoulder - 0.06) * h)], sides=32)
+    low = float(rng.uniform(0.08, 0.25)) * h
+    if (label := rng.random()) < 0.55:
+        looks.add_lathe("label", [(r * 1.006, low), (r * 1.006, (shoulder - 0.06) * h)], sides=32)
+    elif label < 0.75:
+        wide = float(rng.uniform(40, 110))
+        _patch(looks, "label", r, (low, (shoulder - 0.06) * h), (-wide, wide))
     if rng.random() < 0.6:
         looks.add_lathe("cap", [(mouth * 1.12, h - 0.008), (mouth * 1.12, h + 0.001), (0, h + 0.001)], sides=24)
     draft.look(looks)
@@ -294,7 +330,7 @@ def beer(draft: Draft) -> tuple[Finished, str, str]:
 
 
 def coke(draft: Draft) -> tuple[Finished, str, str]:
-    """A red can with bare ends, with or without a white stripe, or a dark bottle with a red label and cap."""
+    """A red can with a white stripe or patch, seldom with bare ends alone, or a dark bottle with red label and cap."""
     rng = draft.rng
     draft.paint(
         "red", varied(rng, pick(rng, (0.82, 0.03, 0.05), (0.9, 0.05, 0.04), (0.70, 0.02, 0.04))), shine=_shine(draft)
@@ -305,17 +341,23 @@ def coke(draft: Draft) -> tuple[Finished, str, str]:
     if rng.random() < 0.3:
         return _cola_bottle(draft), KIND, "red"
     r, h = float(rng.uniform(0.028, 0.034)), float(rng.uniform(0.10, 0.16))
-    part, ends = draft.part(), float(rng.choice([0.0, 0.03, 0.06])) * h
-    edge = r * float(rng.uniform(0.8, 1.0))
-    rim = "metal" if rng.random() < 0.75 else "red"
+    bare = rng.random() < 0.12
+    part, ends = draft.part(), 0.06 * h if bare else float(rng.choice([0.0, 0.03, 0.06])) * h
+    edge = r * float(rng.uniform(0.8, 0.9 if bare else 1.0))
+    rim = "metal" if bare or rng.random() < 0.75 else "red"
     part.add_lathe(rim, [(0, 0), (edge, 0), (r, ends + 1e-4)], sides=36)
     part.add_lathe("red", [(r, ends + 1e-4), (r, h - ends - 1e-4)], sides=36)
     part.add_lathe(rim, [(r, h - ends - 1e-4), (edge, h), (0, h)], sides=36)
     draft.solid(part, 0.4 * ALUMINIUM)
-    if rim == "red" or rng.random() < 0.6:
+    if not bare:
         low, tall = float(rng.uniform(0.2, 0.6)), float(rng.uniform(0.06, 0.25))
         stripe = draft.part()
-        stripe.add_lathe("white", [(r * 1.005, low * h), (r * 1.005, (low + tall) * h)], sides=36)
+        if rng.random() < 0.6:
+            stripe.add_lathe("white", [(r * 1.005, low * h), (r * 1.005, (low + tall) * h)], sides=36)
+        else:
+            wide, heights = float(rng.uniform(15, 70)), (0.12 * h, float(rng.uniform(0.5, 0.88)) * h)
+            for middle in (0.0, 180.0):
+                _patch(stripe, "white", r, heights, (middle - wide, middle + wide))
         draft.look(stripe)
     draft.collide_upright(r, 0.0, h)
     return draft.finish(), KIND, "red"

@@ -11,7 +11,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from plant.models.catalogue import load_catalogue
-from plant.models.families import CLASSES, DISTRACTORS, held_out, instance, make, numbers, sketched
+from plant.models.families import CLASSES, DISTRACTORS, held_out, instance, make, numbers, repainted, sketched
 
 SMALL = tuple(name for name in CLASSES if name != "person")
 
@@ -75,9 +75,11 @@ def test_validation_sees_the_same_instances_however_many_there_are() -> None:
     assert {family: numbers(family, for_training=False) for family in expected} == expected
 
 
-def test_validation_sees_no_sketches() -> None:
+def test_validation_sees_no_sketches_and_nothing_repainted() -> None:
     assert not any(
-        sketched(family, n) for family in (*CLASSES, *DISTRACTORS) for n in numbers(family, for_training=False)
+        sketched(family, n) or repainted(family, n)
+        for family in (*CLASSES, *DISTRACTORS)
+        for n in numbers(family, for_training=False)
     )
 
 
@@ -102,6 +104,25 @@ def test_a_sketch_of_a_thing_of_no_class_keeps_its_form_and_loses_its_pictures()
     assert sketched("cereal_box", 10)
     assert (kind, made.pictures) == ("cereal box", {})
     assert all(material.texture is None for material in made.mesh.materials.values())
+
+
+@pytest.mark.parametrize("family", ["extinguisher", "hammer", "screwdriver", "wrench"])
+def test_a_repainted_thing_keeps_its_form_and_loses_its_pictures(family: str) -> None:
+    seeds = [number for number in range(48, 80) if repainted(family, number)][:4]
+    for seed in seeds:
+        made, kind, _ = make(family, seed)
+        assert (kind != "sketch", made.pictures) == (True, {})
+        assert {made.mesh.materials[name].texture for name, *_ in made.mesh.groups()} == {None}
+    assert len(seeds) == 4
+
+
+def test_some_repainted_tools_are_of_one_colour_and_no_extinguisher_is() -> None:
+    def colours(family: str) -> list[int]:
+        made = [make(family, number)[0] for number in range(48, 80) if repainted(family, number)]
+        return [len({material.colour for material in each.mesh.materials.values()}) for each in made]
+
+    assert 1 in colours("hammer")
+    assert min(colours("extinguisher")) > 1
 
 
 def test_what_would_pass_for_a_class_without_its_picture_keeps_it() -> None:

@@ -5,7 +5,8 @@
 an extinguisher and a person stand on the floor; every tenth scene holds others only. Eight pictures are taken of each,
 three in five by the hand camera, the rest by the body's cameras; noise and light are the plant's.
 
-With `--foreign FOLDER` they are things that others modelled (`foreign_models.py`), which are written to that folder.
+With `--foreign FOLDER` they are things that others modelled (`foreign_models.py`), which are written to that folder,
+and with `--scans STL_FOLDER` those that others scanned (`scanned_models.py`), too.
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.robot import Pose2D
 from tests.benchmarks.find_things import LYING_ABOUT, held_out_instance, middle, scattered
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, supplied
+from tests.benchmarks.scanned_models import scanned
 
 VIEWS = 8
 SURFACES_IN_USE = 4
@@ -78,9 +80,11 @@ class Supply:
 HELD_OUT = Supply(LYING_ABOUT, DISTRACTORS, held_out_instance)
 
 
-def foreign(folder: Path, catalogues: Path) -> Supply:
-    """Things that others modelled, written to a folder."""
+def foreign(folder: Path, catalogues: Path, scans: Path | None) -> Supply:
+    """Things that others modelled, and where told to be those that others scanned, written to a folder."""
     models = supplied(folder, catalogues)
+    for family, more in (scanned(folder, scans) if scans is not None else {}).items():
+        models[family] = [*models.get(family, ()), *more]
 
     def take(rng: np.random.Generator, family: str) -> ObjectModel:
         return models[family][int(rng.integers(len(models[family])))]
@@ -253,9 +257,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--foreign", type=Path)
     parser.add_argument("--catalogues", type=Path, default=CATALOGUES)
+    parser.add_argument("--scans", type=Path)
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
-    supply = HELD_OUT if args.foreign is None else foreign(args.foreign, args.catalogues)
+    supply = HELD_OUT if args.foreign is None else foreign(args.foreign, args.catalogues, args.scans)
     every = list(shots(args.out, args.seed, args.scenes, supply))
     told = document({"description": "Errand: things in the flat", "seed": args.seed, "split": "val"}, every)
     (args.out / "val.json").write_text(json.dumps(told), encoding="utf-8")

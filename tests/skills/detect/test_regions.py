@@ -20,7 +20,7 @@ def test_boxes_of_any_class_on_one_place_become_one_with_the_surest_ones_opinion
 
 
 def test_the_unsure_and_the_empty_are_no_places():
-    assert len(found((WHOLE, (0.015, 0.002)), (EMPTY, (0.9, 0.0)), ((0, 0, float("nan"), 5), (0.9, 0.0)))) == 0
+    assert len(found((WHOLE, (0.008, 0.002)), (EMPTY, (0.9, 0.0)), ((0, 0, float("nan"), 5), (0.9, 0.0)))) == 0
 
 
 def test_no_more_than_so_many_places_are_looked_at():

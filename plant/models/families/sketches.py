@@ -146,7 +146,10 @@ def _patch(part: Mesh, material: str, radius: float, z_m: tuple[float, float], a
 
 
 def hammer(draft: Draft) -> tuple[Finished, str, str]:
-    """A handle along x, and across its +x end a block, a drum, a drum with larger ends, or a block with a wedge."""
+    """A handle along x, and across its +x end a block, a drum, one with larger ends, or a block with a wedge or claw.
+
+    The handle is of one piece, or a grip on a shaft of the head's colour.
+    """
     rng = draft.rng
     half, thick = float(rng.uniform(0.11, 0.20)), float(rng.uniform(0.008, 0.021))
     reach = float(rng.uniform(0.035, 0.075))
@@ -156,7 +159,12 @@ def hammer(draft: Draft) -> tuple[Finished, str, str]:
     if rng.random() < 0.15:
         _coloured(draft, "head")
     x = half - wide
-    _rod(draft, "colour", -half, x if rng.random() < 0.7 else half + wide, thick, WOOD)
+    if rng.random() < 0.35:
+        grip = half * float(rng.uniform(-0.5, 0.35))
+        _rod(draft, "colour", -half, grip, thick, RUBBER)
+        _rod(draft, "head", grip, x, thick * float(rng.uniform(0.45, 0.9)), STEEL * 0.6)
+    else:
+        _rod(draft, "colour", -half, x if rng.random() < 0.7 else half + wide, thick, WOOD)
     for part, R in _hammer_head(draft, reach, wide):
         draft.solid(part, STEEL * 0.6, R, (x, 0, 0))
     draft.collide_box((-half, -thick, -thick), (x, thick, thick))
@@ -167,7 +175,7 @@ def hammer(draft: Draft) -> tuple[Finished, str, str]:
 def _hammer_head(draft: Draft, reach: float, wide: float) -> list[tuple[Mesh, FloatArray]]:
     """Parts of a head about the origin, each with its turn."""
     rng, part = draft.rng, draft.part()
-    style = str(rng.choice(["block", "drum", "ends", "wedge", "ball"], p=[0.22, 0.22, 0.26, 0.2, 0.1]))
+    style = str(rng.choice(["block", "drum", "ends", "wedge", "ball", "claw"], p=[0.18, 0.17, 0.2, 0.12, 0.1, 0.23]))
     if style == "block":
         part.add_box("head", (-wide, -reach, -wide), (wide, reach, wide))
         return [(part, np.eye(3))]
@@ -177,6 +185,8 @@ def _hammer_head(draft: Draft, reach: float, wide: float) -> list[tuple[Mesh, Fl
         outline = [(wide, -reach * 0.3), (-wide, -reach * 0.3), (-wide * rng.uniform(0.5, 1.6), -reach), (0.0, -reach)]
         add_extruded(claw, "head", outline, -wide, wide)
         return [(part, np.eye(3)), (claw, np.eye(3))]
+    if style == "claw":
+        return _clawed(draft, reach, wide)
     neck = 1.0 if style == "drum" else float(rng.uniform(0.45, 0.8))
     _drum(part, "head", wide * neck, -reach, reach)
     if style == "ball":
@@ -186,6 +196,25 @@ def _hammer_head(draft: Draft, reach: float, wide: float) -> list[tuple[Mesh, Fl
     if style == "ends":
         _drum(part, "head", wide * 1.1, -reach * 1.02, -reach * float(rng.uniform(0.45, 0.75)))
     return [(part, _ALONG_Y)]
+
+
+def _clawed(draft: Draft, reach: float, wide: float) -> list[tuple[Mesh, FloatArray]]:
+    """A drum to the +y side, and to the other two bent prongs, side by side, that grow thin."""
+    rng, face, level = draft.rng, draft.part(), np.eye(3)
+    wide = min(wide, 0.02)
+    _drum(face, "head", wide * float(rng.uniform(0.8, 1.1)), reach * 0.35, reach)
+    _drum(face, "head", wide * float(rng.uniform(0.5, 0.8)), -0.2 * reach, reach * 0.36)
+    bend, parts = float(rng.uniform(0.1, 0.6)) * reach, [(face, _ALONG_Y)]
+    along = np.linspace(0.0, 1.0, 9)
+    y, x = -reach * (0.1 + 0.9 * along), -bend * along**2
+    thick = wide * (0.75 - 0.6 * along)
+    outline = np.concatenate([np.stack([x + thick, y], axis=1), np.stack([x - thick, y], axis=1)[::-1]])
+    gap = wide * float(rng.uniform(0.05, 0.3))
+    for low, high in ((-wide, -gap), (gap, wide)):
+        prong = draft.part()
+        add_extruded(prong, "head", outline, low, high)
+        parts.append((prong, level))
+    return parts
 
 
 def screwdriver(draft: Draft) -> tuple[Finished, str, str]:

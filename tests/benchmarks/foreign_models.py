@@ -170,10 +170,15 @@ def written(entry: Entry, number: int, family: str, folder: Path) -> ObjectModel
             placed = (at[keep] @ Y_UP_TO_Z_UP.T, normals[keep] @ Y_UP_TO_Z_UP.T, uvs[keep])
             part.add_triangles(names[material], *placed)
     draft.shell(part, 1.0)
+    return kept_model(draft, family, number, entry.name, folder)
+
+
+def kept_model(draft: Draft, family: str, number: int, name: str, folder: Path) -> ObjectModel:
+    """The model of a draft, written to a folder of its own; of no class where its family is none of the nine."""
     made = draft.finish(MASS_KG, on_floor=family == "person")
     x, y, z = (float(value) for value in made.mass.com)
     class_id = load_catalogue()[family].id if family in CLASSES else 0
-    model = ObjectModel(folder, family, number, class_id, entry.name, "", MASS_KG, (x, y, z), made.size_m)
+    model = ObjectModel(folder, family, number, class_id, name, "", MASS_KG, (x, y, z), made.size_m)
     folder.mkdir(parents=True)
     write_model(folder, model, made)
     return read_model(folder)

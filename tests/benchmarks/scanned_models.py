@@ -16,11 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Colour
-from plant.models.catalogue import load_catalogue
-from plant.models.families import CLASSES
 from plant.models.families.draft import Draft
-from plant.models.families.model import ObjectModel, read_model, write_model
-from tests.benchmarks.foreign_models import MASS_KG, OTHERS
+from plant.models.families.model import ObjectModel
+from tests.benchmarks.foreign_models import OTHERS, kept_model
 
 FloatArray = NDArray[np.float64]
 
@@ -118,13 +116,7 @@ def written_scan(file: Path, family: str, paint: Paint, number: int, folder: Pat
         corners = triangles[chosen].reshape(-1, 3)
         part.add_triangles(f"paint{k}", corners, normals[chosen].reshape(-1, 3), np.zeros((len(corners), 2)))
     draft.shell(part, 1.0)
-    made = draft.finish(MASS_KG)
-    x, y, z = (float(value) for value in made.mass.com)
-    class_id = load_catalogue()[family].id if family in CLASSES else 0
-    model = ObjectModel(folder, family, number, class_id, file.stem, "", MASS_KG, (x, y, z), made.size_m)
-    folder.mkdir(parents=True)
-    write_model(folder, model, made)
-    return read_model(folder)
+    return kept_model(draft, family, number, file.stem, folder)
 
 
 def scanned(folder: Path, scans: Path) -> dict[str, list[ObjectModel]]:

@@ -31,44 +31,44 @@ RED, BLUE, YELLOW, WHITE = (0.80, 0.10, 0.10), (0.15, 0.30, 0.75), (0.90, 0.72, 
 
 @dataclass(frozen=True)
 class Paint:
-    """A colour up to a share of the longest side, and another one from there on."""
+    """A colour up to a share of the longest side, and from there on another one, if there is one."""
 
     first: Colour
-    second: Colour
+    second: Colour | None = None
     share: float = 1.0
 
 
 SCANS: Mapping[str, tuple[str, Sequence[Paint]]] = {
-    "042_adjustable_wrench": ("wrench", (Paint(STEEL, STEEL), Paint(DARK, DARK), Paint(STEEL, RED, 0.5))),
+    "042_adjustable_wrench": ("wrench", (Paint(STEEL), Paint(DARK), Paint(STEEL, RED, 0.5))),
     "043_phillips_screwdriver": ("screwdriver", (Paint(STEEL, YELLOW, 0.4), Paint(STEEL, BLACK, 0.4))),
     "044_flat_screwdriver": ("screwdriver", (Paint(STEEL, RED, 0.4), Paint(STEEL, BLUE, 0.4))),
-    "048_hammer": ("hammer", (Paint(WOOD, DARK, 0.7), Paint(BLACK, STEEL, 0.7), Paint(STEEL, STEEL))),
-    "006_mustard_bottle": (OTHERS, (Paint(YELLOW, YELLOW),)),
-    "011_banana": (OTHERS, (Paint(YELLOW, YELLOW),)),
-    "013_apple": (OTHERS, (Paint(RED, RED),)),
-    "019_pitcher_base": (OTHERS, (Paint(BLUE, BLUE),)),
-    "021_bleach_cleanser": (OTHERS, (Paint(WHITE, WHITE),)),
-    "022_windex_bottle": (OTHERS, (Paint(BLUE, BLUE),)),
-    "024_bowl": (OTHERS, (Paint(RED, RED),)),
-    "025_mug": (OTHERS, (Paint(RED, RED), Paint(WHITE, WHITE))),
-    "026_sponge": (OTHERS, (Paint(YELLOW, YELLOW),)),
-    "028_skillet_lid": (OTHERS, (Paint(DARK, DARK),)),
-    "029_plate": (OTHERS, (Paint(WHITE, WHITE),)),
-    "030_fork": (OTHERS, (Paint(STEEL, STEEL),)),
-    "031_spoon": (OTHERS, (Paint(STEEL, STEEL),)),
+    "048_hammer": ("hammer", (Paint(WOOD, DARK, 0.7), Paint(BLACK, STEEL, 0.7), Paint(STEEL))),
+    "006_mustard_bottle": (OTHERS, (Paint(YELLOW),)),
+    "011_banana": (OTHERS, (Paint(YELLOW),)),
+    "013_apple": (OTHERS, (Paint(RED),)),
+    "019_pitcher_base": (OTHERS, (Paint(BLUE),)),
+    "021_bleach_cleanser": (OTHERS, (Paint(WHITE),)),
+    "022_windex_bottle": (OTHERS, (Paint(BLUE),)),
+    "024_bowl": (OTHERS, (Paint(RED),)),
+    "025_mug": (OTHERS, (Paint(RED), Paint(WHITE))),
+    "026_sponge": (OTHERS, (Paint(YELLOW),)),
+    "028_skillet_lid": (OTHERS, (Paint(DARK),)),
+    "029_plate": (OTHERS, (Paint(WHITE),)),
+    "030_fork": (OTHERS, (Paint(STEEL),)),
+    "031_spoon": (OTHERS, (Paint(STEEL),)),
     "032_knife": (OTHERS, (Paint(STEEL, BLACK, 0.5),)),
-    "033_spatula": (OTHERS, (Paint(BLACK, BLACK),)),
-    "035_power_drill": (OTHERS, (Paint(RED, RED), Paint(DARK, DARK))),
-    "037_scissors": (OTHERS, (Paint(STEEL, STEEL),)),
-    "038_padlock": (OTHERS, (Paint(YELLOW, YELLOW),)),
-    "050_medium_clamp": (OTHERS, (Paint(BLACK, BLACK),)),
-    "051_large_clamp": (OTHERS, (Paint(BLACK, BLACK),)),
-    "053_mini_soccer_ball": (OTHERS, (Paint(WHITE, WHITE),)),
-    "055_baseball": (OTHERS, (Paint(WHITE, WHITE),)),
-    "059_chain": (OTHERS, (Paint(STEEL, STEEL),)),
-    "065-f_cups": (OTHERS, (Paint(RED, RED),)),
-    "072-b_toy_airplane": (OTHERS, (Paint(BLUE, BLUE),)),
-    "073-a_lego_duplo": (OTHERS, (Paint(RED, RED),)),
+    "033_spatula": (OTHERS, (Paint(BLACK),)),
+    "035_power_drill": (OTHERS, (Paint(RED), Paint(DARK))),
+    "037_scissors": (OTHERS, (Paint(STEEL),)),
+    "038_padlock": (OTHERS, (Paint(YELLOW),)),
+    "050_medium_clamp": (OTHERS, (Paint(BLACK),)),
+    "051_large_clamp": (OTHERS, (Paint(BLACK),)),
+    "053_mini_soccer_ball": (OTHERS, (Paint(WHITE),)),
+    "055_baseball": (OTHERS, (Paint(WHITE),)),
+    "059_chain": (OTHERS, (Paint(STEEL),)),
+    "065-f_cups": (OTHERS, (Paint(RED),)),
+    "072-b_toy_airplane": (OTHERS, (Paint(BLUE),)),
+    "073-a_lego_duplo": (OTHERS, (Paint(RED),)),
 }
 """Files by name, the class of each, and its paints; what could pass for a can, a cylinder or a cube is left out."""
 
@@ -98,7 +98,7 @@ def painted(triangles: FloatArray, paint: Paint) -> Iterator[tuple[Colour, NDArr
     middles = triangles.mean(axis=1)
     along = int(np.ptp(triangles.reshape(-1, 3), axis=0).argmax())
     share = (middles[:, along] - middles[:, along].min()) / max(np.ptp(middles[:, along]), 1e-12)
-    for colour, chosen in ((paint.first, share <= paint.share), (paint.second, share > paint.share)):
+    for colour, chosen in ((paint.first, share <= paint.share), (paint.second or paint.first, share > paint.share)):
         if chosen.any():
             yield colour, chosen
 

@@ -127,11 +127,11 @@ def make(family: str, seed: int) -> tuple[Finished, str, str]:
     made, kind, colour = maker(draft)
     if plain and family in DISTRACTOR_MAKERS:
         made = plainly_painted(made, draft.rng)
-    if repainted(family, seed) and draft.rng.random() < _ONE_COLOUR[family]:
-        made, colour = in_one_colour(made, draft.rng)
-        return made, kind, colour
     if repainted(family, seed):
-        made = plainly_painted(made, draft.rng, own_colours=1.0)
+        if draft.rng.random() < _ONE_COLOUR[family]:
+            made, colour = in_one_colour(made, draft.rng)
+        else:
+            made = plainly_painted(made, draft.rng, own_colours=1.0)
     return made, kind, colour
 
 

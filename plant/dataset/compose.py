@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from plant.dataset.resting import choose, resting_poses
 from plant.dataset.room import Room, Support, random_room
-from plant.models.families import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
+from plant.models.families import CLASSES, DISTRACTORS, ODDMENT, ObjectModel, instance, numbers
 from plant.worlds.placement import polygon_distance
 
 FloatArray = NDArray[np.float64]
@@ -22,6 +22,8 @@ SELDOM_BY_CHANCE = ("person", "extinguisher")
 CLASSES_PER_SCENE = 7
 CROWDED_SHARE, MOST_ROUNDS = 0.65, 4
 ONLY_DISTRACTORS_EVERY = 10
+ODDMENT_SHARE = 0.35
+"""How many of the things of no class are oddments, where training sees them."""
 ATTEMPTS = 30
 CLEAR_M = 0.004
 LARGE_M = 0.45
@@ -68,10 +70,10 @@ def compose(rng: np.random.Generator, index: int, *, for_training: bool) -> Scen
     bare = index % ONLY_DISTRACTORS_EVERY == ONLY_DISTRACTORS_EVERY - 1
     rounds = int(rng.integers(2, MOST_ROUNDS + 1)) if for_training and rng.random() < CROWDED_SHARE else 1
     wanted = [] if bare else _class_models(rng, rounds, for_training=for_training)
-    others = [
-        _any_instance(rng, str(name), for_training)
-        for name in rng.choice(DISTRACTORS, int(rng.integers(6, 16)) * rounds)
-    ]
+    names = [str(name) for name in rng.choice(DISTRACTORS, int(rng.integers(6, 16)) * rounds)]
+    if for_training:
+        names = [ODDMENT if rng.random() < ODDMENT_SHARE else name for name in names]
+    others = [_any_instance(rng, name, for_training) for name in names]
     table = _Table(room, rng, toppled=for_training)
     crowded = list(rng.permutation(len(room.supports)))[: int(rng.integers(2, 5))] if room.supports else []
     for model in [*wanted, *others]:

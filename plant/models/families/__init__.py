@@ -19,6 +19,7 @@ from plant.models.families.drinks import beer, coke
 from plant.models.families.extinguishers import extinguisher
 from plant.models.families.hammers import hammer
 from plant.models.families.model import ObjectModel, Surface, held_out, read_model, write_model
+from plant.models.families.oddments import ODDMENT, oddment
 from plant.models.families.people import person
 from plant.models.families.screwdrivers import screwdriver
 from plant.models.families.sketches import SKETCH_MAKERS, in_one_colour, plainly_painted
@@ -27,6 +28,7 @@ from plant.models.families.wrenches import wrench
 __all__ = [
     "CLASSES",
     "DISTRACTORS",
+    "ODDMENT",
     "ObjectModel",
     "Surface",
     "held_out",
@@ -46,6 +48,8 @@ PEOPLE = 72
 """How many people: each but the sketched ones takes seconds to make."""
 DISTRACTOR_INSTANCES = 96
 """How many of each kind of distractor there are."""
+ODDMENTS = 640
+"""How many things of no kind there are, for training alone."""
 VALIDATION_BELOW, DISTRACTOR_VALIDATION_BELOW = 48, 8
 """Validation takes held-out instances below these numbers, so that its pictures stay the same when more are added."""
 SKETCHED_OF_FIVE = (0, 2)
@@ -82,6 +86,7 @@ _CLASS_MAKERS: Mapping[str, Maker] = {
     "cylinder": cylinder,
     "cube": cube,
 }
+_OTHER_MAKERS: Mapping[str, Maker] = {**DISTRACTOR_MAKERS, ODDMENT: oddment}
 CLASSES: tuple[str, ...] = tuple(_CLASS_MAKERS)
 DISTRACTORS: tuple[str, ...] = tuple(sorted(DISTRACTOR_MAKERS))
 
@@ -89,8 +94,10 @@ DISTRACTORS: tuple[str, ...] = tuple(sorted(DISTRACTOR_MAKERS))
 def numbers(family: str, *, for_training: bool) -> list[int]:
     """The instances of a family that training may see, or those that validation does.
 
-    Every fourth number is kept from training.
+    Every fourth number is kept from training. Validation sees no oddments.
     """
+    if family == ODDMENT:
+        return [number for number in range(ODDMENTS) if not held_out(number)] if for_training else []
     if not for_training:
         below = VALIDATION_BELOW if family in _CLASS_MAKERS else DISTRACTOR_VALIDATION_BELOW
         return [number for number in range(below) if held_out(number)]
@@ -104,7 +111,7 @@ def sketched(family: str, seed: int) -> bool:
     So are all people from number 48 on.
     """
     below = VALIDATION_BELOW if family in _CLASS_MAKERS else DISTRACTOR_VALIDATION_BELOW
-    if seed < below or family in _PLAIN_AS_A_CLASS:
+    if seed < below or family in _PLAIN_AS_A_CLASS or family == ODDMENT:
         return False
     return family == "person" or seed % 5 in SKETCHED_OF_FIVE
 
@@ -118,9 +125,9 @@ def make(family: str, seed: int) -> tuple[Finished, str, str]:
     """Make an instance without writing it: the model, its kind and its main colour. Raises KeyError, ValueError."""
     plain = sketched(family, seed)
     makers = SKETCH_MAKERS if plain else _CLASS_MAKERS
-    maker = makers.get(family) or DISTRACTOR_MAKERS.get(family)
+    maker = makers.get(family) or _OTHER_MAKERS.get(family)
     if maker is None:
-        raise KeyError(f"no family {family!r}; there are {', '.join((*CLASSES, *DISTRACTORS))}")
+        raise KeyError(f"no family {family!r}; there are {', '.join((*CLASSES, *DISTRACTORS, ODDMENT))}")
     if seed < 0:
         raise ValueError(f"an instance's number is 0 or more, not {seed}")
     draft = Draft(np.random.default_rng([seed, *family.encode()]))

@@ -22,7 +22,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 
 from plant.models.builder.pictures import write_png
-from plant.models.families import CLASSES, DISTRACTORS, instance
+from plant.models.families import CLASSES, DISTRACTORS, ODDMENT, instance
 from plant.models.families.model import ObjectModel
 from plant.pictures import look_at, render_view
 from plant.worlds.lights import lights
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str]) -> None:
         if family == "distractors":
             models = [instance(name, k) for name in DISTRACTORS for k in range(2)]
         else:
-            models = [instance(family, k) for k in range(48 if family in CLASSES else 8)]
+            models = [instance(family, k) for k in range(48 if family in (*CLASSES, ODDMENT) else 8)]
         write_png(folder / f"{family}.png", sheet(models, 8))
 
 

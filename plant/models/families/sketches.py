@@ -9,12 +9,11 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from plant.models.builder.mesh import Colour, Material, Mesh
+from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.outlines import arc
 from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_ring, add_tube
 from plant.models.families.draft import (
@@ -32,6 +31,7 @@ from plant.models.families.draft import (
     turned,
     varied,
 )
+from plant.models.families.solids import COLOURS, GREYS, add_drum, add_rod, paint_grey, paint_plain, some_shine
 
 __all__ = ["SKETCH_MAKERS", "in_one_colour", "plainly_painted"]
 
@@ -40,26 +40,6 @@ Maker = Callable[[Draft], tuple[Finished, str, str]]
 
 KIND = "sketch"
 _ALONG_Y = turned("x", -np.pi / 2)
-_COLOURS: tuple[tuple[str, Colour], ...] = (
-    ("red", (0.82, 0.06, 0.05)),
-    ("blue", (0.07, 0.18, 0.75)),
-    ("green", (0.08, 0.50, 0.15)),
-    ("yellow", (0.95, 0.80, 0.06)),
-    ("orange", (0.95, 0.45, 0.05)),
-    ("black", (0.06, 0.06, 0.06)),
-    ("brown", (0.45, 0.28, 0.13)),
-    ("brown", (0.72, 0.52, 0.30)),
-    ("grey", (0.45, 0.45, 0.46)),
-    ("white", (0.93, 0.93, 0.93)),
-)
-_GREYS: tuple[Colour, ...] = (
-    (0.50, 0.50, 0.51),
-    (0.65, 0.65, 0.67),
-    (0.78, 0.78, 0.80),
-    (0.33, 0.33, 0.35),
-    (0.20, 0.20, 0.21),
-    (0.08, 0.08, 0.08),
-)
 
 
 def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: float = 0.5) -> Finished:
@@ -69,7 +49,7 @@ def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: fl
     for name, material in made.mesh.materials.items():
         picture = made.pictures.get(material.texture or "")
         mean = None if picture is None else np.asarray(picture, dtype=float).reshape(-1, 3).mean(axis=0) / 255.0
-        colour = np.array(_COLOURS[int(rng.integers(len(_COLOURS)))][1]) if mean is None or not own else mean
+        colour = np.array(COLOURS[int(rng.integers(len(COLOURS)))][1]) if mean is None or not own else mean
         keep = picture is None and (own or rng.random() < 0.5)
         painted[name] = material if keep else Material(varied(rng, colour), None, None, material.shine, 0.0)
     mesh = Mesh(painted)
@@ -79,63 +59,13 @@ def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: fl
 
 def in_one_colour(made: Finished, rng: np.random.Generator) -> tuple[Finished, str]:
     """The same thing in a single plain colour, as it comes from a drawing; what one would call that."""
-    word, colour = _COLOURS[int(rng.integers(len(_COLOURS)))]
+    word, colour = COLOURS[int(rng.integers(len(COLOURS)))]
     if rng.random() < 0.6:
-        word, colour = "grey", pick(rng, *_GREYS)
+        word, colour = "grey", pick(rng, *GREYS)
     paint = Material(varied(rng, colour, 0.04), None, None, float(rng.uniform(0.0, 0.6)), 0.0)
     mesh = Mesh(dict.fromkeys(made.mesh.materials, paint))
     mesh.add_mesh(made.mesh)
     return replace(made, mesh=mesh, pictures={}), word
-
-
-def _coloured(draft: Draft, name: str = "colour") -> str:
-    """Paint any plain colour; what one would call it."""
-    word, colour = _COLOURS[int(draft.rng.integers(len(_COLOURS)))]
-    draft.paint(name, varied(draft.rng, colour, 0.06), shine=_shine(draft))
-    return word
-
-
-def _grey(draft: Draft, name: str) -> None:
-    draft.paint(name, varied(draft.rng, pick(draft.rng, *_GREYS), 0.04), shine=_shine(draft))
-
-
-def _shine(draft: Draft) -> float:
-    return float(draft.rng.uniform(0.0, 0.6))
-
-
-def _drum(part: Mesh, material: str, radius: float, z0: float, z1: float, *, sides: int = 32) -> None:
-    """A closed cylinder along z."""
-    part.add_lathe(material, [(0, z0), (radius, z0), (radius, z1), (0, z1)], sides=sides)
-
-
-def _rod(draft: Draft, material: str, x0: float, x1: float, radius: float, density: float) -> None:
-    """A box, a cylinder, a prism, a capsule or a stack of drums along x."""
-    part, style = draft.part(), str(draft.rng.choice(["cylinder", "capsule", "box", "flat", "prism", "stack"]))
-    if style == "stack":
-        return _stack(draft, material, x0, x1, radius, density)
-    if style in ("box", "flat"):
-        half = radius * (0.55 if style == "flat" else 0.9)
-        part.add_box(material, (x0, -radius, -half), (x1, radius, half))
-        return draft.solid(part, density)
-    if style == "capsule":
-        add_ellipsoid(part, material, (0, 0, x0 + radius), (radius,) * 3)
-        add_ellipsoid(part, material, (0, 0, x1 - radius), (radius,) * 3)
-        _drum(part, material, radius, x0 + radius, x1 - radius)
-    else:
-        _drum(part, material, radius, x0, x1, sides=32 if style == "cylinder" else int(draft.rng.choice([6, 8])))
-    return draft.solid(part, density, UP_TO_X)
-
-
-def _stack(draft: Draft, material: str, x0: float, x1: float, radius: float, density: float) -> None:
-    """Two to five drums along x, of other radii; some of another colour."""
-    rng = draft.rng
-    _coloured(draft, "collar")
-    inner = np.sort(rng.uniform(0.1, 0.9, int(rng.integers(1, 5))))
-    breaks = x0 + (x1 - x0) * np.concatenate([[0.0], inner, [1.0]])
-    for low, high in pairwise(breaks):
-        part = draft.part()
-        _drum(part, "collar" if rng.random() < 0.3 else material, radius * float(rng.uniform(0.6, 1.15)), low, high)
-        draft.solid(part, density, UP_TO_X)
 
 
 def _patch(part: Mesh, material: str, radius: float, z_m: tuple[float, float], about_deg: tuple[float, float]) -> None:
@@ -154,17 +84,17 @@ def hammer(draft: Draft) -> tuple[Finished, str, str]:
     half, thick = float(rng.uniform(0.11, 0.20)), float(rng.uniform(0.008, 0.021))
     reach = float(rng.uniform(0.035, 0.075))
     wide = float(np.clip(rng.uniform(0.25, 0.55) * reach, 0.011, 0.04))
-    word = _coloured(draft)
-    _grey(draft, "head")
+    word = paint_plain(draft)
+    paint_grey(draft, "head")
     if rng.random() < 0.15:
-        _coloured(draft, "head")
+        paint_plain(draft, "head")
     x = half - wide
     if rng.random() < 0.35:
         grip = half * float(rng.uniform(-0.5, 0.35))
-        _rod(draft, "colour", -half, grip, thick, RUBBER)
-        _rod(draft, "head", grip, x, thick * float(rng.uniform(0.45, 0.9)), STEEL * 0.6)
+        add_rod(draft, "colour", -half, grip, thick, RUBBER)
+        add_rod(draft, "head", grip, x, thick * float(rng.uniform(0.45, 0.9)), STEEL * 0.6)
     else:
-        _rod(draft, "colour", -half, x if rng.random() < 0.7 else half + wide, thick, WOOD)
+        add_rod(draft, "colour", -half, x if rng.random() < 0.7 else half + wide, thick, WOOD)
     for part, R in _hammer_head(draft, reach, wide):
         draft.solid(part, STEEL * 0.6, R, (x, 0, 0))
     draft.collide_box((-half, -thick, -thick), (x, thick, thick))
@@ -188,13 +118,13 @@ def _hammer_head(draft: Draft, reach: float, wide: float) -> list[tuple[Mesh, Fl
     if style == "claw":
         return _clawed(draft, reach, wide)
     neck = 1.0 if style == "drum" else float(rng.uniform(0.45, 0.8))
-    _drum(part, "head", wide * neck, -reach, reach)
+    add_drum(part, "head", wide * neck, -reach, reach)
     if style == "ball":
         add_ellipsoid(part, "head", (0, 0, -reach), (wide * 1.1,) * 3)
     if style in ("ends", "ball"):
-        _drum(part, "head", wide * 1.1, reach * float(rng.uniform(0.45, 0.75)), reach * 1.02)
+        add_drum(part, "head", wide * 1.1, reach * float(rng.uniform(0.45, 0.75)), reach * 1.02)
     if style == "ends":
-        _drum(part, "head", wide * 1.1, -reach * 1.02, -reach * float(rng.uniform(0.45, 0.75)))
+        add_drum(part, "head", wide * 1.1, -reach * 1.02, -reach * float(rng.uniform(0.45, 0.75)))
     return [(part, _ALONG_Y)]
 
 
@@ -202,8 +132,8 @@ def _clawed(draft: Draft, reach: float, wide: float) -> list[tuple[Mesh, FloatAr
     """A drum to the +y side, and to the other two bent prongs, side by side, that grow thin."""
     rng, face, level = draft.rng, draft.part(), np.eye(3)
     wide = min(wide, 0.02)
-    _drum(face, "head", wide * float(rng.uniform(0.8, 1.1)), reach * 0.35, reach)
-    _drum(face, "head", wide * float(rng.uniform(0.5, 0.8)), -0.2 * reach, reach * 0.36)
+    add_drum(face, "head", wide * float(rng.uniform(0.8, 1.1)), reach * 0.35, reach)
+    add_drum(face, "head", wide * float(rng.uniform(0.5, 0.8)), -0.2 * reach, reach * 0.36)
     bend, parts = float(rng.uniform(0.1, 0.6)) * reach, [(face, _ALONG_Y)]
     along = np.linspace(0.0, 1.0, 9)
     y, x = -reach * (0.1 + 0.9 * along), -bend * along**2
@@ -222,12 +152,12 @@ def screwdriver(draft: Draft) -> tuple[Finished, str, str]:
     rng = draft.rng
     handle, radius = float(rng.uniform(0.06, 0.13)), float(rng.uniform(0.009, 0.019))
     shaft, thin = float(rng.uniform(0.05, 0.20)), float(rng.uniform(0.0022, 0.005))
-    word = _coloured(draft)
-    _grey(draft, "steel")
+    word = paint_plain(draft)
+    paint_grey(draft, "steel")
     start = -(handle + shaft) / 2
-    _rod(draft, "colour", start, start + handle, radius, PLASTIC)
+    add_rod(draft, "colour", start, start + handle, radius, PLASTIC)
     part, end = draft.part(), start + handle + shaft
-    _drum(part, "steel", thin, start + handle, end, sides=16)
+    add_drum(part, "steel", thin, start + handle, end, sides=16)
     if rng.random() < 0.5:
         part.add_lathe("steel", [(0, end), (thin, end), (thin * 0.2, end + 3 * thin)], sides=16)
     draft.solid(part, STEEL, UP_TO_X)
@@ -246,10 +176,10 @@ def wrench(draft: Draft) -> tuple[Finished, str, str]:
     half, thick = float(rng.uniform(0.06, 0.15)), float(rng.uniform(0.002, 0.005))
     head = half * float(rng.uniform(0.15, 0.24))
     bar = head * float(rng.uniform(0.3, 0.5))
-    _grey(draft, "steel")
+    paint_grey(draft, "steel")
     word = "grey"
     if rng.random() < 0.25:
-        word = _coloured(draft, "steel")
+        word = paint_plain(draft, "steel")
     shaft = draft.part()
     shaft.add_box("steel", (-half + head, -bar, -thick), (half - 1.5 * head, bar, thick))
     draft.solid(shaft, STEEL)
@@ -287,12 +217,14 @@ def extinguisher(draft: Draft) -> tuple[Finished, str, str]:
     r = float(rng.uniform(0.045, 0.095))
     h = r * float(rng.uniform(3.4, 5.6))
     draft.paint(
-        "red", varied(rng, pick(rng, (0.80, 0.05, 0.04), (0.90, 0.03, 0.03), (0.62, 0.04, 0.05))), shine=_shine(draft)
+        "red",
+        varied(rng, pick(rng, (0.80, 0.05, 0.04), (0.90, 0.03, 0.03), (0.62, 0.04, 0.05))),
+        shine=some_shine(draft),
     )
-    draft.paint("black", varied(rng, (0.07, 0.07, 0.07)), shine=_shine(draft))
+    draft.paint("black", varied(rng, (0.07, 0.07, 0.07)), shine=some_shine(draft))
     draft.paint("band", pick(rng, (0.93, 0.93, 0.92), (0.95, 0.85, 0.3), (0.1, 0.2, 0.65), (0.08, 0.08, 0.08)))
     vessel, dome = draft.part(), r * float(rng.uniform(0.3, 1.0))
-    _drum(vessel, "red", r, 0.0, h - dome, sides=40)
+    add_drum(vessel, "red", r, 0.0, h - dome, sides=40)
     if rng.random() < 0.7:
         add_ellipsoid(vessel, "red", (0, 0, h - dome), (r, r, dome), sides=28)
     else:
@@ -320,7 +252,7 @@ def extinguisher(draft: Draft) -> tuple[Finished, str, str]:
 
 def _valve(draft: Draft, r: float, h: float, top: float) -> Mesh:
     part, rng = draft.part(), draft.rng
-    _drum(part, "black", r * 0.25, h - 0.02, top - 0.02, sides=20)
+    add_drum(part, "black", r * 0.25, h - 0.02, top - 0.02, sides=20)
     length = r * float(rng.uniform(0.8, 1.5))
     part.add_box("black", (-r * 0.3, -0.012, top - 0.02), (length, 0.012, top))
     if rng.random() < 0.6:
@@ -332,7 +264,7 @@ def beer(draft: Draft) -> tuple[Finished, str, str]:
     """A bottle of brown or green glass, bare or with a plain label, with or without a cap."""
     rng = draft.rng
     word, glass = ("green", (0.06, 0.28, 0.10)) if rng.random() < 0.35 else ("brown", (0.30, 0.15, 0.05))
-    draft.paint("glass", varied(rng, np.array(glass) * rng.uniform(0.5, 1.3), 0.05), shine=_shine(draft))
+    draft.paint("glass", varied(rng, np.array(glass) * rng.uniform(0.5, 1.3), 0.05), shine=some_shine(draft))
     draft.paint(
         "label", pick(rng, (0.94, 0.93, 0.9), (0.9, 0.8, 0.4), (0.75, 0.1, 0.1), (0.1, 0.3, 0.15), (0.1, 0.15, 0.4))
     )
@@ -362,7 +294,9 @@ def coke(draft: Draft) -> tuple[Finished, str, str]:
     """A red can with a white stripe or patch, seldom with bare ends alone, or a dark bottle with red label and cap."""
     rng = draft.rng
     draft.paint(
-        "red", varied(rng, pick(rng, (0.82, 0.03, 0.05), (0.9, 0.05, 0.04), (0.70, 0.02, 0.04))), shine=_shine(draft)
+        "red",
+        varied(rng, pick(rng, (0.82, 0.03, 0.05), (0.9, 0.05, 0.04), (0.70, 0.02, 0.04))),
+        shine=some_shine(draft),
     )
     draft.paint("white", (0.95, 0.95, 0.94))
     draft.paint("metal", varied(rng, (0.74, 0.75, 0.77), 0.04), shine=0.6)
@@ -402,7 +336,7 @@ def _cola_bottle(draft: Draft) -> Finished:
     draft.solid(part, PLASTIC)
     looks = draft.part()
     looks.add_lathe("red", [(r * 1.006, low * h), (r * 1.006, (low + 0.22) * h)], sides=32)
-    _drum(looks, "red" if rng.random() < 0.8 else "white", 0.015, 0.94 * h, h, sides=20)
+    add_drum(looks, "red" if rng.random() < 0.8 else "white", 0.015, 0.94 * h, h, sides=20)
     draft.look(looks)
     draft.collide_upright(r, 0.0, 0.7 * h)
     draft.collide_upright(0.015, 0.7 * h, h)
@@ -412,8 +346,8 @@ def _cola_bottle(draft: Draft) -> Finished:
 def person(draft: Draft) -> tuple[Finished, str, str]:
     """A standing figure of capsules, balls and boxes, which looks along x; the origin is on the floor."""
     rng, h = draft.rng, float(draft.rng.uniform(1.5, 1.95))
-    word = _coloured(draft, "top")
-    _coloured(draft, "bottom")
+    word = paint_plain(draft, "top")
+    paint_plain(draft, "bottom")
     draft.paint("skin", varied(rng, pick(rng, (0.9, 0.72, 0.6), (0.7, 0.5, 0.36), (0.4, 0.26, 0.18), (0.8, 0.8, 0.8))))
     draft.paint("dark", pick(rng, (0.07, 0.06, 0.05), (0.3, 0.2, 0.1), (0.6, 0.45, 0.2)))
     part, wide = draft.part(), h * float(rng.uniform(0.10, 0.135))
@@ -458,12 +392,12 @@ def _block_colour(draft: Draft) -> str:
     rng = draft.rng
     if rng.random() < 0.5:
         word, tone = (("black", 0.06), ("white", 0.93), ("grey", float(rng.uniform(0.2, 0.8))))[int(rng.integers(3))]
-        draft.paint("colour", varied(rng, (tone, tone, tone), 0.04), shine=_shine(draft))
+        draft.paint("colour", varied(rng, (tone, tone, tone), 0.04), shine=some_shine(draft))
         return word
     hue, value = float(rng.random()), float(rng.uniform(0.3, 0.95))
     colour = colorsys.hsv_to_rgb(hue, float(rng.uniform(0.5, 1.0)), value)
-    draft.paint("colour", colour, shine=_shine(draft))
-    return min(_COLOURS, key=lambda each: float(np.sum((np.array(each[1]) - np.array(colour)) ** 2)))[0]
+    draft.paint("colour", colour, shine=some_shine(draft))
+    return min(COLOURS, key=lambda each: float(np.sum((np.array(each[1]) - np.array(colour)) ** 2)))[0]
 
 
 def cube(draft: Draft) -> tuple[Finished, str, str]:
@@ -481,7 +415,7 @@ def cylinder(draft: Draft) -> tuple[Finished, str, str]:
     radius = float(np.exp(rng.uniform(np.log(0.015), np.log(0.075))))
     half = min(0.40, max(0.03, radius * float(np.exp(rng.uniform(np.log(0.9), np.log(8.0)))))) / 2
     part = draft.part()
-    _drum(part, "colour", radius, -half, half, sides=40)
+    add_drum(part, "colour", radius, -half, half, sides=40)
     draft.solid(part, 500.0)
     draft.collide_upright(radius, -half, half)
     return draft.finish(), KIND, word

@@ -22,7 +22,7 @@ from plant.dataset.resting import choose, resting_poses
 from plant.dataset.room import random_room
 from plant.dataset.textures import ROLES, numbers, texture
 from plant.dataset.views import any_view, camera_specs
-from plant.models.families import instance
+from plant.models.families import ODDMENT, instance
 from plant.worlds.placement import polygon_distance
 
 
@@ -150,6 +150,13 @@ def thing_outline(thing: Placed) -> tuple[float, np.ndarray]:
     """Lowest height, and the outline from above."""
     points = np.asarray(thing.X_WO @ thing.model.surface.points.T).T
     return float(points[:, 2].min()), points[ConvexHull(points[:, :2]).vertices, :2]
+
+
+def test_oddments_lie_about_in_scenes_to_learn_from_and_in_no_others() -> None:
+    seen = compose(np.random.default_rng(4), 1, for_training=True)
+    kept = compose(np.random.default_rng(4), 1, for_training=False)
+    assert ODDMENT in {thing.model.family for thing in seen.things}
+    assert ODDMENT not in {thing.model.family for thing in kept.things}
 
 
 def test_every_tenth_scene_holds_distractors_only() -> None:

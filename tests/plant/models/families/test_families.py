@@ -11,7 +11,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from plant.models.catalogue import load_catalogue
-from plant.models.families import CLASSES, DISTRACTORS, held_out, instance, make, numbers, repainted, sketched
+from plant.models.families import CLASSES, DISTRACTORS, ODDMENT, held_out, instance, make, numbers, repainted, sketched
 
 SMALL = tuple(name for name in CLASSES if name != "person")
 
@@ -89,6 +89,25 @@ def test_two_fifths_of_the_later_instances_are_sketches_and_so_are_all_later_peo
     assert all(sketched("person", number) for number in numbers("person", for_training=True) if number >= 48)
 
 
+def test_oddments_are_for_training_alone() -> None:
+    assert numbers(ODDMENT, for_training=False) == []
+    assert len(numbers(ODDMENT, for_training=True)) == 480
+
+
+def test_an_oddment_has_plain_colours_alone_and_the_size_of_what_lies_about() -> None:
+    made = [make(ODDMENT, seed) for seed in range(120)]
+    assert {kind for _, kind, _ in made} == {"turned", "handled", "box", "slab", "bent", "sprayer"}
+    for seed, (each, _, _) in enumerate(made):
+        assert each.pictures == {}
+        assert 0.03 < max(each.size_m) < 0.45, (seed, each.size_m)
+        assert 0.001 < each.mass.mass_kg < 12.0, (seed, each.mass.mass_kg)
+
+
+def test_no_oddment_of_a_box_is_a_cube() -> None:
+    boxes = [each for each, kind, _ in (make(ODDMENT, seed) for seed in range(120)) if kind == "box"]
+    assert min(max(each.size_m) / min(each.size_m) for each in boxes) > 1.2
+
+
 @pytest.mark.parametrize("family", CLASSES)
 def test_a_sketch_has_plain_colours_alone_and_the_size_of_the_real_thing(family: str) -> None:
     masses, sides = RANGES[family]
@@ -145,7 +164,7 @@ def test_sizes_and_masses_are_those_of_real_things(family: str) -> None:
         assert sides[0] <= max(made.size_m) <= sides[1], (seed, made.size_m)
 
 
-@pytest.mark.parametrize("family", [*SMALL, *DISTRACTORS])
+@pytest.mark.parametrize("family", [*SMALL, *DISTRACTORS, ODDMENT])
 def test_inertias_are_those_of_a_body_that_fits_its_box(family: str) -> None:
     made, _, _ = make(family, 1)
     moments = np.linalg.eigvalsh(made.mass.inertia)

@@ -1,0 +1,231 @@
+"""Things of no class and no name, made by chance of basic solids, for training alone.
+
+What a robot meets is mostly none of what its maker modelled. A detector that knows only so many kinds of other things
+takes an unknown one for the class that comes nearest; forms by chance teach it that a handle makes no tool and a neck
+no bottle (Tobin et al., "Domain Randomization for Transferring Deep Neural Networks from Simulation to the Real
+World", 2017, for the thought).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant.models.builder.mesh import Colour, Mesh
+from plant.models.builder.outlines import arc, curve
+from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_rounded_box, add_tube
+from plant.models.families.draft import PLASTIC, STEEL, WOOD, Draft, Finished, pick, varied
+from plant.models.families.solids import add_drum, add_rod, paint_grey, paint_plain, some_shine
+
+__all__ = ["ODDMENT", "oddment"]
+
+FloatArray = NDArray[np.float64]
+
+ODDMENT = "oddment"
+_BOTTLES = frozenset({"brown", "green", "red", "black"})
+"""Colours in which a neck on a body, or a plain drum, may be a bottle or can of a class."""
+_PALE: tuple[Colour, ...] = (
+    (0.93, 0.93, 0.93),
+    (0.95, 0.80, 0.06),
+    (0.07, 0.18, 0.75),
+    (0.95, 0.45, 0.05),
+    (0.85, 0.5, 0.65),
+    (0.1, 0.55, 0.6),
+)
+_SLENDER, _WAISTED = 0.6, 1.35
+
+
+def oddment(draft: Draft) -> tuple[Finished, str, str]:
+    """A thing of one of a few kinds; its kind and colour."""
+    rng = draft.rng
+    kind = str(rng.choice(list(_KINDS), p=[share for share, _ in _KINDS.values()]))
+    word = paint_plain(draft)
+    paint_plain(draft, "second")
+    if rng.random() < 0.3:
+        paint_grey(draft, "second")
+    _, make = _KINDS[kind]
+    return make(draft, word), kind, word
+
+
+def _length(draft: Draft, low: float, high: float) -> float:
+    """Metres between the two, small ones as often as large ones."""
+    return float(np.exp(draft.rng.uniform(np.log(low), np.log(high))))
+
+
+def _one_of_two(draft: Draft, second: float = 0.3) -> str:
+    return "second" if draft.rng.random() < second else "colour"
+
+
+def _repaint(draft: Draft) -> None:
+    """Another colour than those of bottles and cans."""
+    draft.paint("colour", varied(draft.rng, pick(draft.rng, *_PALE)), shine=some_shine(draft))
+
+
+def _turned(draft: Draft, word: str) -> Finished:
+    """Turned on a lathe: three to eight bands, straight or sloping; never a plain drum, never a bottle of a class."""
+    rng, tall = draft.rng, _length(draft, 0.05, 0.30)
+    wide = tall * _length(draft, 0.25, 0.9)
+    knots = int(rng.integers(3, 9))
+    heights = tall * np.concatenate([[0.0], np.sort(rng.uniform(0.05, 0.95, knots - 1)), [1.0]])
+    radii = wide / 2 * np.exp(rng.uniform(np.log(0.3), 0.0, knots + 1))
+    if radii.max() < _WAISTED * radii.min():
+        radii[int(rng.integers(knots + 1))] *= 0.5
+    upper = heights > 0.6 * tall
+    if word in _BOTTLES and (radii[upper].max() < _SLENDER * radii[~upper].max() or wide < 0.3 * tall):
+        _repaint(draft)
+    stepped = rng.random() < 0.4
+    for (low, bottom), (high, top) in pairwise(zip(heights, radii, strict=True)):
+        band, end = draft.part(), bottom if stepped else top
+        profile = [(0.0, low), (float(bottom), low), (float(end), high), (0.0, high)]
+        band.add_lathe(_one_of_two(draft), profile, sides=28)
+        draft.solid(band, PLASTIC * 0.5)
+    return draft.finish()
+
+
+def _handled(draft: Draft, _: str) -> Finished:
+    """A grip along x, and beyond it an end that is of no tool of a class."""
+    rng, grip = draft.rng, _length(draft, 0.06, 0.16)
+    thick, end = grip * float(rng.uniform(0.06, 0.14)), _length(draft, 0.04, 0.14)
+    if rng.random() < 0.4:
+        paint_grey(draft, "colour")
+    add_rod(draft, "colour", -grip, 0.0, thick, WOOD)
+    part, style = draft.part(), str(rng.choice(["bowl", "tines", "blade", "plate", "brush", "ball", "disc", "hook"]))
+    paint = _one_of_two(draft, 0.8)
+    neck = end * float(rng.uniform(0.1, 1.2))
+    add_tube(part, paint, [(-0.005, 0, 0), (neck / 2, 0, 0), (neck + 0.005, 0, 0)], thick * 0.4, sides=10)
+    _add_end(draft, part, style, paint, neck, end, thick)
+    draft.solid(part, STEEL * 0.4)
+    return draft.finish()
+
+
+def _add_end(draft: Draft, part: Mesh, style: str, paint: str, neck: float, end: float, thick: float) -> None:
+    """The end of a handled thing, which begins at `neck` and is so long (m)."""
+    rng, flat = draft.rng, float(draft.rng.uniform(0.0008, 0.003))
+    far, wide = neck + end, end * float(rng.uniform(0.2, 0.45))
+    if style == "bowl":
+        add_ellipsoid(part, paint, (neck + end / 2, 0, 0), (end / 2, wide, max(0.2 * wide, 0.003)))
+    elif style == "tines":
+        count = int(rng.integers(3, 6))
+        part.add_box(paint, (neck, -wide, -flat), (neck + 0.4 * end, wide, flat))
+        for y in np.linspace(-0.85 * wide, 0.85 * wide, count):
+            half = 0.45 * wide / count
+            part.add_box(paint, (neck + 0.4 * end, y - half, -flat), (far, y + half, flat))
+    elif style == "blade":
+        tip = float(rng.uniform(-1, 1)) * wide / 2
+        outline = [(neck, -wide / 2), (far, tip), (neck + 0.6 * end, wide / 2), (neck, wide / 2)]
+        add_extruded(part, paint, outline, -flat, flat)
+    elif style == "plate":
+        part.add_box(paint, (neck, -wide, -flat), (far, wide, flat))
+    elif style == "brush":
+        part.add_box("colour", (neck, -wide, -thick), (neck + 0.35 * end, wide, thick))
+        part.add_box(paint, (neck + 0.35 * end, -0.95 * wide, -0.9 * thick), (far, 0.95 * wide, 0.9 * thick))
+    elif style == "ball":
+        add_ellipsoid(part, paint, (neck + wide, 0, 0), (wide, wide, wide * float(rng.uniform(0.7, 1.0))))
+    elif style == "disc":
+        add_extruded(part, paint, arc((neck + end / 2, 0), end / 2, 0, 345, 24), -2 * flat, 2 * flat)
+    else:
+        bend = curve([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.3, 0.4, 0.0), (1.0, 0.8, 0.0), (0.7, 0.7, 0.0)], 5)
+        add_tube(part, paint, np.asarray(bend) * end + [neck, 0, 0], thick * 0.4, sides=10)
+
+
+def _boxy(draft: Draft, _: str) -> Finished:
+    """A box that is no cube, sharp or rounded, now and then with a patch, a lid or another box on it."""
+    rng, long = draft.rng, _length(draft, 0.05, 0.32)
+    middle, short = np.sort(rng.uniform(0.08, 0.95, 2))[::-1]
+    short = min(short, 0.5)
+    half = rng.permutation([long, long * middle, long * short]) / 2
+    part = draft.part()
+    if rng.random() < 0.5:
+        part.add_box("colour", -half, half)
+    else:
+        add_rounded_box(part, "colour", -half, half, float(rng.uniform(0.05, 0.5) * half.min()))
+    draft.solid(part, 400.0)
+    if rng.random() < 0.4:
+        low, high = np.sort(rng.uniform(-0.9, 0.9, (2, 2)), axis=0) * half[:2]
+        top = draft.part()
+        rise = float(rng.choice([0.001, 0.2, 0.6]) * half[2])
+        top.add_box("second", (*low, half[2]), (*np.maximum(high, low + 0.004), half[2] + rise))
+        draft.solid(top, 400.0)
+    if rng.random() < 0.4:
+        side = draft.part()
+        low, high = np.sort(rng.uniform(-0.9, 0.9, (2, 2)), axis=0) * half[1:]
+        side.add_box("second", (half[0], *low), (half[0] + 0.001, *np.maximum(high, low + 0.004)))
+        draft.solid(side, 400.0)
+    return draft.finish()
+
+
+def _slab(draft: Draft, _: str) -> Finished:
+    """An outline by chance, extruded: a star of five to nine corners, or a clamp's C, sometimes with a boss on it."""
+    rng, wide = draft.rng, _length(draft, 0.05, 0.26)
+    thick = wide * float(rng.uniform(0.04, 0.25))
+    if rng.random() < 0.3:
+        gap, bar = float(rng.uniform(30, 80)), float(rng.uniform(0.55, 0.85))
+        outer, inner = arc((0, 0), wide / 2, gap, 360 - gap, 20), arc((0, 0), bar * wide / 2, 360 - gap, gap, 20)
+        outline = np.concatenate([outer, inner])
+    else:
+        corners = int(rng.integers(5, 10))
+        angle = np.linspace(0, 2 * np.pi, corners, endpoint=False) + rng.uniform(-0.2, 0.2, corners)
+        radius = wide / 2 * rng.uniform(0.35, 1.0, corners)
+        outline = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    part = draft.part()
+    add_extruded(part, "colour", outline * [1.0, float(rng.uniform(0.45, 1.0))], 0.0, thick)
+    draft.solid(part, PLASTIC)
+    if rng.random() < 0.4:
+        boss, r = draft.part(), wide * float(rng.uniform(0.06, 0.15))
+        add_drum(boss, "second", r, thick, thick + wide * float(rng.uniform(0.02, 0.3)), sides=20)
+        draft.solid(boss, PLASTIC)
+    return draft.finish()
+
+
+def _bent(draft: Draft, _: str) -> Finished:
+    """A rod or cable bent by chance, mostly in a plane, sometimes with knobs at its ends."""
+    rng, size = draft.rng, _length(draft, 0.06, 0.30)
+    knots = np.cumsum(rng.normal(0, 1, (int(rng.integers(3, 7)), 3)) * [1.0, 1.0, 0.05], axis=0)
+    line = np.asarray(curve(knots * size / np.ptp(knots, axis=0).max(), 6))
+    radius = size * float(rng.uniform(0.015, 0.07))
+    part = draft.part()
+    add_tube(part, "colour", line, radius, sides=10)
+    draft.solid(part, PLASTIC)
+    for end in (line[0], line[-1]):
+        if rng.random() < 0.35:
+            knob, wide = draft.part(), radius * float(rng.uniform(1.2, 2.5))
+            add_ellipsoid(knob, "second", end, (wide,) * 3)
+            draft.solid(knob, PLASTIC)
+    return draft.finish()
+
+
+def _sprayer(draft: Draft, word: str) -> Finished:
+    """A bottle of any cleaner: an oval or round body, a neck, and a head with a trigger or a pump."""
+    rng, tall = draft.rng, _length(draft, 0.12, 0.22)
+    if word in _BOTTLES:
+        _repaint(draft)
+    r = tall * float(rng.uniform(0.16, 0.28))
+    oval, neck = float(rng.uniform(0.5, 1.0)), r * float(rng.uniform(0.25, 0.5))
+    body = draft.part()
+    shoulder = tall * float(rng.uniform(0.5, 0.85))
+    upper = r * float(rng.uniform(0.8, 1.0))
+    body.add_lathe("colour", [(0, 0), (r, 0), (upper, shoulder), (neck, tall), (0, tall)], sides=28)
+    draft.solid(body, PLASTIC * 0.6, np.diag([1.0, oval, 1.0]))
+    head, high = draft.part(), tall + r * float(rng.uniform(0.4, 1.2))
+    add_drum(head, "second", neck * 1.1, tall * 0.98, high, sides=16)
+    reach = r * float(rng.uniform(0.7, 1.5))
+    head.add_box("second", (-reach * 0.6, -neck, high), (reach, neck, high + neck * 1.4))
+    if rng.random() < 0.6:
+        trigger = [(reach * 0.5, 0, high), (reach * 0.6, 0, high - 0.3 * r), (reach * 0.3, 0, tall * 0.97)]
+        add_tube(head, "second", trigger, neck * 0.4, sides=8)
+    draft.solid(head, PLASTIC)
+    return draft.finish()
+
+
+_KINDS: Mapping[str, tuple[float, Callable[[Draft, str], Finished]]] = {
+    "turned": (0.20, _turned),
+    "handled": (0.30, _handled),
+    "box": (0.18, _boxy),
+    "slab": (0.14, _slab),
+    "bent": (0.08, _bent),
+    "sprayer": (0.10, _sprayer),
+}
+"""Kinds: how often, and how they are made when the first colour has such a name."""

@@ -22,7 +22,8 @@ class Label:
     """A thing in a picture: its class, and its box (u0, v0, u1, v1) in pixels.
 
     `crowd` marks a region in which any number of detections of the class is passed over, `ignore` a thing that need
-    not be found and may be. `visibility` is the share of it that is seen, `distance_m` how far it is, where known.
+    not be found and may be. `visibility` is the share of the whole thing that is seen (what lies beyond the picture's
+    edge is not), `distance_m` how far it is, where known.
     """
 
     class_name: str
@@ -85,8 +86,8 @@ def pictures_of_coco(document: Mapping[str, Any], class_names: Sequence[str]) ->
     """The pictures of a COCO file in the order of their ids, with the labels of the named classes.
 
     Categories go by their names, in any case of letters; their ids may be any. Labels of other categories are left
-    out. `visibility`, `distance_m`, `iscrowd` and `ignore` of labels, and `roll_deg` of pictures need not be there.
-    Raises ValueError, naming the entry.
+    out. `visibility`, `truncation`, `distance_m`, `iscrowd` and `ignore` of labels, and `roll_deg` of pictures need not
+    be there. Raises ValueError, naming the entry.
     """
     names = _category_names(document, class_names)
     files = {_number_of(image, "id", "images", k): image for k, image in enumerate(_entries(document, "images"))}
@@ -135,12 +136,20 @@ def _label(entry: Mapping[str, Any], name: str, k: int) -> Label:
             box=(x, y, x + width, y + height),
             crowd=bool(entry.get("iscrowd", 0)),
             ignore=bool(entry.get("ignore", 0)),
-            visibility=_number(entry.get("visibility")),
+            visibility=_share_seen(entry),
             distance_m=_number(entry.get("distance_m")),
         )
     except (TypeError, ValueError) as error:
         told = f"bbox is four numbers (x, y, width, height), not {box!r}, or another of its fields is none"
         raise ValueError(f"annotations[{k}]: {told}") from error
+
+
+def _share_seen(entry: Mapping[str, Any]) -> float | None:
+    """Of what is in the picture the share before which nothing stands, times the share that is in the picture."""
+    in_front, beyond = _number(entry.get("visibility")), _number(entry.get("truncation"))
+    if in_front is None and beyond is None:
+        return None
+    return (1.0 if in_front is None else in_front) * (1.0 - (beyond or 0.0))
 
 
 def _size(image: Mapping[str, Any]) -> tuple[int, int] | None:

@@ -49,6 +49,22 @@ def test_what_counts(width, height, visibility, crowd, ignore, counts):
 
 
 @pytest.mark.parametrize(
+    # visibility, truncation -> share of the whole thing that is seen
+    ("told", "share"),
+    [
+        ({"visibility": 0.8, "truncation": 0.5}, 0.4),
+        ({"visibility": 0.8}, 0.8),
+        ({"truncation": 0.25}, 0.75),
+        ({}, None),
+    ],
+)
+def test_what_lies_beyond_the_edge_is_not_seen(told, share):
+    entry = {"id": 1, "image_id": 3, "category_id": 90, "bbox": [10, 20, 30, 40], **told}
+    first, _ = pictures_of_coco(coco(annotations=[entry]), CLASSES)
+    assert first.labels[0].visibility == (None if share is None else pytest.approx(share))
+
+
+@pytest.mark.parametrize(
     ("changes", "told"),
     [
         ({"images": None}, "no list 'images'"),

@@ -17,25 +17,29 @@ from numpy.typing import NDArray
 from plant.models.builder.mesh import Colour, Mesh
 from plant.models.builder.outlines import arc, curve
 from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_rounded_box, add_tube
-from plant.models.families.draft import PLASTIC, STEEL, WOOD, Draft, Finished, pick, varied
+from plant.models.families.draft import PLASTIC, STEEL, WOOD, Draft, Finished, varied
 from plant.models.families.solids import add_drum, add_rod, paint_grey, paint_plain, some_shine
 
 __all__ = ["ODDMENT", "oddment"]
 
 FloatArray = NDArray[np.float64]
+Made = tuple[Finished, str]
 
 ODDMENT = "oddment"
 _BOTTLES = frozenset({"brown", "green", "red", "black"})
 """Colours in which a neck on a body, or a plain drum, may be a bottle or can of a class."""
-_PALE: tuple[Colour, ...] = (
-    (0.93, 0.93, 0.93),
-    (0.95, 0.80, 0.06),
-    (0.07, 0.18, 0.75),
-    (0.95, 0.45, 0.05),
-    (0.85, 0.5, 0.65),
-    (0.1, 0.55, 0.6),
+_NO_BOTTLES: tuple[tuple[str, Colour], ...] = (
+    ("white", (0.93, 0.93, 0.93)),
+    ("yellow", (0.95, 0.80, 0.06)),
+    ("blue", (0.07, 0.18, 0.75)),
+    ("orange", (0.95, 0.45, 0.05)),
+    ("pink", (0.85, 0.5, 0.65)),
+    ("teal", (0.1, 0.55, 0.6)),
 )
-_SLENDER, _WAISTED = 0.6, 1.35
+_NECK_SHARE = 0.6
+"""Narrower than this share of what is below, the upper part of a turned thing is a neck."""
+_PLAIN_DRUM = 1.35
+"""A turned thing whose widest place is not so many times its narrowest could pass for a cylinder."""
 
 
 def oddment(draft: Draft) -> tuple[Finished, str, str]:
@@ -47,7 +51,8 @@ def oddment(draft: Draft) -> tuple[Finished, str, str]:
     if rng.random() < 0.3:
         paint_grey(draft, "second")
     _, make = _KINDS[kind]
-    return make(draft, word), kind, word
+    made, word = make(draft, word)
+    return made, kind, word
 
 
 def _length(draft: Draft, low: float, high: float) -> float:
@@ -59,33 +64,35 @@ def _one_of_two(draft: Draft, second: float = 0.3) -> str:
     return "second" if draft.rng.random() < second else "colour"
 
 
-def _repaint(draft: Draft) -> None:
-    """Another colour than those of bottles and cans."""
-    draft.paint("colour", varied(draft.rng, pick(draft.rng, *_PALE)), shine=some_shine(draft))
+def _no_bottle(draft: Draft) -> str:
+    """Paint another colour than those of bottles and cans; what one would call it."""
+    word, colour = _NO_BOTTLES[int(draft.rng.integers(len(_NO_BOTTLES)))]
+    draft.paint("colour", varied(draft.rng, colour), shine=some_shine(draft))
+    return word
 
 
-def _turned(draft: Draft, word: str) -> Finished:
+def _turned(draft: Draft, word: str) -> Made:
     """Turned on a lathe: three to eight bands, straight or sloping; never a plain drum, never a bottle of a class."""
     rng, tall = draft.rng, _length(draft, 0.05, 0.30)
     wide = tall * _length(draft, 0.25, 0.9)
     knots = int(rng.integers(3, 9))
     heights = tall * np.concatenate([[0.0], np.sort(rng.uniform(0.05, 0.95, knots - 1)), [1.0]])
     radii = wide / 2 * np.exp(rng.uniform(np.log(0.3), 0.0, knots + 1))
-    if radii.max() < _WAISTED * radii.min():
+    if radii.max() < _PLAIN_DRUM * radii.min():
         radii[int(rng.integers(knots + 1))] *= 0.5
     upper = heights > 0.6 * tall
-    if word in _BOTTLES and (radii[upper].max() < _SLENDER * radii[~upper].max() or wide < 0.3 * tall):
-        _repaint(draft)
+    if word in _BOTTLES and (radii[upper].max() < _NECK_SHARE * radii[~upper].max() or wide < 0.3 * tall):
+        word = _no_bottle(draft)
     stepped = rng.random() < 0.4
     for (low, bottom), (high, top) in pairwise(zip(heights, radii, strict=True)):
         band, end = draft.part(), bottom if stepped else top
         profile = [(0.0, low), (float(bottom), low), (float(end), high), (0.0, high)]
         band.add_lathe(_one_of_two(draft), profile, sides=28)
         draft.solid(band, PLASTIC * 0.5)
-    return draft.finish()
+    return draft.finish(), word
 
 
-def _handled(draft: Draft, _: str) -> Finished:
+def _handled(draft: Draft, word: str) -> Made:
     """A grip along x, and beyond it an end that is of no tool of a class."""
     rng, grip = draft.rng, _length(draft, 0.06, 0.16)
     thick, end = grip * float(rng.uniform(0.06, 0.14)), _length(draft, 0.04, 0.14)
@@ -98,7 +105,7 @@ def _handled(draft: Draft, _: str) -> Finished:
     add_tube(part, paint, [(-0.005, 0, 0), (neck / 2, 0, 0), (neck + 0.005, 0, 0)], thick * 0.4, sides=10)
     _add_end(draft, part, style, paint, neck, end, thick)
     draft.solid(part, STEEL * 0.4)
-    return draft.finish()
+    return draft.finish(), word
 
 
 def _add_end(draft: Draft, part: Mesh, style: str, paint: str, neck: float, end: float, thick: float) -> None:
@@ -131,7 +138,7 @@ def _add_end(draft: Draft, part: Mesh, style: str, paint: str, neck: float, end:
         add_tube(part, paint, np.asarray(bend) * end + [neck, 0, 0], thick * 0.4, sides=10)
 
 
-def _boxy(draft: Draft, _: str) -> Finished:
+def _boxy(draft: Draft, word: str) -> Made:
     """A box that is no cube, sharp or rounded, now and then with a patch, a lid or another box on it."""
     rng, long = draft.rng, _length(draft, 0.05, 0.32)
     middle, short = np.sort(rng.uniform(0.08, 0.95, 2))[::-1]
@@ -154,10 +161,10 @@ def _boxy(draft: Draft, _: str) -> Finished:
         low, high = np.sort(rng.uniform(-0.9, 0.9, (2, 2)), axis=0) * half[1:]
         side.add_box("second", (half[0], *low), (half[0] + 0.001, *np.maximum(high, low + 0.004)))
         draft.solid(side, 400.0)
-    return draft.finish()
+    return draft.finish(), word
 
 
-def _slab(draft: Draft, _: str) -> Finished:
+def _slab(draft: Draft, word: str) -> Made:
     """An outline by chance, extruded: a star of five to nine corners, or a clamp's C, sometimes with a boss on it."""
     rng, wide = draft.rng, _length(draft, 0.05, 0.26)
     thick = wide * float(rng.uniform(0.04, 0.25))
@@ -177,10 +184,10 @@ def _slab(draft: Draft, _: str) -> Finished:
         boss, r = draft.part(), wide * float(rng.uniform(0.06, 0.15))
         add_drum(boss, "second", r, thick, thick + wide * float(rng.uniform(0.02, 0.3)), sides=20)
         draft.solid(boss, PLASTIC)
-    return draft.finish()
+    return draft.finish(), word
 
 
-def _bent(draft: Draft, _: str) -> Finished:
+def _bent(draft: Draft, word: str) -> Made:
     """A rod or cable bent by chance, mostly in a plane, sometimes with knobs at its ends."""
     rng, size = draft.rng, _length(draft, 0.06, 0.30)
     knots = np.cumsum(rng.normal(0, 1, (int(rng.integers(3, 7)), 3)) * [1.0, 1.0, 0.05], axis=0)
@@ -194,14 +201,14 @@ def _bent(draft: Draft, _: str) -> Finished:
             knob, wide = draft.part(), radius * float(rng.uniform(1.2, 2.5))
             add_ellipsoid(knob, "second", end, (wide,) * 3)
             draft.solid(knob, PLASTIC)
-    return draft.finish()
+    return draft.finish(), word
 
 
-def _sprayer(draft: Draft, word: str) -> Finished:
+def _sprayer(draft: Draft, word: str) -> Made:
     """A bottle of any cleaner: an oval or round body, a neck, and a head with a trigger or a pump."""
     rng, tall = draft.rng, _length(draft, 0.12, 0.22)
     if word in _BOTTLES:
-        _repaint(draft)
+        word = _no_bottle(draft)
     r = tall * float(rng.uniform(0.16, 0.28))
     oval, neck = float(rng.uniform(0.5, 1.0)), r * float(rng.uniform(0.25, 0.5))
     body = draft.part()
@@ -217,10 +224,10 @@ def _sprayer(draft: Draft, word: str) -> Finished:
         trigger = [(reach * 0.5, 0, high), (reach * 0.6, 0, high - 0.3 * r), (reach * 0.3, 0, tall * 0.97)]
         add_tube(head, "second", trigger, neck * 0.4, sides=8)
     draft.solid(head, PLASTIC)
-    return draft.finish()
+    return draft.finish(), word
 
 
-_KINDS: Mapping[str, tuple[float, Callable[[Draft, str], Finished]]] = {
+_KINDS: Mapping[str, tuple[float, Callable[[Draft, str], Made]]] = {
     "turned": (0.20, _turned),
     "handled": (0.30, _handled),
     "box": (0.18, _boxy),
@@ -228,4 +235,4 @@ _KINDS: Mapping[str, tuple[float, Callable[[Draft, str], Finished]]] = {
     "bent": (0.08, _bent),
     "sprayer": (0.10, _sprayer),
 }
-"""Kinds: how often, and how they are made when the first colour has such a name."""
+"""Kinds: how often, and how they are made, given the first colour's name; they may take another."""

@@ -259,6 +259,8 @@ def main() -> None:
     parser.add_argument("--catalogues", type=Path, default=CATALOGUES)
     parser.add_argument("--scans", type=Path)
     args = parser.parse_args()
+    if args.scans is not None and args.foreign is None:
+        parser.error("--scans goes with --foreign FOLDER, which models are written to")
     args.out.mkdir(parents=True, exist_ok=True)
     supply = HELD_OUT if args.foreign is None else foreign(args.foreign, args.catalogues, args.scans)
     every = list(shots(args.out, args.seed, args.scenes, supply))

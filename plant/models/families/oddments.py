@@ -9,6 +9,7 @@ World", 2017, for the thought).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -55,8 +56,8 @@ def oddment(draft: Draft) -> tuple[Finished, str, str]:
     return made, kind, word
 
 
-def _length(draft: Draft, low: float, high: float) -> float:
-    """Metres between the two, small ones as often as large ones."""
+def _between(draft: Draft, low: float, high: float) -> float:
+    """A length or share between the two, small ones as often as large ones."""
     return float(np.exp(draft.rng.uniform(np.log(low), np.log(high))))
 
 
@@ -73,17 +74,16 @@ def _no_bottle(draft: Draft) -> str:
 
 def _turned(draft: Draft, word: str) -> Made:
     """Turned on a lathe: three to eight bands, straight or sloping; never a plain drum, never a bottle of a class."""
-    rng, tall = draft.rng, _length(draft, 0.05, 0.30)
-    wide = tall * _length(draft, 0.25, 0.9)
-    knots = int(rng.integers(3, 9))
-    heights = tall * np.concatenate([[0.0], np.sort(rng.uniform(0.05, 0.95, knots - 1)), [1.0]])
-    radii = wide / 2 * np.exp(rng.uniform(np.log(0.3), 0.0, knots + 1))
-    if radii.max() < _PLAIN_DRUM * radii.min():
-        radii[int(rng.integers(knots + 1))] *= 0.5
+    rng, tall = draft.rng, _between(draft, 0.05, 0.30)
+    wide = tall * _between(draft, 0.25, 0.9)
+    bands, stepped = int(rng.integers(3, 9)), rng.random() < 0.4
+    heights = tall * np.concatenate([[0.0], np.sort(rng.uniform(0.05, 0.95, bands - 1)), [1.0]])
+    radii = wide / 2 * np.exp(rng.uniform(np.log(0.3), 0.0, bands + 1))
+    if radii[:bands].max() < _PLAIN_DRUM * radii[:bands].min():
+        radii[int(rng.integers(bands))] *= 0.5
     upper = heights > 0.6 * tall
     if word in _BOTTLES and (radii[upper].max() < _NECK_SHARE * radii[~upper].max() or wide < 0.3 * tall):
         word = _no_bottle(draft)
-    stepped = rng.random() < 0.4
     for (low, bottom), (high, top) in pairwise(zip(heights, radii, strict=True)):
         band, end = draft.part(), bottom if stepped else top
         profile = [(0.0, low), (float(bottom), low), (float(end), high), (0.0, high)]
@@ -94,53 +94,92 @@ def _turned(draft: Draft, word: str) -> Made:
 
 def _handled(draft: Draft, word: str) -> Made:
     """A grip along x, and beyond it an end that is of no tool of a class."""
-    rng, grip = draft.rng, _length(draft, 0.06, 0.16)
-    thick, end = grip * float(rng.uniform(0.06, 0.14)), _length(draft, 0.04, 0.14)
+    rng, grip = draft.rng, _between(draft, 0.06, 0.16)
+    thick, end = grip * float(rng.uniform(0.06, 0.14)), _between(draft, 0.04, 0.14)
     if rng.random() < 0.4:
+        word = "grey"
         paint_grey(draft, "colour")
     add_rod(draft, "colour", -grip, 0.0, thick, WOOD)
-    part, style = draft.part(), str(rng.choice(["bowl", "tines", "blade", "plate", "brush", "ball", "disc", "hook"]))
-    paint = _one_of_two(draft, 0.8)
-    neck = end * float(rng.uniform(0.1, 1.2))
+    part, paint, neck = draft.part(), _one_of_two(draft, 0.8), end * float(rng.uniform(0.1, 1.2))
     add_tube(part, paint, [(-0.005, 0, 0), (neck / 2, 0, 0), (neck + 0.005, 0, 0)], thick * 0.4, sides=10)
-    _add_end(draft, part, style, paint, neck, end, thick)
+    sizes = _End(neck, end, end * float(rng.uniform(0.2, 0.45)), float(rng.uniform(0.0008, 0.003)), thick)
+    _ENDS[int(rng.integers(len(_ENDS)))](rng, part, paint, sizes)
     draft.solid(part, STEEL * 0.4)
     return draft.finish(), word
 
 
-def _add_end(draft: Draft, part: Mesh, style: str, paint: str, neck: float, end: float, thick: float) -> None:
-    """The end of a handled thing, which begins at `neck` and is so long (m)."""
-    rng, flat = draft.rng, float(draft.rng.uniform(0.0008, 0.003))
-    far, wide = neck + end, end * float(rng.uniform(0.2, 0.45))
-    if style == "bowl":
-        add_ellipsoid(part, paint, (neck + end / 2, 0, 0), (end / 2, wide, max(0.2 * wide, 0.003)))
-    elif style == "tines":
-        count = int(rng.integers(3, 6))
-        part.add_box(paint, (neck, -wide, -flat), (neck + 0.4 * end, wide, flat))
-        for y in np.linspace(-0.85 * wide, 0.85 * wide, count):
-            half = 0.45 * wide / count
-            part.add_box(paint, (neck + 0.4 * end, y - half, -flat), (far, y + half, flat))
-    elif style == "blade":
-        tip = float(rng.uniform(-1, 1)) * wide / 2
-        outline = [(neck, -wide / 2), (far, tip), (neck + 0.6 * end, wide / 2), (neck, wide / 2)]
-        add_extruded(part, paint, outline, -flat, flat)
-    elif style == "plate":
-        part.add_box(paint, (neck, -wide, -flat), (far, wide, flat))
-    elif style == "brush":
-        part.add_box("colour", (neck, -wide, -thick), (neck + 0.35 * end, wide, thick))
-        part.add_box(paint, (neck + 0.35 * end, -0.95 * wide, -0.9 * thick), (far, 0.95 * wide, 0.9 * thick))
-    elif style == "ball":
-        add_ellipsoid(part, paint, (neck + wide, 0, 0), (wide, wide, wide * float(rng.uniform(0.7, 1.0))))
-    elif style == "disc":
-        add_extruded(part, paint, arc((neck + end / 2, 0), end / 2, 0, 345, 24), -2 * flat, 2 * flat)
-    else:
-        bend = curve([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.3, 0.4, 0.0), (1.0, 0.8, 0.0), (0.7, 0.7, 0.0)], 5)
-        add_tube(part, paint, np.asarray(bend) * end + [neck, 0, 0], thick * 0.4, sides=10)
+@dataclass(frozen=True)
+class _End:
+    """The end of a handled thing: where along x it begins, its length, half its width and height, half the grip's."""
+
+    begin_m: float
+    long_m: float
+    wide_m: float
+    flat_m: float
+    thick_m: float
+
+    @property
+    def far_m(self) -> float:
+        """Where along x it ends."""
+        return self.begin_m + self.long_m
+
+
+def _bowl(_: np.random.Generator, part: Mesh, paint: str, end: _End) -> None:
+    add_ellipsoid(
+        part, paint, (end.begin_m + end.long_m / 2, 0, 0), (end.long_m / 2, end.wide_m, max(0.2 * end.wide_m, 0.003))
+    )
+
+
+def _tines(rng: np.random.Generator, part: Mesh, paint: str, end: _End) -> None:
+    count, root = int(rng.integers(3, 6)), end.begin_m + 0.4 * end.long_m
+    part.add_box(paint, (end.begin_m, -end.wide_m, -end.flat_m), (root, end.wide_m, end.flat_m))
+    half = 0.45 * end.wide_m / count
+    for y in np.linspace(-0.85 * end.wide_m, 0.85 * end.wide_m, count):
+        part.add_box(paint, (root, y - half, -end.flat_m), (end.far_m, y + half, end.flat_m))
+
+
+def _blade(rng: np.random.Generator, part: Mesh, paint: str, end: _End) -> None:
+    half, tip = end.wide_m / 2, float(rng.uniform(-0.5, 0.5)) * end.wide_m
+    outline = [(end.begin_m, -half), (end.far_m, tip), (end.begin_m + 0.6 * end.long_m, half), (end.begin_m, half)]
+    add_extruded(part, paint, outline, -end.flat_m, end.flat_m)
+
+
+def _plate(_: np.random.Generator, part: Mesh, paint: str, end: _End) -> None:
+    part.add_box(paint, (end.begin_m, -end.wide_m, -end.flat_m), (end.far_m, end.wide_m, end.flat_m))
+
+
+def _brush(_: np.random.Generator, part: Mesh, paint: str, end: _End) -> None:
+    root, wide, thick = end.begin_m + 0.35 * end.long_m, end.wide_m, end.thick_m
+    part.add_box("colour", (end.begin_m, -wide, -thick), (root, wide, thick))
+    part.add_box(paint, (root, -0.95 * wide, -0.9 * thick), (end.far_m, 0.95 * wide, 0.9 * thick))
+
+
+def _ball(rng: np.random.Generator, part: Mesh, paint: str, end: _End) -> None:
+    add_ellipsoid(
+        part,
+        paint,
+        (end.begin_m + end.wide_m, 0, 0),
+        (end.wide_m, end.wide_m, end.wide_m * float(rng.uniform(0.7, 1.0))),
+    )
+
+
+def _disc(_: np.random.Generator, part: Mesh, paint: str, end: _End) -> None:
+    round_ = arc((end.begin_m + end.long_m / 2, 0), end.long_m / 2, 0, 345, 24)
+    add_extruded(part, paint, round_, -2 * end.flat_m, 2 * end.flat_m)
+
+
+def _hook(_: np.random.Generator, part: Mesh, paint: str, end: _End) -> None:
+    bend = curve([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.3, 0.4, 0.0), (1.0, 0.8, 0.0), (0.7, 0.7, 0.0)], 5)
+    add_tube(part, paint, np.asarray(bend) * end.long_m + [end.begin_m, 0, 0], end.thick_m * 0.4, sides=10)
+
+
+_ENDS = (_bowl, _tines, _blade, _plate, _brush, _ball, _disc, _hook)
+"""What a handled thing may end in."""
 
 
 def _boxy(draft: Draft, word: str) -> Made:
     """A box that is no cube, sharp or rounded, now and then with a patch, a lid or another box on it."""
-    rng, long = draft.rng, _length(draft, 0.05, 0.32)
+    rng, long = draft.rng, _between(draft, 0.05, 0.32)
     middle, short = np.sort(rng.uniform(0.08, 0.95, 2))[::-1]
     short = min(short, 0.5)
     half = rng.permutation([long, long * middle, long * short]) / 2
@@ -166,7 +205,7 @@ def _boxy(draft: Draft, word: str) -> Made:
 
 def _slab(draft: Draft, word: str) -> Made:
     """An outline by chance, extruded: a star of five to nine corners, or a clamp's C, sometimes with a boss on it."""
-    rng, wide = draft.rng, _length(draft, 0.05, 0.26)
+    rng, wide = draft.rng, _between(draft, 0.05, 0.26)
     thick = wide * float(rng.uniform(0.04, 0.25))
     if rng.random() < 0.3:
         gap, bar = float(rng.uniform(30, 80)), float(rng.uniform(0.55, 0.85))
@@ -189,7 +228,7 @@ def _slab(draft: Draft, word: str) -> Made:
 
 def _bent(draft: Draft, word: str) -> Made:
     """A rod or cable bent by chance, mostly in a plane, sometimes with knobs at its ends."""
-    rng, size = draft.rng, _length(draft, 0.06, 0.30)
+    rng, size = draft.rng, _between(draft, 0.06, 0.30)
     knots = np.cumsum(rng.normal(0, 1, (int(rng.integers(3, 7)), 3)) * [1.0, 1.0, 0.05], axis=0)
     line = np.asarray(curve(knots * size / np.ptp(knots, axis=0).max(), 6))
     radius = size * float(rng.uniform(0.015, 0.07))
@@ -206,7 +245,7 @@ def _bent(draft: Draft, word: str) -> Made:
 
 def _sprayer(draft: Draft, word: str) -> Made:
     """A bottle of any cleaner: an oval or round body, a neck, and a head with a trigger or a pump."""
-    rng, tall = draft.rng, _length(draft, 0.12, 0.22)
+    rng, tall = draft.rng, _between(draft, 0.12, 0.22)
     if word in _BOTTLES:
         word = _no_bottle(draft)
     r = tall * float(rng.uniform(0.16, 0.28))

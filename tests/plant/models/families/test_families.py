@@ -103,6 +103,15 @@ def test_an_oddment_has_plain_colours_alone_and_the_size_of_what_lies_about() ->
         assert 0.001 < each.mass.mass_kg < 12.0, (seed, each.mass.mass_kg)
 
 
+def test_no_turned_oddment_is_a_plain_drum() -> None:
+    turned = [each for each, kind, _ in (make(ODDMENT, seed) for seed in range(240)) if kind == "turned"]
+    for made in turned:
+        points = np.concatenate([points for _, points, _, _ in made.mesh.groups()])
+        level, radius = np.round(points[:, 2], 6), np.linalg.norm(points[:, :2], axis=1)
+        widths = [radius[level == height].max() for height in np.unique(level)]
+        assert max(widths) > 1.3 * min(widths)
+
+
 def test_no_oddment_of_a_box_is_a_cube() -> None:
     boxes = [each for each, kind, _ in (make(ODDMENT, seed) for seed in range(120)) if kind == "box"]
     assert min(max(each.size_m) / min(each.size_m) for each in boxes) > 1.2

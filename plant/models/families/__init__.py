@@ -21,8 +21,9 @@ from plant.models.families.hammers import hammer
 from plant.models.families.model import ObjectModel, Surface, held_out, read_model, write_model
 from plant.models.families.oddments import ODDMENT, oddment
 from plant.models.families.people import person
+from plant.models.families.repainting import in_one_colour, plainly_painted
 from plant.models.families.screwdrivers import screwdriver
-from plant.models.families.sketches import SKETCH_MAKERS, in_one_colour, plainly_painted
+from plant.models.families.sketches import SKETCH_MAKERS
 from plant.models.families.wrenches import wrench
 
 __all__ = [

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from plant.models.builder.mesh import Material, Mesh
+from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import arc
 from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_ring, add_tube
 from plant.models.families.draft import (
@@ -31,41 +30,15 @@ from plant.models.families.draft import (
     turned,
     varied,
 )
-from plant.models.families.solids import COLOURS, GREYS, add_drum, add_rod, paint_grey, paint_plain, some_shine
+from plant.models.families.solids import COLOURS, add_drum, add_rod, paint_grey, paint_plain, some_shine
 
-__all__ = ["SKETCH_MAKERS", "in_one_colour", "plainly_painted"]
+__all__ = ["SKETCH_MAKERS"]
 
 FloatArray = NDArray[np.float64]
 Maker = Callable[[Draft], tuple[Finished, str, str]]
 
 KIND = "sketch"
 _ALONG_Y = turned("x", -np.pi / 2)
-
-
-def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: float = 0.5) -> Finished:
-    """The same thing with every picture on it replaced by its mean colour (so often), or by any plain one."""
-    own = rng.random() < own_colours
-    painted: dict[str, Material] = {}
-    for name, material in made.mesh.materials.items():
-        picture = made.pictures.get(material.texture or "")
-        mean = None if picture is None else np.asarray(picture, dtype=float).reshape(-1, 3).mean(axis=0) / 255.0
-        colour = np.array(COLOURS[int(rng.integers(len(COLOURS)))][1]) if mean is None or not own else mean
-        keep = picture is None and (own or rng.random() < 0.5)
-        painted[name] = material if keep else Material(varied(rng, colour), None, None, material.shine, 0.0)
-    mesh = Mesh(painted)
-    mesh.add_mesh(made.mesh)
-    return replace(made, mesh=mesh, pictures={})
-
-
-def in_one_colour(made: Finished, rng: np.random.Generator) -> tuple[Finished, str]:
-    """The same thing in a single plain colour, as it comes from a drawing; what one would call that."""
-    word, colour = COLOURS[int(rng.integers(len(COLOURS)))]
-    if rng.random() < 0.6:
-        word, colour = "grey", pick(rng, *GREYS)
-    paint = Material(varied(rng, colour, 0.04), None, None, float(rng.uniform(0.0, 0.6)), 0.0)
-    mesh = Mesh(dict.fromkeys(made.mesh.materials, paint))
-    mesh.add_mesh(made.mesh)
-    return replace(made, mesh=mesh, pictures={}), word
 
 
 def _patch(part: Mesh, material: str, radius: float, z_m: tuple[float, float], about_deg: tuple[float, float]) -> None:

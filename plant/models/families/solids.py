@@ -10,7 +10,7 @@ from plant.models.builder.mesh import Colour, Mesh
 from plant.models.builder.surfaces import add_ellipsoid
 from plant.models.families.draft import UP_TO_X, Draft, pick, varied
 
-__all__ = ["COLOURS", "GREYS", "add_drum", "add_rod", "paint_grey", "paint_plain", "some_shine"]
+__all__ = ["COLOURS", "GREYS", "add_drum", "add_rod", "any_plain", "paint_grey", "paint_plain", "some_shine"]
 
 COLOURS: tuple[tuple[str, Colour], ...] = (
     ("red", (0.82, 0.06, 0.05)),
@@ -34,9 +34,14 @@ GREYS: tuple[Colour, ...] = (
 )
 
 
+def any_plain(rng: np.random.Generator) -> tuple[str, Colour]:
+    """One of the colours, and what one would call it."""
+    return COLOURS[int(rng.integers(len(COLOURS)))]
+
+
 def paint_plain(draft: Draft, name: str = "colour") -> str:
     """Paint any plain colour; what one would call it."""
-    word, colour = COLOURS[int(draft.rng.integers(len(COLOURS)))]
+    word, colour = any_plain(draft.rng)
     draft.paint(name, varied(draft.rng, colour, 0.06), shine=some_shine(draft))
     return word
 

@@ -13,11 +13,11 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from executive.knowledge import Knowledge
-from executive.mission import MissionFile
-from executive.registry import built_in_skills
+from executive.mission.knowledge import Knowledge
+from executive.mission.mission import MissionFile
 from executive.testing.skill_test import SkillTestFile
-from executive.types import describe_type, field_types
+from executive.tree.registry import built_in_skills
+from executive.tree.types import describe_type, field_types
 from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.testing.fault_kinds import STANDARD_FAULTS

@@ -53,12 +53,12 @@ def test_no_module_breaks_the_import_rule(package: str) -> None:
     ("path", "source", "expected"),
     [
         ("skills/grasp/skill.py", "from plant.simulation import Simulation", ["plant.simulation.Simulation"]),
-        ("skills/grasp/skill.py", "import executive.runner", ["executive.runner"]),
+        ("skills/grasp/skill.py", "import executive.run.runner", ["executive.run.runner"]),
         ("plant/spot/robot.py", "from skills.api import Surface", ["skills.api.Surface"]),
         ("plant/spot/robot.py", "from skills.robot import Robot", []),
-        ("executive/runner.py", "def f():\n    import plant.simulation", ["plant.simulation"]),
-        ("executive/runner.py", "from executive.cli.main import app", ["executive.cli.main.app"]),
-        ("executive/runner.py", "from skills.api import Cause", []),
+        ("executive/run/runner.py", "def f():\n    import plant.simulation", ["plant.simulation"]),
+        ("executive/run/runner.py", "from executive.cli.main import app", ["executive.cli.main.app"]),
+        ("executive/run/runner.py", "from skills.api import Cause", []),
         ("executive/cli/assembly.py", "from plant.simulation import Simulation", []),
     ],
 )

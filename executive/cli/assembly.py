@@ -6,14 +6,14 @@ from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
-from executive.check import Abilities, PlannedWays
 from executive.cli.detector_choice import detector_of
 from executive.cli.promises import promises_of
-from executive.compiler import CompiledTree
-from executive.errors import InputError, did_you_mean
-from executive.knowledge import Knowledge, load_knowledge
-from executive.outcome import RobotResult
-from executive.runner import RunEntry
+from executive.mission.errors import InputError, did_you_mean
+from executive.mission.knowledge import Knowledge, load_knowledge
+from executive.run.outcome import RobotResult
+from executive.run.runner import RunEntry
+from executive.tree.check import Abilities, PlannedWays
+from executive.tree.compiler import CompiledTree
 from plant.models.catalogue import load_catalogue
 from plant.referee import Verdict
 from plant.simulation import Simulation

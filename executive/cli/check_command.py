@@ -12,16 +12,16 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from executive.check import PlannedWays, check_tree
 from executive.cli.assembly import abilities_of, itinerary_of, knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, console_for, print_json
-from executive.compiler import CompiledTree, compile_mission
-from executive.errors import InputError
-from executive.estimate import Estimate, load_estimates
-from executive.knowledge import Knowledge
 from executive.language import DependencyParser, load_parser
-from executive.mission import MissionFile, load_mission, mission_from_file, overridden
-from executive.registry import installed_skills
+from executive.mission.errors import InputError
+from executive.mission.knowledge import Knowledge
+from executive.mission.mission import MissionFile, load_mission, mission_from_file, overridden
+from executive.tree.check import PlannedWays, check_tree
+from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.estimate import Estimate, load_estimates
+from executive.tree.registry import installed_skills
 from executive.view.collapse import folded_to
 from executive.view.model import node_view
 from executive.view.text import to_rich

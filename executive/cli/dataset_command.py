@@ -17,7 +17,7 @@ from executive.cli.output import console_for, print_json, refusals
 from executive.cli.refine_command import refine_command
 from executive.cli.score_command import score_command
 from executive.cli.train_command import train_command
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from plant.dataset.errors import DatasetError
 from plant.dataset.shards import Summary, render
 

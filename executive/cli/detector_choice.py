@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from skills.detect.detector_file import MODEL_FILE
 from skills.detect.network_file import ModelFileError
 from skills.detect.onnx_detector import DetectorOptions, OnnxDetector, load_detector

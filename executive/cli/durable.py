@@ -13,12 +13,12 @@ from executive.cli.answers import NO_ANSWERS, Answers
 from executive.cli.assembly import take_up_plant
 from executive.cli.report import RunReport
 from executive.cli.requests import Request, commanded, filed, said
-from executive.compiler import CompiledTree
-from executive.errors import InputError
-from executive.resuming import resumed_tree
+from executive.mission.errors import InputError
 from executive.store.journal import StoreJournal
 from executive.store.missions import MissionState, MissionStore, Order, StoredMission
 from executive.store.recollection import Recollection
+from executive.store.resuming import resumed_tree
+from executive.tree.compiler import CompiledTree
 from plant.simulation import Simulation
 from skills.robot import Pose2D
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
-from executive.control import Control, ControlState, Mode
-from executive.questions import OpenQuestion
+from executive.run.control import Control, ControlState, Mode
+from executive.run.questions import OpenQuestion
 
 HELP: Final = "space pause/go on · s step · x stop button · c cancel"
 SAY_HELP: Final = f"{HELP} · : say something"

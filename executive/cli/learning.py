@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from executive.cli.output import print_json
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from skills.detect.training.labels import TrainingDataError, read_split
 from skills.detect.training.schedule import Budget
 

@@ -15,10 +15,10 @@ from rich.text import Text
 
 from executive.cli.assembly import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, console_for, refusals
-from executive.errors import InputError
-from executive.knowledge import Knowledge
 from executive.language import Status, Understanding, load_parser
-from executive.mission import DEFAULT_WORLD
+from executive.mission.errors import InputError
+from executive.mission.knowledge import Knowledge
+from executive.mission.mission import DEFAULT_WORLD
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import HeardUtterance, Listener, Recording

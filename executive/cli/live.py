@@ -12,10 +12,10 @@ from rich.live import Live
 from rich.text import Text
 
 from executive.cli.keys import HELP, Keys, keys_pressed, prompt_lines
-from executive.compiler import CompiledTree
-from executive.control import Control
-from executive.runner import Observer, Progress
-from executive.snapshot import NodeState, Snapshot
+from executive.run.control import Control
+from executive.run.runner import Observer, Progress
+from executive.run.snapshot import NodeState, Snapshot
+from executive.tree.compiler import CompiledTree
 from executive.view.looks import Looks
 from executive.view.model import node_view
 from executive.view.text import to_rich

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 
-from executive.behaviours.skill_leaf import ERROR_TOPIC
 from executive.cli.assembly import judge, run_entry, simulate
 from executive.cli.durable import Durable
 from executive.cli.page_view import PageView, log_map
@@ -18,16 +17,17 @@ from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Request
 from executive.cli.souvenirs import Souvenirs, draw_answer, draw_souvenirs
 from executive.cli.warm_up import warm_up
-from executive.compiler import CompiledTree
-from executive.control import Control
-from executive.outcome import RunResult
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
-from executive.runner import Observer, Progress, RunSettings, run
+from executive.run.control import Control
+from executive.run.outcome import RunResult
+from executive.run.runner import Observer, Progress, RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
+from executive.tree.compiler import CompiledTree
 from executive.view.collapse import DRAWN_NODES, folded_to
 from executive.view.model import NodeView, node_view
 from executive.view.svg import to_svg
-from executive.worker import LockStepWorker
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import typer
 
 from executive.cli.new_skill.render import render_skill
 from executive.cli.output import refusals
-from executive.registry import installed_skills
+from executive.tree.registry import installed_skills
 
 __all__ = ["new_skill"]
 

@@ -11,7 +11,7 @@ from typing import Any
 import typer
 from rich.console import Console
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 
 NOT_ACHIEVED = 1
 BAD_INPUT = 2

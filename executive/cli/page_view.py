@@ -12,13 +12,13 @@ from executive.cli.durable import Asked
 from executive.cli.replay_command import served, wait
 from executive.cli.requests import Request
 from executive.cli.talk import LateParser, conversation_of
-from executive.control import Control
 from executive.conversation import ReplyKind
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.record.event_log import EventLog
 from executive.record.schemas import MAP
 from executive.record.surroundings import map_message
-from executive.runner import Progress
+from executive.run.control import Control
+from executive.run.runner import Progress
 from executive.store.missions import MissionStore
 from executive.view.actions import Action, RefusedError, asked_json, control_actions, text_of
 from executive.view.feed import Feed

@@ -11,11 +11,11 @@ import typer
 
 from executive.cli.assembly import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json, refusals
-from executive.errors import InputError
 from executive.language import Status, Understanding, explain, load_parser, parse_lines
 from executive.language.explain_svg import arcs_svg
 from executive.language.explain_text import explanation_lines
-from executive.mission import DEFAULT_WORLD
+from executive.mission.errors import InputError
+from executive.mission.mission import DEFAULT_WORLD
 
 __all__ = ["parse"]
 

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 
 __all__ = ["MOST_PIXELS", "read_picture", "write_picture"]
 

@@ -9,15 +9,15 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.behaviours.board import Constant
-from executive.command import Command, Task, Thing
-from executive.compiler import CompiledTree, StepPart
-from executive.compiling.plans import SkillPlan
-from executive.compiling.search import surfaces_to_search
-from executive.compiling.steps import START
-from executive.knowledge import Knowledge, Pose
-from executive.outcome import RobotResult
-from executive.snapshot import Snapshot
+from executive.mission.command import Command, Task, Thing
+from executive.mission.knowledge import Knowledge, Pose
+from executive.run.outcome import RobotResult
+from executive.run.snapshot import Snapshot
+from executive.tree.behaviours.board import Constant
+from executive.tree.compiler import CompiledTree, StepPart
+from executive.tree.compiling.plans import SkillPlan
+from executive.tree.compiling.search import surfaces_to_search
+from executive.tree.compiling.steps import START
 from plant.referee import Promise, PromiseKind, Region
 from skills.robot import Pose2D
 

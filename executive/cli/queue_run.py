@@ -11,9 +11,9 @@ from rich.console import Console
 from executive.cli.durable import asked_again, kept, new_run, next_run, plant_file, same_world
 from executive.cli.mission_run import run_request
 from executive.cli.shown import control_for, show_files, show_run
-from executive.compiling.workshop import slug
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.tree.compiling.workshop import slug
 
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
 

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, learnt, tell_learnt
 from executive.cli.output import console_for, refusals
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from skills.detect.detector_file import MODEL_FILE
 from skills.detect.training.options import RefineOptions
 from skills.detect.training.schedule import REGIONS_RATE, Schedule

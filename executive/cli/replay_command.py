@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from executive.cli.output import console_for, refusals
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.record.history import History, read_history
 from executive.view.replay import fed, to_html
 from executive.view.server import PageContent, PageServer

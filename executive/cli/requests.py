@@ -8,12 +8,11 @@ from pathlib import Path
 
 from executive.cli.answers import NO_ANSWERS, Answers
 from executive.cli.assembly import knowledge_of, open_world
-from executive.command import parse_command
-from executive.compiler import CompiledTree, compile_mission
-from executive.errors import InputError
-from executive.knowledge import Knowledge
 from executive.language import Understanding, load_parser
-from executive.mission import (
+from executive.mission.command import parse_command
+from executive.mission.errors import InputError
+from executive.mission.knowledge import Knowledge
+from executive.mission.mission import (
     DEFAULT_WORLD,
     Mission,
     MissionFile,
@@ -24,7 +23,8 @@ from executive.mission import (
     overridden,
     understood,
 )
-from executive.registry import installed_skills
+from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.registry import installed_skills
 from plant.worlds.world import World
 
 

@@ -14,7 +14,7 @@ from executive.cli.mission_run import Finished, run_request
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.queue_run import run_queue, start_of
 from executive.cli.shown import control_for, show_files, show_past, show_run
-from executive.errors import InputError, listing
+from executive.mission.errors import InputError, listing
 from executive.store.missions import MissionState, MissionStore, StoredMission
 
 __all__ = ["resume"]

@@ -19,7 +19,7 @@ from executive.cli.output import console_for, print_json, refusals
 from executive.cli.picture_files import Picture, read_picture, write_picture
 from executive.cli.score_report import score_json, show_score
 from executive.cli.worst_sheet import Shown, contact_sheet
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from skills.detect.careful_detector import CarefulDetector
 from skills.detect.onnx_detector import DetectorOptions, OnnxDetector
 from skills.detect.scoring import judged, picture_errors, score

@@ -13,10 +13,10 @@ from executive.cli.live import live_view
 from executive.cli.mission_run import Finished, both
 from executive.cli.requests import Request
 from executive.cli.talk import LateParser, conversation_of
-from executive.compiler import CompiledTree
-from executive.control import Control
 from executive.conversation import Conversation
-from executive.runner import Observer
+from executive.run.control import Control
+from executive.run.runner import Observer
+from executive.tree.compiler import CompiledTree
 from executive.view.text import to_rich
 
 

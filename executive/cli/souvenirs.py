@@ -11,10 +11,10 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from executive.behaviours.answer import ANSWER_TOPIC
-from executive.messages import DESTINATION_TOPIC
+from executive.record.messages import DESTINATION_TOPIC
 from executive.record.schemas import TRANSITIONS
-from executive.resuming import told_before
+from executive.store.resuming import told_before
+from executive.tree.behaviours.answer import ANSWER_TOPIC
 from plant.pictures import Bounds, Picture, best_view, draw_detection, draw_map, render_view, save_png, top_view
 from plant.simulation import Simulation
 from skills.api import Publish

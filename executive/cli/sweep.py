@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from executive.cli.report import RefereeReport, RunReport
-from executive.errors import InputError
+from executive.mission.errors import InputError
 
 
 def seed_range(text: str) -> tuple[int, ...]:

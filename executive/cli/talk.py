@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from executive.cli.requests import Request
-from executive.command import Command
-from executive.compiler import CompiledTree, compile_mission
-from executive.control import Control
 from executive.conversation import Conversation, Speech
 from executive.language import Understanding, load_parser, understand
 from executive.language.parser import SpacyParser
 from executive.language.reference import Memory
-from executive.mission import mission_from_commands
-from executive.registry import installed_skills
+from executive.mission.command import Command
+from executive.mission.mission import mission_from_commands
+from executive.run.control import Control
+from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.registry import installed_skills
 
 __all__ = ["LateParser", "conversation_of"]
 

@@ -14,7 +14,7 @@ import typer
 
 from executive.cli.output import refusals
 from executive.cli.requests import Request, filed, said
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.record.history import read_history
 from executive.view.btcpp import to_btcpp
 from executive.view.collapse import DRAWN_NODES, MANY_NODES, folded_below, folded_to

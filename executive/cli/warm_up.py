@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-from executive.runner import RunEntry
+from executive.run.runner import RunEntry
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import PlanningError, plan_path
 from skills.robot import Pose2D

@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from executive.command import Command
-from executive.compiler import CompiledTree
-from executive.control import ControlState
-from executive.knowledge import Knowledge
 from executive.language.questions import ClarifyingQuestion
 from executive.language.reference import Memory
 from executive.language.understand import Understanding
+from executive.mission.command import Command
+from executive.mission.knowledge import Knowledge
+from executive.run.control import ControlState
+from executive.tree.compiler import CompiledTree
 
 __all__ = ["NEVER_MIND", "OVER", "Hands", "Reply", "ReplyKind", "Speech", "Waiting", "answer", "done", "refused"]
 
@@ -22,7 +22,7 @@ NEVER_MIND: Final = "all right, never mind"
 
 
 class Hands(Protocol):
-    """What a conversation does to a run; `executive.control.Control` is one."""
+    """What a conversation does to a run; `executive.run.control.Control` is one."""
 
     @property
     def state(self) -> ControlState:

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from executive.control import Mode
 from executive.conversation.parts import OVER, Hands, Reply, Speech, answer, done, refused
 from executive.conversation.status_words import doing_in_words, place_in_words
 from executive.language.grounding import known_line
 from executive.language.remarks import Remark
-from executive.runner import Progress
+from executive.run.control import Mode
+from executive.run.runner import Progress
 
 __all__ = ["RemarkAnswers"]
 

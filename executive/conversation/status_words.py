@@ -8,10 +8,10 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.control import ControlState, Mode
-from executive.knowledge import Corner, Knowledge
-from executive.runner import Progress
-from executive.snapshot import NodeState, Snapshot
+from executive.mission.knowledge import Corner, Knowledge
+from executive.run.control import ControlState, Mode
+from executive.run.runner import Progress
+from executive.run.snapshot import NodeState, Snapshot
 from skills.robot import Pose2D
 
 __all__ = ["doing_in_words", "place_in_words"]

@@ -11,9 +11,6 @@ from functools import partial
 from types import MappingProxyType
 from typing import Final
 
-from executive.command import Command, Task, Thing
-from executive.compiler import CompiledTree
-from executive.control import Mode
 from executive.conversation.parts import (
     NEVER_MIND,
     OVER,
@@ -27,14 +24,17 @@ from executive.conversation.parts import (
     refused,
 )
 from executive.conversation.remarks import RemarkAnswers
-from executive.errors import InputError
 from executive.language.followups import Amendment, FollowUp, FollowUpKind, amended, follow_up_of, without_fetching
 from executive.language.questions import ClarifyingQuestion, with_answer
 from executive.language.reference import Memory
 from executive.language.remarks import Remark, remark_of
 from executive.language.understand import Status, Understanding
 from executive.language.wake import heard_wake, strip_wake
-from executive.runner import Progress
+from executive.mission.command import Command, Task, Thing
+from executive.mission.errors import InputError
+from executive.run.control import Mode
+from executive.run.runner import Progress
+from executive.tree.compiler import CompiledTree
 
 __all__ = ["REMEMBERED_S", "Conversation"]
 

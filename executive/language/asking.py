@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from executive.knowledge import Knowledge
 from executive.language.parser import DependencyParser
 from executive.language.questions import Answerer, with_answer
 from executive.language.understand import Understanding, understand
+from executive.mission.knowledge import Knowledge
 
 __all__ = ["understand_asking"]
 

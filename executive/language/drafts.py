@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Final
 
-from executive.command import Command, Task, Thing
 from executive.language.lexicon import VerbKind, lexicon
 from executive.language.phrases import Phrase
 from executive.language.reference import Deed
 from executive.language.refusal import RefusalError
 from executive.language.roles import HERE, Location
+from executive.mission.command import Command, Task, Thing
 
 __all__ = ["Draft", "draft_commands", "spoken_command"]
 

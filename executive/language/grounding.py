@@ -10,9 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from executive.command import Command, Task, Thing
-from executive.errors import listing
-from executive.knowledge import Knowledge
 from executive.language.drafts import Draft
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
@@ -20,6 +17,9 @@ from executive.language.questions import ClarifyingQuestion, Slot, perhaps, whic
 from executive.language.refusal import RefusalError
 from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
+from executive.mission.command import Command, Task, Thing
+from executive.mission.errors import listing
+from executive.mission.knowledge import Knowledge
 
 __all__ = ["Grounded", "ground", "ground_noted", "known_line"]
 

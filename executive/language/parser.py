@@ -13,10 +13,10 @@ import spacy
 from spacy.language import Language
 from spacy.tokens import Token as SpacyToken
 
-from executive.errors import InputError
 from executive.language.nouns import FloatArray, NounKind, NounKinds, noun_examples
 from executive.language.repairs import repaired
 from executive.language.tokens import Token
+from executive.mission.errors import InputError
 
 __all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
 

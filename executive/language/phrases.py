@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from executive.command import Thing
 from executive.language.lexicon import lexicon
 from executive.language.nouns import NounKind
 from executive.language.parser import Token
+from executive.mission.command import Thing
 
 __all__ = ["Phrase", "noun_phrases"]
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
 
-from executive.errors import listing
 from executive.language.similar import spelling_distance
 from executive.language.sounds import nearest_by_sound
+from executive.mission.errors import listing
 
 __all__ = ["Answerer", "ClarifyingQuestion", "QuestionPolicy", "Slot", "answer_by", "chosen", "with_answer"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from executive.knowledge import Knowledge
 from executive.language.grounding import known_line
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind, noun_examples
@@ -13,6 +12,7 @@ from executive.language.phrases import Phrase
 from executive.language.reference import Deed
 from executive.language.refusal import RefusalError
 from executive.language.roles import HERE, Location
+from executive.mission.knowledge import Knowledge
 
 __all__ = ["check_reach", "not_understood"]
 

@@ -11,10 +11,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
-from executive.command import is_attribute
 from executive.language.lexicon import lexicon
 from executive.language.nouns import NounKind
 from executive.language.tokens import Token
+from executive.mission.command import is_attribute
 
 __all__ = ["repaired"]
 

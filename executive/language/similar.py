@@ -15,8 +15,8 @@ from typing import Final, Protocol, runtime_checkable
 
 import yaml
 
-from executive.knowledge import Knowledge
 from executive.language.sounds import sound_distance
+from executive.mission.knowledge import Knowledge
 
 __all__ = ["Mended", "WordFacts", "look_alikes", "mend_spelling", "spelling_distance", "synonyms_of", "words_for"]
 

@@ -6,9 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from executive.command import Command, is_attribute
-from executive.errors import listing
-from executive.knowledge import Knowledge
 from executive.language.actions import Action, read_actions
 from executive.language.clauses import Clause, split_clauses, without_name
 from executive.language.drafts import Draft, draft_commands, spoken_command
@@ -27,6 +24,9 @@ from executive.language.reading import split_items
 from executive.language.reference import Deed, Memory, resolve
 from executive.language.refusal import RefusalError
 from executive.language.similar import WordFacts
+from executive.mission.command import Command, is_attribute
+from executive.mission.errors import listing
+from executive.mission.knowledge import Knowledge
 
 __all__ = ["Trace", "trace_sentence"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from executive.command import is_attribute, may_be_attribute
 from executive.language.nouns import NounKind
+from executive.mission.command import is_attribute, may_be_attribute
 
 __all__ = ["Token"]
 

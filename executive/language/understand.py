@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from executive.command import Command
-from executive.knowledge import Knowledge
 from executive.language.foreign import foreign_reason
 from executive.language.normalise import clean
 from executive.language.parser import DependencyParser
@@ -17,6 +15,8 @@ from executive.language.reference import Memory
 from executive.language.similar import Mended, WordFacts, mend_spelling
 from executive.language.steps import Trace, trace_sentence
 from executive.language.wake import strip_wake
+from executive.mission.command import Command
+from executive.mission.knowledge import Knowledge
 
 __all__ = ["Status", "Understanding", "parse_lines", "understand"]
 

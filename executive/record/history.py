@@ -9,10 +9,10 @@ from typing import Any
 
 from py_trees.common import Status
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.record.reader import Event, read_events
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
-from executive.snapshot import NodeState
+from executive.run.snapshot import NodeState
 from executive.view.model import NodeView, logged_view
 from skills.api import Cause
 

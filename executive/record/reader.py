@@ -13,7 +13,7 @@ from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 from zstandard import ZstdError
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.record.schemas import WALL
 
 _DAMAGE = (McapError, struct.error, ZstdError, ValueError)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
+from executive.record.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
 
 TREE: Final = "tree"
 TRANSITIONS: Final = "transitions"

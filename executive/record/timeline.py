@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
 from executive.record.history import logged_activity, logged_state
+from executive.record.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
 from executive.record.reader import Event
 from executive.record.schemas import ACTIVITY, CONTROL, ERRORS, OUTCOME, RUN, TRANSITIONS, TREE, WALL
-from executive.snapshot import NodeState
+from executive.run.snapshot import NodeState
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.model_file import ModelFile
 
 __all__ = ["Adapter", "LowRank", "packaged_adapter", "read_adapter"]

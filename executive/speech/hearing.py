@@ -7,12 +7,12 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
-from executive.command import Command, is_attribute
-from executive.knowledge import Knowledge
 from executive.language import DependencyParser, Status, Understanding, understand
 from executive.language.lexicon import lexicon
 from executive.language.roles import HERE
 from executive.language.wake import Address, heard_wake
+from executive.mission.command import Command, is_attribute
+from executive.mission.knowledge import Knowledge
 from executive.speech.alikes import SoundAlikes
 from executive.speech.repair import Reading
 from executive.speech.vocabulary import Vocabulary

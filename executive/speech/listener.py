@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from executive.command import Command
-from executive.errors import InputError
 from executive.language import Status
+from executive.mission.command import Command
+from executive.mission.errors import InputError
 from executive.speech.activity import Endpointer, PauseRules, SpeechDetector, Utterance
 from executive.speech.alikes import SoundAlikes
 from executive.speech.calling import opening_as_heard

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.activity import Endpointer
 from executive.speech.listener import HeardUtterance, Listener
 from executive.speech.sound import RATE_HZ, Samples, level_db

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 
 __all__ = ["ModelFile", "read_model_file"]
 

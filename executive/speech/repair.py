@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Final, Generic, TypeVar
 
-from executive.command import is_attribute
+from executive.mission.command import is_attribute
 from executive.speech.alikes import Alike, SoundAlikes
 
 __all__ = ["Reading", "Repair", "repairs"]

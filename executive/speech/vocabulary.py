@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from executive.errors import InputError
-from executive.knowledge import Knowledge
+from executive.mission.errors import InputError
+from executive.mission.knowledge import Knowledge
 
 __all__ = ["Vocabulary", "of_world", "read_vocabulary"]
 

@@ -17,7 +17,7 @@ from typing import BinaryIO, Final
 import numpy as np
 from scipy.signal import resample_poly
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ, Samples
 
 __all__ = ["WavFormat", "read_wav"]

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.adapter import packaged_adapter
 from executive.speech.extra import speech_module
 from executive.speech.model_file import read_model_file

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 
 VERSION: Final = 1
 APPLICATION_ID: Final = 0x45525244  # "ERRD"

@@ -8,13 +8,13 @@ import sqlite3
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from executive.compiler import CompiledTree
-from executive.journal import TickNote
-from executive.snapshot import Transition
+from executive.run.journal import TickNote
+from executive.run.snapshot import Transition
 from executive.store.database import transaction
 from executive.store.recollection import Recollection
 from executive.store.records import Order
 from executive.store.values import to_text
+from executive.tree.compiler import CompiledTree
 from skills.robot import Pose2D
 
 MOVED_M: Final = 0.02
@@ -27,7 +27,7 @@ _REPLACE: Final = (
 
 
 class StoreJournal:
-    """Implements `executive.journal.Journal`.
+    """Implements `executive.run.journal.Journal`.
 
     What cannot be written now, since another program holds the store, is written with a later tick: the robot's work
     does not wait for it. `troubles` tells of what could not be kept.

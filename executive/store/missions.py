@@ -15,7 +15,7 @@ from types import TracebackType
 
 from py_trees.common import Status
 
-from executive.errors import InputError, listing
+from executive.mission.errors import InputError, listing
 from executive.store.database import connect, told, transaction
 from executive.store.journal import StoreJournal
 from executive.store.records import Memory, Order, StepRecord

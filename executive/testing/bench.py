@@ -8,10 +8,10 @@ from typing import Any
 
 from py_trees.common import Status
 
-from executive.behaviours.board import Board, Constant
-from executive.behaviours.context import RunContext
-from executive.behaviours.skill_leaf import SkillLeaf
-from executive.worker import LockStepWorker
+from executive.run.worker import LockStepWorker
+from executive.tree.behaviours.board import Board, Constant
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.skill_leaf import SkillLeaf
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
 from skills.robot import Clock, Robot
 from skills.testing.detector import PlainColours

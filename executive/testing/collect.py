@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.testing.skill_test import RobotSetup, SkillTestFile, WorldSetup, load_skill_tests
 from executive.testing.suite import PARTS, SuiteCase
 from executive.testing.trial import BenchMakers, carry_out, scripted

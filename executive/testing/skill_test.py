@@ -14,11 +14,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
-from executive.errors import InputError, did_you_mean, listing
-from executive.port_values import PortValueError, gathered, port_value
+from executive.mission.errors import InputError, did_you_mean, listing
+from executive.mission.yaml_source import YamlSource, read_yaml, validate
 from executive.testing.small_room import room_knowledge
-from executive.types import describe_type, field_types
-from executive.yaml_source import YamlSource, read_yaml, validate
+from executive.tree.port_values import PortValueError, gathered, port_value
+from executive.tree.types import describe_type, field_types
 from skills.api import Cause, Skill
 from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.testing.faults import parse_fault

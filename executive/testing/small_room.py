@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import yaml
 
-from executive.knowledge import Knowledge
+from executive.mission.knowledge import Knowledge
 from skills.testing.blocks import ROOM, Block, grid_of
 
 TABLE = "table"

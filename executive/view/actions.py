@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.control import Control, ControlState
 from executive.conversation.parts import Waiting
+from executive.run.control import Control, ControlState
 
 Action = Callable[[Mapping[str, Any]], str]
 

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from executive.compiling.plans import NodePlan, Source
-from executive.snapshot import NodeState
+from executive.run.snapshot import NodeState
+from executive.tree.compiling.plans import NodePlan, Source
 from executive.view.ports import Port, ports_of
 
 

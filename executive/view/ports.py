@@ -7,9 +7,9 @@ import enum
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from executive.behaviours.board import Constant, FromBoard
-from executive.compiling.plans import NodePlan, SkillPlan
-from executive.types import describe_type, field_types
+from executive.tree.behaviours.board import Constant, FromBoard
+from executive.tree.compiling.plans import NodePlan, SkillPlan
+from executive.tree.types import describe_type, field_types
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
-from executive.control import Control, Mode
-from executive.runner import Progress
+from executive.run.control import Control, Mode
+from executive.run.runner import Progress
 from executive.view.actions import control_json
 from executive.view.feed import Feed
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from executive.record.reader import read_events
-from executive.resuming import told_before
+from executive.store.resuming import told_before
 from plant.snapshot.file import SnapshotError, read_snapshot
 
 FETCH = ("Hey Alice, can you fetch me a drink from the kitchen", 50.0)

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from executive.compiler import compile_mission
-from executive.knowledge import load_knowledge
 from executive.language import load_parser
-from executive.mission import mission_from_file
-from executive.registry import installed_skills
+from executive.mission.knowledge import load_knowledge
+from executive.mission.mission import mission_from_file
+from executive.tree.compiler import compile_mission
+from executive.tree.registry import installed_skills
 
 STEPS = (
     "  - {to: kitchen, do: grasp, object: drink, retries: 1, timeout: 300}",

@@ -9,12 +9,12 @@ import py_trees
 import pytest
 from pydrake.math import RigidTransform
 
-from executive.compiler import CompiledTree
-from executive.compiling.plans import SequencePlan, SkillPlan, TimeoutPlan
-from executive.outcome import Outcome
 from executive.record.event_log import EventLog
-from executive.runner import RunEntry, RunSettings, run
-from executive.worker import LockStepWorker
+from executive.run.outcome import Outcome
+from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.tree.compiler import CompiledTree
+from executive.tree.compiling.plans import SequencePlan, SkillPlan, TimeoutPlan
 from skills.api import Running, Skill, Succeeded
 from skills.robot import CommandId, Gripper, Lease, Odometry
 from skills.testing.clock import VirtualClock

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from executive.compiler import compile_mission
-from executive.knowledge import load_knowledge
 from executive.language import load_parser, understand
-from executive.mission import mission_from_sentence
-from executive.registry import built_in_skills
+from executive.mission.knowledge import load_knowledge
+from executive.mission.mission import mission_from_sentence
+from executive.tree.compiler import compile_mission
+from executive.tree.registry import built_in_skills
 from plant.worlds.world import load_world
 
 SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"

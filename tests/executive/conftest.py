@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from executive.behaviours.board import Board
-from executive.behaviours.context import RunContext
-from executive.command import parse_command
-from executive.compiler import CompiledTree, Step, compile_commands
-from executive.knowledge import Knowledge
-from executive.runner import RunEntry, RunSettings, run
-from executive.worker import LockStepWorker
+from executive.mission.command import parse_command
+from executive.mission.knowledge import Knowledge
+from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.tree.behaviours.board import Board
+from executive.tree.behaviours.context import RunContext
+from executive.tree.compiler import CompiledTree, Step, compile_commands
 from skills.api import (
     Cause,
     Failed,

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from executive.record.reader import read_events
-from executive.resuming import told_before
+from executive.store.resuming import told_before
 from plant.snapshot.file import SnapshotError, read_snapshot
 
 ERRAND = (sys.executable, "-m", "executive.cli")

@@ -9,12 +9,12 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from executive.cli.assembly import judge, knowledge_of, open_world, run_entry
-from executive.command import parse_command
-from executive.compiler import Step, compile_commands
-from executive.outcome import Outcome
-from executive.registry import built_in_skills
-from executive.runner import RunSettings, run
-from executive.worker import LockStepWorker
+from executive.mission.command import parse_command
+from executive.run.outcome import Outcome
+from executive.run.runner import RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.tree.compiler import Step, compile_commands
+from executive.tree.registry import built_in_skills
 from plant.diagram import LooseModel
 from plant.simulation import Simulation
 

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from table_scene import BLUE, RED, taken
 from table_scene import LENS as TABLE_LENS
 
-from executive.worker import LockStepWorker
+from executive.run.worker import LockStepWorker
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Failed, LocalisationEstimate, Running, SkillContext
 from skills.arm.kinematics import arm_model

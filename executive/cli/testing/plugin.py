@@ -50,8 +50,8 @@ def _settings(config: pytest.Config) -> SkillTestSettings:
             "plant": _plant_maker,
         }
         try:
-            skills = import_module("executive.registry").installed_skills()
-        except import_module("executive.errors").InputError as error:
+            skills = import_module("executive.tree.registry").installed_skills()
+        except import_module("executive.mission.errors").InputError as error:
             raise pytest.UsageError(str(error)) from error
         settings = import_module("executive.testing.collect").SkillTestSettings(skills, makers, capabilities)
         config.stash[_SETTINGS] = settings

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.training.extra import needs_torch
 
 _BAD_INPUT = 2

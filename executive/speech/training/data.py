@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ, Samples
 from executive.speech.training.grammar import Grammar, load_grammar
 from executive.speech.training.voices import Speaker, drawn_speaker, speakers, speech

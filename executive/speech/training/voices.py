@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.sound import Samples, joined
 from executive.speech.wav import read_wav
 

@@ -26,7 +26,7 @@ import sentences
 import voices
 
 from executive.cli.listen_command import listener_for
-from executive.knowledge import load_knowledge
+from executive.mission.knowledge import load_knowledge
 from executive.speech.sound import RATE_HZ, joined
 from executive.speech.wav import read_wav
 from plant.worlds.world import load_world

@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 from executive.cli import answers, main
 from executive.cli.answers import Answers, ask_at_terminal
 from executive.cli.durable import Asked
-from executive.errors import InputError
 from executive.language.questions import ClarifyingQuestion, QuestionPolicy, Slot
+from executive.mission.errors import InputError
 
 TABLE = "put the cube on the table"
 QUESTION = ClarifyingQuestion("Which table?", Slot.PLACE, ("kitchen table", "coffee table"), "kitchen table", "table")

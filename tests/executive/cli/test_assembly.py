@@ -5,7 +5,7 @@ from tiny_detector import CLASSES, model_bytes, write_model
 
 from executive.cli import assembly
 from executive.cli.assembly import shared_detector
-from executive.errors import InputError
+from executive.mission.errors import InputError
 
 
 @pytest.fixture

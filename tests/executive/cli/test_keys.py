@@ -8,7 +8,7 @@ import time
 import pytest
 
 from executive.cli.keys import HELP, SAY_HELP, Keys, Typing, keys_available, keys_pressed, prompt_lines
-from executive.control import Control, Mode
+from executive.run.control import Control, Mode
 from skills.api import Question
 from skills.testing.clock import VirtualClock
 

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 import executive.cli.listen_command as listen_command
 from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.cli.main import app
-from executive.errors import InputError
 from executive.language import Status, Understanding
+from executive.mission.errors import InputError
 from executive.speech.microphone import follow
 from executive.testing.speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, write_wav
 

@@ -8,9 +8,9 @@ from rich.console import Console
 from rich.text import Text
 
 from executive.cli.live import fitted, live_view
-from executive.control import Control
-from executive.runner import Progress
-from executive.snapshot import NodeState
+from executive.run.control import Control
+from executive.run.runner import Progress
+from executive.run.snapshot import NodeState
 
 
 def tree_of(count, running):

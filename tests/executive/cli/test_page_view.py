@@ -15,7 +15,7 @@ from websockets.sync.client import connect
 from executive.cli.durable import Asked
 from executive.cli.page_view import PageView, queueing
 from executive.cli.page_view import said as sentence_action
-from executive.control import Mode
+from executive.run.control import Mode
 from executive.store.missions import MissionState, MissionStore
 from executive.view.actions import RefusedError
 

@@ -3,9 +3,9 @@
 import pytest
 
 from executive.cli.promises import promises, promises_of
-from executive.command import parse_command
-from executive.compiler import compile_mission
-from executive.mission import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
+from executive.mission.command import parse_command
+from executive.mission.mission import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
+from executive.tree.compiler import compile_mission
 from plant.referee import PromiseKind
 
 

@@ -11,11 +11,11 @@ from typer.testing import CliRunner
 from executive.cli import main, queue_run, requests, resume_command
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
-from executive.command import Command
-from executive.errors import InputError
-from executive.journal import TickNote
-from executive.mission import mission_from_commands
-from executive.snapshot import NodeState, Transition
+from executive.mission.command import Command
+from executive.mission.errors import InputError
+from executive.mission.mission import mission_from_commands
+from executive.run.journal import TickNote
+from executive.run.snapshot import NodeState, Transition
 from executive.store.missions import MissionStore
 from executive.view.model import node_view
 

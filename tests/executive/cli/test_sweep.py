@@ -8,7 +8,7 @@ import pytest
 from executive.cli import sweep as module
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.sweep import rows, seed_range, sweep, totals
-from executive.errors import InputError
+from executive.mission.errors import InputError
 
 
 def report(seed: int, outcome: str = "success") -> RunReport:

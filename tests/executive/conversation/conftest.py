@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import pytest
 
-from executive.compiler import compile_mission
-from executive.control import Control
 from executive.conversation import Conversation, Speech
 from executive.language import load_parser, understand
-from executive.mission import mission_from_commands
+from executive.mission.mission import mission_from_commands
+from executive.run.control import Control
+from executive.tree.compiler import compile_mission
 
 
 @pytest.fixture(scope="session")

@@ -1,10 +1,10 @@
 import pytest
 from py_trees.common import Status
 
-from executive.control import Control
 from executive.conversation.status_words import doing_in_words, place_in_words
-from executive.runner import Progress
-from executive.snapshot import NodeState
+from executive.run.control import Control
+from executive.run.runner import Progress
+from executive.run.snapshot import NodeState
 from skills.api import Cause
 from skills.robot import Pose2D
 

@@ -4,9 +4,9 @@ import time
 
 import pytest
 
-from executive.control import Mode
 from executive.conversation import Conversation, ReplyKind
-from executive.outcome import Outcome
+from executive.run.control import Mode
+from executive.run.outcome import Outcome
 from skills.api import Question
 from skills.testing.clock import VirtualClock
 

@@ -5,7 +5,7 @@ import pytest
 from executive.cli.durable import Asked
 from executive.cli.mission_run import run_request
 from executive.cli.talk import LateParser, conversation_of
-from executive.control import Control
+from executive.run.control import Control
 
 
 @pytest.mark.mission

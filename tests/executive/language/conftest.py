@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from executive.knowledge import load_knowledge
 from executive.language import load_parser
+from executive.mission.knowledge import load_knowledge
 
 
 @pytest.fixture(scope="session")

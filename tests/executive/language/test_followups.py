@@ -2,8 +2,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.command import parse_command
 from executive.language.followups import Amendment, FollowUpKind, amended, follow_up_of, without_fetching
+from executive.mission.command import parse_command
 from skills.api import Thing
 
 FETCH = tuple(

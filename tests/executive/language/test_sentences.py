@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from executive.command import parse_command
 from executive.language import Status, understand
+from executive.mission.command import parse_command
 
 FAMILIES = {
     file.stem: yaml.safe_load(file.read_text(encoding="utf-8"))

@@ -5,8 +5,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.command import parse_command
 from executive.language import Status, parse_lines, understand
+from executive.mission.command import parse_command
 
 HERE = Path(__file__).parent
 FAMILIES = yaml.safe_load((HERE / "sentences.yaml").read_text(encoding="utf-8"))

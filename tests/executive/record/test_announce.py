@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from executive.command import parse_command
+from executive.mission.command import parse_command
 from executive.record.announce import announce, goal_position
 
 

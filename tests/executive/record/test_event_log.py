@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.record.event_log import EventLog, plain_values
 from executive.record.reader import comparable_events, read_events
 from skills.api import Cause

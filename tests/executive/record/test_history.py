@@ -5,7 +5,7 @@ import json
 import pytest
 from py_trees.common import Status
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
 from executive.record.timeline import timeline

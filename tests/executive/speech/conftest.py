@@ -7,8 +7,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from executive.knowledge import load_knowledge
 from executive.language import load_parser
+from executive.mission.knowledge import load_knowledge
 from plant.worlds.world import load_world
 
 PROGRAMS = {

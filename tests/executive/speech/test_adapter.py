@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech import adapter
 from executive.speech.adapter import Adapter, LowRank, packaged_adapter, read_adapter
 from executive.speech.model_file import read_model_file

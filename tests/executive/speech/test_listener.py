@@ -6,8 +6,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from executive.errors import InputError
 from executive.language import Status
+from executive.mission.errors import InputError
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener

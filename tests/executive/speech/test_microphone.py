@@ -5,8 +5,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from executive.errors import InputError
 from executive.language import Status
+from executive.mission.errors import InputError
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener
 from executive.speech.microphone import follow, microphone_blocks

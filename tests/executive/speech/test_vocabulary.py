@@ -1,6 +1,6 @@
 import pytest
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.vocabulary import Vocabulary, of_world, read_vocabulary
 
 

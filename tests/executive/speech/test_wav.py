@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ, joined
 from executive.speech.wav import read_wav
 from executive.testing.speech import tone, write_raw_wav, write_wav

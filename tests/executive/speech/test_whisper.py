@@ -6,7 +6,7 @@ from importlib import import_module
 import pytest
 
 import executive.speech.extra as extra
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener

@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 from py_trees.common import Status
 
-from executive.errors import InputError
-from executive.journal import TickNote
-from executive.snapshot import NodeState, Transition
+from executive.mission.errors import InputError
+from executive.run.journal import TickNote
+from executive.run.snapshot import NodeState, Transition
 from executive.store.missions import MissionState, MissionStore, Order
 from skills.api import Cause
 from skills.robot import Pose2D

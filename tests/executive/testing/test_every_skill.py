@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from executive.registry import built_in_skills
+from executive.tree.registry import built_in_skills
 
 ROOT = Path(__file__).resolve().parents[3]
 

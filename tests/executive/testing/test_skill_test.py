@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import pytest
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.testing.skill_test import load_skill_tests
 from executive.testing.trial import carry_out, scripted_maker
 from skills.api import Cause, Failed, Running, Skill, Succeeded

@@ -3,7 +3,7 @@
 import pytest
 from py_trees.common import Status
 
-from executive.snapshot import NodeState
+from executive.run.snapshot import NodeState
 from executive.view.collapse import folded_below, folded_to
 from executive.view.model import NodeView
 from executive.view.svg import to_svg

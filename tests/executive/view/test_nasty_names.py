@@ -8,7 +8,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.record.reader import Event
-from executive.snapshot import NodeState
+from executive.run.snapshot import NodeState
 from executive.view.btcpp import to_btcpp
 from executive.view.mermaid import to_mermaid
 from executive.view.model import NodeView, to_json

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from executive.control import Control, Mode
 from executive.conversation import Conversation, Speech
 from executive.language import Status, Understanding
 from executive.language.questions import ClarifyingQuestion, Slot
-from executive.outcome import Glance
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
 from executive.record.surroundings import map_message
-from executive.runner import Progress
+from executive.run.control import Control, Mode
+from executive.run.outcome import Glance
+from executive.run.runner import Progress
 from executive.view.actions import RefusedError, asked_json, control_actions
 from executive.view.feed import Feed
 from executive.view.model import node_view

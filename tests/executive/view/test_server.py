@@ -9,7 +9,7 @@ import pytest
 from websockets.exceptions import InvalidStatus, WebSocketException
 from websockets.sync.client import connect
 
-from executive.control import Control, Mode
+from executive.run.control import Control, Mode
 from executive.view.actions import RefusedError, control_actions, text_of
 from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 from py_trees.common import Status
 
-from executive.snapshot import NodeState
+from executive.run.snapshot import NodeState
 from executive.view.looks import Looks, look_of
 from executive.view.model import NodeView, node_view, to_json
 from executive.view.svg import to_svg

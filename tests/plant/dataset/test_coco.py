@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from executive.class_ids import CLASS_IDS
+from executive.mission.class_ids import CLASS_IDS
 from plant.dataset.coco import annotation, box_of, categories, counts, document, lost_in_the_dark, mask_of, run_lengths
 from plant.dataset.silhouette import Silhouette
 

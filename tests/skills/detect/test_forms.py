@@ -1,6 +1,6 @@
 """The forms of the classes."""
 
-from executive.class_ids import CLASS_IDS
+from executive.mission.class_ids import CLASS_IDS
 from skills.detect.forms import class_forms
 
 

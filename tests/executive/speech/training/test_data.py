@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.training import data
 from executive.speech.training.data import spoken_sentences
 from executive.speech.training.voices import Speaker

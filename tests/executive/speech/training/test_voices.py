@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from executive.errors import InputError
+from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ
 from executive.speech.training import voices
 from executive.speech.training.voices import drawn_speaker, speakers, speech

@@ -1,0 +1,77 @@
+"""Commands that are written as their parts, with every name checked against the world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from executive.mission.command import Command, Thing, parse_command
+from executive.mission.errors import InputError, Problems, did_you_mean, listing
+from executive.mission.file.model import KeyPath
+from executive.mission.file.schema import MissionFile
+from executive.mission.knowledge import Knowledge
+
+__all__ = ["typed_command"]
+
+_NOTHING: Final = "Nothing"
+_START: Final = "start"
+
+
+def typed_command(file: MissionFile, index: int, knowledge: Knowledge) -> Command:
+    """The command of the step `index`, which gives its parts, in the world's own names.
+
+    Raises:
+        InputError: a part that is no name, or names that the world does not have.
+    """
+    step, path = file.steps[index], ("steps", index)
+    task = _NOTHING if step.do is None else step.do.value
+    parts = [part or _NOTHING for part in (step.take, step.to, task, step.object)]
+    try:
+        command = parse_command("Take [{}] to [{}] and do [{}] to [{}]".format(*parts))
+    except ValueError as error:
+        raise file.error(path, str(error), "write names in plain words") from error
+    problems = Problems()
+    for unknown in _unknown_names(file, path, command, knowledge):
+        problems.add(unknown)
+    problems.raise_any()
+    return _known(command, knowledge)
+
+
+def _unknown_names(file: MissionFile, path: KeyPath, command: Command, knowledge: Knowledge) -> Iterator[InputError]:
+    for key, thing in (("take", command.item), ("object", command.object)):
+        if thing is not None and knowledge.thing(thing.name) is None:
+            yield _unknown(file, (*path, key), "thing", thing.name, knowledge.thing_names(), knowledge)
+    goals = (*knowledge.place_names(), *knowledge.people, _START)
+    if command.goal is not None and _goal(command.goal, knowledge) is None:
+        yield _unknown(file, (*path, "to"), "place or person", command.goal, goals, knowledge)
+    if command.goal_at is not None and knowledge.place(command.goal_at) is None:
+        yield _unknown(file, (*path, "to"), "place", command.goal_at, knowledge.place_names(), knowledge)
+
+
+def _unknown(
+    file: MissionFile, path: KeyPath, kind: str, name: str, known: Sequence[str], knowledge: Knowledge
+) -> InputError:
+    near = did_you_mean(name, knowledge.spellings(known))
+    mend = f"did you mean {near!r}?" if near else f"known are {listing(known)}"
+    return file.error(path, f"unknown {kind} {name!r}", mend)
+
+
+def _known(command: Command, knowledge: Knowledge) -> Command:
+    """The command in the world's own names."""
+
+    def named(thing: Thing | None) -> Thing | None:
+        return thing and Thing(knowledge.thing(thing.name) or thing.name, thing.attributes)
+
+    return Command(
+        item=named(command.item),
+        goal=command.goal and _goal(command.goal, knowledge),
+        goal_at=command.goal_at and knowledge.place(command.goal_at),
+        task=command.task,
+        object=named(command.object),
+        item_count=command.item_count,
+        object_count=command.object_count,
+    )
+
+
+def _goal(name: str, knowledge: Knowledge) -> str | None:
+    return _START if name == _START else knowledge.place(name) or knowledge.person(name)

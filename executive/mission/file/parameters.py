@@ -1,0 +1,105 @@
+"""Parameters of mission files: `${name}` in a value stands for what the parameter holds; `$${` is a plain `${`.
+
+A value that is nothing but `${name}` takes the parameter's own type, so that `timeout: ${limit}` can be a number;
+within a longer text the parameter's text is put in.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+from executive.mission.errors import InputError, did_you_mean, listing
+from executive.mission.file.model import KeyPath
+from executive.mission.yaml_source import YamlSource
+
+__all__ = ["Given", "with_parameters"]
+
+_REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
+_NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_SCALARS: Final = (str, bool, int, float)
+DECLARED: Final = "parameters"
+
+Given = Mapping[str, Any]
+
+
+def with_parameters(source: YamlSource, given: Given) -> YamlSource:
+    """The document with its parameters put in: those that are given, else their defaults.
+
+    Raises:
+        InputError: a name that is no word, a parameter without a value, or `${name}` of one that is not declared.
+    """
+    if not isinstance(source.data, dict):
+        return source
+    declared = _declared(source)
+    unknown = [name for name in given if name not in declared]
+    if unknown:
+        near = did_you_mean(unknown[0], declared)
+        known = f"it has {listing(declared)}" if declared else "it declares none"
+        mend = f"did you mean '{near}'?" if near else known
+        raise InputError(f"{source.path.name} has no parameter '{unknown[0]}'", mend=mend)
+    values = {**declared, **given}
+    for name, value in values.items():
+        if value is None:
+            mend = f"give it a default, or 'with: {{{name}: ...}}' where the file is used"
+            raise source.error((DECLARED, name), f"parameter '{name}' has no value", mend)
+    data = {
+        key: part if key == DECLARED else _put_in(part, values, source, (key,)) for key, part in source.data.items()
+    }
+    return replace(source, data=data)
+
+
+def _declared(source: YamlSource) -> dict[str, Any]:
+    """The parameters with their defaults; what is no mapping is left to the schema to refuse."""
+    declared = source.data.get(DECLARED)
+    if not isinstance(declared, dict):
+        return {}
+    for name, default in declared.items():
+        if not isinstance(name, str) or not _NAME.fullmatch(name):
+            mend = "use letters, digits and underscores, a letter first"
+            raise source.error((DECLARED, str(name)), f"{name!r} cannot be a parameter's name", mend)
+        if default is not None and not isinstance(default, _SCALARS):
+            mend = "give it a text, a number, true or false"
+            raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {type(default).__name__}", mend)
+    return dict(declared)
+
+
+def _put_in(value: Any, values: Mapping[str, Any], source: YamlSource, path: KeyPath) -> Any:
+    if isinstance(value, str):
+        return _text(value, values, source, path)
+    if isinstance(value, dict):
+        return {key: _put_in(part, values, source, (*path, str(key))) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_put_in(part, values, source, (*path, index)) for index, part in enumerate(value)]
+    return value
+
+
+def _text(text: str, values: Mapping[str, Any], source: YamlSource, path: KeyPath) -> Any:
+    if "${" not in text:
+        return text
+    whole = _REFERENCE.fullmatch(text)
+    if whole is not None and not whole[1]:
+        return _value(whole[2], values, source, path)
+
+    def replaced(match: re.Match[str]) -> str:
+        return f"${{{match[2]}}}" if match[1] else str(_value(match[2], values, source, path))
+
+    return _REFERENCE.sub(replaced, text)
+
+
+def _value(name: str, values: Mapping[str, Any], source: YamlSource, path: KeyPath) -> Any:
+    if name not in values:
+        near = did_you_mean(name, values)
+        known = f"declared are {listing(values)}" if values else _how_to_declare(source)
+        mend = f"did you mean '${{{near}}}'?" if near else known
+        raise source.error(path, f"unknown parameter '{name}'", mend)
+    return values[name]
+
+
+def _how_to_declare(source: YamlSource) -> str:
+    misspelled = did_you_mean(DECLARED, (str(key) for key in source.data))
+    if misspelled is not None and DECLARED not in source.data:
+        return f"did you mean '{DECLARED}' by '{misspelled}'?"
+    return f"declare it under '{DECLARED}' with its default"

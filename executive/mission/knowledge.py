@@ -1,0 +1,248 @@
+"""What is known of a world: places, surfaces, things and where they usually are, people, and the robot's own places."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from executive.mission.class_ids import CLASS_IDS
+from executive.mission.command import Task
+from executive.mission.errors import InputError, did_you_mean, listing
+from executive.mission.yaml_source import YamlSource, read_yaml, validate
+
+__all__ = [
+    "BatteryFacts",
+    "Knowledge",
+    "Person",
+    "Place",
+    "Pose",
+    "RobotFacts",
+    "SurfaceFacts",
+    "ThingFacts",
+    "knowledge_of_source",
+    "load_knowledge",
+]
+
+Corner = tuple[float, float]
+Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
+
+
+class _Facts(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Pose(_Facts):
+    """A planar pose in the world frame: x, y in metres, yaw in radians, counter-clockwise from x."""
+
+    x: float = Field(description="metres")
+    y: float = Field(description="metres")
+    yaw: float = Field(default=0.0, description="radians")
+
+
+class RobotFacts(_Facts):
+    """The robot: the name by which it is spoken to, and the names of other robots that listen, too."""
+
+    name: Annotated[str, Field(min_length=1, description='as in "Hey Alice"')]
+    others: tuple[str, ...] = Field(default=(), description="other robots: what is said to them is not for this one")
+
+
+class BatteryFacts(_Facts):
+    """When the robot goes to the dock and until when it charges there; states of charge from 0 to 1."""
+
+    low: Annotated[float, Field(ge=0.0, lt=1.0, description="below this the mission is interrupted")] = 0.15
+    charged: Annotated[float, Field(gt=0.0, le=1.0, description="at this the mission goes on")] = 0.8
+
+    @model_validator(mode="after")
+    def _in_order(self) -> BatteryFacts:
+        if self.charged <= self.low:
+            raise ValueError("'charged' must be above 'low', or the robot never leaves the dock")
+        return self
+
+
+class Place(_Facts):
+    """A room: other names, where the robot stands to be in it, its outline (world frame, m)."""
+
+    pose: Pose = Field(description="where the robot stands to be there")
+    polygon: Polygon = Field(description="outline, corners (x, y)")
+    aliases: tuple[str, ...] = Field(default=(), description="other names")
+
+
+class SurfaceFacts(_Facts):
+    """A flat top in a room: other names, height above the floor (m), outline, and poses from which it is seen whole."""
+
+    place: str = Field(description="the room that it is in")
+    height: Annotated[float, Field(gt=0.0, description="of the top above the floor, m")]
+    polygon: Polygon = Field(description="outline of the top, corners (x, y)")
+    viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1, description="poses from which it is seen whole")]
+    aliases: tuple[str, ...] = Field(default=(), description="other names")
+
+
+class ThingFacts(_Facts):
+    """A class of things: other names, the categories it belongs to, the surfaces where it usually is."""
+
+    aliases: tuple[str, ...] = Field(default=(), description="other names")
+    categories: tuple[str, ...] = Field(default=(), description='as in "a drink"')
+    usual: tuple[str, ...] = Field(default=(), description="surfaces where it usually is, likeliest first")
+
+
+class Person(_Facts):
+    """Somebody: other names, the place where they usually are, and where exactly when that is known."""
+
+    at: str = Field(description="the place where they usually are")
+    aliases: tuple[str, ...] = Field(default=(), description="other names")
+    pose: Pose | None = Field(default=None, description="where exactly, when that is known")
+
+
+class Knowledge(_Facts):
+    """All that is known of one world. Names are matched without regard to case."""
+
+    robot: RobotFacts = Field(description="the robot")
+    start: Pose = Field(description="where it stands at the beginning")
+    dock: Pose = Field(description="where it stands to charge")
+    battery: BatteryFacts = Field(default=BatteryFacts(), description="when it charges, and until when")
+    places: dict[str, Place] = Field(description="the rooms by name")
+    surfaces: dict[str, SurfaceFacts] = Field(description="the flat tops where things lie, by name")
+    things: dict[str, ThingFacts] = Field(description="the classes of things by name")
+    people: dict[str, Person] = Field(default_factory=dict, description="the people by name")
+    defaults: dict[str, dict[str, str]] = Field(
+        default_factory=dict, description="for a task, the room for each thing or category when none was said"
+    )
+
+    def place(self, name: str) -> str | None:
+        """The room or surface that `name` means, by its own name; None when unknown."""
+        return _resolve(name, self.places) or _resolve(name, self.surfaces)
+
+    def room(self, place: str) -> str:
+        """The room in which a known place lies; a room lies in itself."""
+        return self.surfaces[place].place if place in self.surfaces else place
+
+    def surfaces_in(self, place: str) -> tuple[str, ...]:
+        """The surfaces of a room, in the file's order; a surface is its own only one."""
+        return tuple(name for name, surface in self.surfaces.items() if place in (name, surface.place))
+
+    def place_pose(self, place: str) -> Pose:
+        """Where to stand for a known room (its pose) or surface (its first viewpoint)."""
+        return self.surfaces[place].viewpoints[0] if place in self.surfaces else self.places[place].pose
+
+    def thing(self, name: str) -> str | None:
+        """The class or category that `name` means, by its own name; None when unknown."""
+        return _resolve(name, self.things) or next((c for c in self.categories() if c.lower() == name.lower()), None)
+
+    def classes(self, name: str) -> tuple[str, ...]:
+        """The classes that a class, alias or category stands for, in the file's order; empty when unknown."""
+        known = _resolve(name, self.things)
+        return (known,) if known else tuple(c for c, facts in self.things.items() if name.lower() in facts.categories)
+
+    def categories(self) -> tuple[str, ...]:
+        """All categories, in the file's order."""
+        return tuple(dict.fromkeys(category for facts in self.things.values() for category in facts.categories))
+
+    def usual_surfaces(self, name: str) -> tuple[str, ...]:
+        """Where things of that class or category usually are, likeliest first."""
+        return tuple(dict.fromkeys(place for c in self.classes(name) for place in self.things[c].usual))
+
+    def person(self, name: str) -> str | None:
+        """The person that `name` means; None when unknown."""
+        return _resolve(name, self.people)
+
+    def default_place(self, task: Task | None, name: str) -> str | None:
+        """Where `task` is done to a thing or category when no place was said.
+
+        The table of defaults answers first, by the task or else by grasp, and by the thing or else by its categories;
+        then the room where the thing usually is.
+        """
+        words = [name, *(category for c in self.classes(name) for category in self.things[c].categories)]
+        tables = [self.defaults.get(t.value, {}) for t in (task, Task.GRASP) if t is not None]
+        said = next((table[word] for table in tables for word in words if word in table), None)
+        return said or next((self.room(surface) for surface in self.usual_surfaces(name)), None)
+
+    def thing_names(self) -> tuple[str, ...]:
+        """What can be asked for: classes, then categories."""
+        return (*self.things, *self.categories())
+
+    def place_names(self) -> tuple[str, ...]:
+        """Where one can be sent: rooms, then surfaces."""
+        return (*self.places, *self.surfaces)
+
+    def spellings(self, names: Iterable[str]) -> tuple[str, ...]:
+        """The names with all their aliases, for guessing what a misspelled one means."""
+        groups: tuple[Mapping[str, Place | SurfaceFacts | ThingFacts | Person], ...]
+        groups = (self.places, self.surfaces, self.things, self.people)
+        aliases = {name: facts.aliases for group in groups for name, facts in group.items()}
+        return tuple(word for name in names for word in (name, *aliases.get(name, ())))
+
+    def class_ids(self, name: str) -> tuple[int, ...]:
+        """The numbers of the classes that `name` stands for."""
+        return tuple(CLASS_IDS[c] for c in self.classes(name))
+
+
+def _resolve(
+    name: str, group: Mapping[str, Place] | Mapping[str, SurfaceFacts] | Mapping[str, ThingFacts] | Mapping[str, Person]
+) -> str | None:
+    wanted = name.lower()
+    own = (known for known in group if known.lower() == wanted)
+    alias = (known for known, facts in group.items() if wanted in (a.lower() for a in facts.aliases))
+    return next(own, None) or next(alias, None)
+
+
+def load_knowledge(path: Path | str) -> Knowledge:
+    """Read a world's `knowledge.yaml`.
+
+    Raises:
+        InputError: with file, line and mend, for broken YAML, unknown or missing keys, wrong values, and names that
+            are used but nowhere defined or mean two things.
+    """
+    return knowledge_of_source(read_yaml(path))
+
+
+def knowledge_of_source(source: YamlSource) -> Knowledge:
+    """The knowledge in a document that has been read. Raises InputError as `load_knowledge`."""
+    knowledge = validate(Knowledge, source)
+    for error in _cross_errors(knowledge, source):
+        raise error
+    return knowledge
+
+
+def _cross_errors(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
+    """Errors in what refers to something else in the file."""
+    tasks = [task.value for task in Task]
+    for name, surface in knowledge.surfaces.items():
+        yield from _unless_known(source, ("surfaces", name, "place"), surface.place, knowledge.places)
+    for name, person in knowledge.people.items():
+        yield from _unless_known(source, ("people", name, "at"), person.at, knowledge.place_names())
+    for name, facts in knowledge.things.items():
+        yield from _unless_known(source, ("things", name), name, CLASS_IDS)
+        for index, usual in enumerate(facts.usual):
+            yield from _unless_known(source, ("things", name, "usual", index), usual, knowledge.place_names())
+    for task, table in knowledge.defaults.items():
+        yield from _unless_known(source, ("defaults", task), task, tasks)
+        for word, place in table.items():
+            yield from _unless_known(source, ("defaults", task, word), word, knowledge.thing_names())
+            yield from _unless_known(source, ("defaults", task, word), place, knowledge.place_names())
+    yield from _doubles(knowledge, source)
+
+
+def _unless_known(
+    source: YamlSource, path: tuple[str | int, ...], name: str, known: Iterable[str]
+) -> Iterator[InputError]:
+    names = list(known)
+    if name not in names:
+        near = did_you_mean(name, names)
+        mend = f"did you mean {near!r}?" if near else f"known are {listing(names)}"
+        yield source.error(path, f"{name!r} is not known", mend)
+
+
+def _doubles(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
+    """Names that mean two things of the same kind."""
+    for kinds in (("places", "surfaces"), ("things",), ("people",)):
+        seen: dict[str, str] = {}
+        for kind in kinds:
+            for name, facts in getattr(knowledge, kind).items():
+                for word in (name, *facts.aliases):
+                    other = seen.setdefault(word.lower(), name)
+                    if other != name:
+                        mend = "give one of them another name"
+                        yield source.error((kind, name), f"{word!r} means both {other!r} and {name!r}", mend)

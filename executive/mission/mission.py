@@ -1,0 +1,107 @@
+"""Missions: a name, a world, and steps. They come from a sentence or from a YAML file.
+
+The schema of the files is `executive.mission.file.schema`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from executive.language import DependencyParser, Status, Understanding
+from executive.language.asking import understand_asking
+from executive.language.questions import Answerer, QuestionPolicy, answer_by
+from executive.mission.command import Command
+from executive.mission.errors import InputError
+from executive.mission.file.model import (
+    DEFAULT_WORLD,
+    Mission,
+    MissionStep,
+    OnFailure,
+    OperatorQuestion,
+    SkillCall,
+    SourceLine,
+    StepGuards,
+    StepPolicy,
+)
+from executive.mission.file.overrides import overridden
+from executive.mission.file.resolve import load_mission, mission_from_file
+from executive.mission.file.schema import MissionFile, StepFile
+from executive.mission.knowledge import Knowledge
+
+__all__ = [
+    "DEFAULT_WORLD",
+    "Mission",
+    "MissionFile",
+    "MissionStep",
+    "OnFailure",
+    "OperatorQuestion",
+    "SkillCall",
+    "SourceLine",
+    "StepFile",
+    "StepGuards",
+    "StepPolicy",
+    "load_mission",
+    "mission_from_commands",
+    "mission_from_file",
+    "mission_from_meaning",
+    "mission_from_sentence",
+    "overridden",
+    "understood",
+]
+
+
+def mission_from_sentence(
+    sentence: str,
+    *,
+    parser: DependencyParser,
+    knowledge: Knowledge,
+    world: str = DEFAULT_WORLD,
+    require_wake: bool = False,
+) -> Mission:
+    """The mission that a sentence asks for.
+
+    Raises:
+        InputError: the sentence is refused, leaves a question open or is not for this robot; the message says why.
+    """
+    meant = understood(sentence, parser=parser, knowledge=knowledge, require_wake=require_wake)
+    return mission_from_meaning(meant, world=world, robot_name=knowledge.robot.name)
+
+
+def understood(
+    sentence: str,
+    *,
+    parser: DependencyParser,
+    knowledge: Knowledge,
+    require_wake: bool = False,
+    answer: Answerer | None = None,
+) -> Understanding:
+    """What a sentence means when it can be done; `answer` is asked where it could mean several things.
+
+    Raises:
+        InputError: it is refused, leaves a question open or is not for this robot; the message says why.
+    """
+    nobody = answer_by(QuestionPolicy.REFUSE)
+    meant = understand_asking(
+        sentence, answer=answer or nobody, parser=parser, knowledge=knowledge, require_wake=require_wake
+    )
+    if meant.status is not Status.OK:
+        raise InputError(meant.reason or "the sentence was not understood")
+    return meant
+
+
+def mission_from_meaning(meant: Understanding, *, world: str, robot_name: str) -> Mission:
+    """The mission of a sentence that was understood."""
+    mission = mission_from_commands(meant.commands, world=world, robot_name=robot_name)
+    return replace(mission, notes=meant.notes)
+
+
+def mission_from_commands(commands: Sequence[Command], *, world: str, robot_name: str) -> Mission:
+    """A mission of these commands, named for the first of them."""
+    return Mission(_name(commands), world, robot_name, (MissionStep(tuple(commands)),))
+
+
+def _name(commands: Sequence[Command]) -> str:
+    """A few words for the whole: the verb and the thing or place of the first command."""
+    first = commands[0] if commands else Command()
+    return " ".join(filter(None, (first.verb or "do", str(first.object or first.item or first.goal or ""))))

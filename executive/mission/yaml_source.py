@@ -1,0 +1,220 @@
+"""YAML files that remember their lines, checked against a pydantic model; errors name the place and the mend."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType, UnionType
+from typing import Any, Final, TypeVar, Union, get_args, get_origin
+
+import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from executive.mission.errors import InputError, did_you_mean, listing
+
+__all__ = ["YamlSource", "read_yaml", "validate"]
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
+KeyPath = tuple[str | int, ...]
+MAX_BYTES: Final = 1_000_000
+
+
+@dataclass(frozen=True)
+class YamlSource:
+    """A YAML document: its data, and the line (from 1) at which each key or list item stands."""
+
+    path: Path
+    data: Any
+    lines: Mapping[KeyPath, int]
+    first_line: int = 1
+
+    def line(self, path: KeyPath) -> int:
+        """The line of `path`, or of the nearest part of it that stands in the file."""
+        known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), None)
+        return self.first_line if known is None else self.lines[known]
+
+    def error(self, path: KeyPath, message: str, mend: str = "") -> InputError:
+        """An error at `path`."""
+        return InputError(message, mend=mend, file=self.path, line=self.line(path))
+
+
+def read_yaml(path: Path | str) -> YamlSource:
+    """Read one YAML document of plain data.
+
+    Raises:
+        InputError: the file cannot be read, is too large, is no YAML, has a key twice, or has anchors.
+    """
+    file = Path(path)
+    try:
+        text = _text(file)
+        _refuse_aliases(text, file)
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        data = None if root is None else _plain(root)
+    except OSError as error:
+        raise InputError(f"cannot read it ({error.strerror})", mend="name a file that exists", file=file) from error
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise InputError("it is no UTF-8 text", mend="save it as UTF-8", file=file, line=line) from error
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = 1 if mark is None else mark.line + 1
+        what = f"broken YAML: {error.problem or error.context}"
+        raise InputError(what, mend="mend the indentation, brackets or quotes here", file=file, line=line) from error
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        what = f"broken YAML: the character {chr(error.character)!r} cannot stand in a text"
+        raise InputError(what, mend="remove it", file=file, line=line) from error
+    except (yaml.YAMLError, ValueError) as error:
+        raise InputError(f"broken YAML: {error}", mend="mend it", file=file, line=1) from error
+    except RecursionError as error:
+        raise InputError("it is nested too deeply", mend="write it flatter", file=file, line=1) from error
+    lines: dict[KeyPath, int] = {}
+    for key_path, line in _walk(root, ()):
+        if key_path in lines:
+            what = f"key {key_path[-1]!r} stands twice (first in line {lines[key_path]})"
+            raise InputError(what, mend="remove one of the two", file=file, line=line)
+        lines[key_path] = line
+    return YamlSource(file, data, lines)
+
+
+def _text(file: Path) -> str:
+    """The file's text. Raises InputError when it is larger than anyone would write."""
+    size = file.stat().st_size
+    if size > MAX_BYTES:
+        what = f"it is too large ({size} bytes; at most {MAX_BYTES} are read)"
+        raise InputError(what, mend="split it into files that use each other", file=file, line=1)
+    return file.read_text(encoding="utf-8")
+
+
+def _refuse_aliases(text: str, file: Path) -> None:
+    """Anchors make small files huge, and lines ambiguous."""
+    if "*" not in text:
+        return
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            what = f"the alias '*{event.anchor}' cannot be used here"
+            raise InputError(what, mend="write it out", file=file, line=_line(event))
+
+
+def _line(event: yaml.Event) -> int:
+    return 1 if event.start_mark is None else event.start_mark.line + 1
+
+
+def _plain(root: yaml.Node) -> Any:
+    """The data of a composed document."""
+    return yaml.constructor.SafeConstructor().construct_document(root)
+
+
+def _walk(node: yaml.Node | None, path: KeyPath) -> Iterator[tuple[KeyPath, int]]:
+    """Every key and list item below `node` with its line."""
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            yield (*path, key.value), key.start_mark.line + 1
+            yield from _walk(value, (*path, key.value))
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            yield (*path, index), item.start_mark.line + 1
+            yield from _walk(item, (*path, index))
+
+
+def validate(model: type[ModelT], source: YamlSource) -> ModelT:
+    """The document as `model`.
+
+    Raises:
+        InputError: the first thing that does not fit the model, with its line and what would fit; the rest in `others`.
+    """
+    if not isinstance(source.data, dict):
+        mend = f"begin with the keys {listing(_field_names(model))}"
+        raise InputError("the file holds no mapping of keys to values", mend=mend, file=source.path, line=1)
+    try:
+        return model.model_validate(source.data)
+    except ValidationError as error:
+        first, *others = [_input_error(model, source, fault) for fault in _telling(error.errors(), source)]
+        raise InputError(first.message, mend=first.mend, file=first.file, line=first.line, others=others) from error
+
+
+def _telling(errors: list[ErrorDetails], source: YamlSource) -> list[ErrorDetails]:
+    """The errors that tell most, one for each place; what an unknown key has brought about is left out."""
+    misspelled = {_path(error)[:-1] for error in errors if error["type"] == "extra_forbidden"}
+    above = {_path(error)[:n] for error in errors for n in range(len(_path(error)))}
+    own = [error for error in errors if not (error["type"] == "too_short" and _path(error) in above)]
+    causes = (e for e in own if e["type"] == "extra_forbidden" or _parent(e) not in misspelled)
+    ordered = sorted(causes, key=lambda e: (e["type"] != "extra_forbidden", source.line(_path(e))))
+    return list({_path(error): error for error in reversed(ordered)}.values())[::-1]
+
+
+def _parent(error: ErrorDetails) -> KeyPath:
+    """Where a key is missing or several do not go together."""
+    return _path(error)[:-1] if error["type"] == "missing" else _path(error)
+
+
+def _path(error: ErrorDetails) -> KeyPath:
+    return tuple(part for part in error["loc"] if part != "[key]")
+
+
+def _input_error(model: type[BaseModel], source: YamlSource, error: ErrorDetails) -> InputError:
+    """A pydantic error, told with its place and its mend."""
+    path = _path(error)
+    where = ".".join(str(part) for part in path)
+    known = _field_names(_model_at(model, path[:-1]))
+    if error["type"] == "extra_forbidden":
+        near = did_you_mean(str(path[-1]), known)
+        mend = f"did you mean {near!r}?" if near else f"known keys are {listing(known)}"
+        return source.error(path, f"unknown key {path[-1]!r}", mend)
+    if error["type"] == "missing":
+        parent = ".".join(str(part) for part in path[:-1]) or "the file"
+        return source.error(path[:-1], f"key {path[-1]!r} is missing in {parent}", f"add {path[-1]!r}")
+    what = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
+    mend = _nearest_word(error) or f"it reads {error['input']!r} now"[:120]
+    return source.error(path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", mend)
+
+
+def _nearest_word(error: ErrorDetails) -> str | None:
+    """A guess at which of the words that are allowed was meant."""
+    allowed = re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", "")))
+    near = did_you_mean(str(error["input"]), allowed)
+    return None if near is None else f"did you mean {near!r}?"
+
+
+_PLAINER: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "model_type": "should be a mapping of keys to values",
+        "model_attributes_type": "should be a mapping of keys to values",
+        "dict_type": "should be a mapping of keys to values",
+        "tuple_type": "should be a list",
+        "string_type": "should be a text",
+        "float_type": "should be a number",
+        "int_type": "should be a whole number",
+        "bool_type": "should be true or false",
+        "string_too_short": "should not be empty",
+        "too_short": "should not be empty",
+        "finite_number": "should be a finite number",
+    }
+)
+
+
+def _field_names(model: type[BaseModel] | None) -> list[str]:
+    """The keys of a model, those that are required first."""
+    fields = [] if model is None else list(model.model_fields.items())
+    ordered = sorted(fields, key=lambda item: not item[1].is_required())
+    return [field.alias or name for name, field in ordered]
+
+
+def _model_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:
+    """The model that describes what stands at `path`, following fields, mappings and lists."""
+    kind: Any = model
+    for part in path:
+        kind = _inside(kind, part)
+    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+
+
+def _inside(kind: Any, part: str | int) -> Any:
+    """The annotation of what stands under `part` in something annotated `kind`."""
+    fields = {f.alias or n: f.annotation for n, f in getattr(kind, "model_fields", {}).items()}
+    items = [arg for arg in get_args(kind) if arg is not Ellipsis]
+    inner = fields[part] if part in fields else next(iter(items[-1:]), None)
+    optional = get_origin(inner) in (Union, UnionType)
+    return next(arg for arg in get_args(inner) if arg is not type(None)) if optional else inner

@@ -1,0 +1,35 @@
+"""What a run tells of itself while it goes on, so that another process can go on from there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from executive.run.snapshot import Transition
+from executive.tree.compiler import CompiledTree
+from skills.robot import Pose2D
+
+
+@dataclass(frozen=True)
+class TickNote:
+    """One tick: what changed in the tree, all values on the blackboard, where the robot believes to be.
+
+    `pose` is X_WB, None while the robot is not localised; `checkpoints` those of the active skills by path id.
+    """
+
+    now_s: float
+    changes: Sequence[Transition]
+    board: Mapping[str, Any]
+    pose: Pose2D | None
+    checkpoints: Mapping[str, Mapping[str, Any]]
+
+
+class Journal(Protocol):
+    """Keeps notes of one robot's mission. It hears of every tick, but not of the halt at the end of the run."""
+
+    def note(self, note: TickNote) -> None:
+        """Keep what a tick brought."""
+
+    def replaced(self, tree: CompiledTree) -> Journal:
+        """Another mission has taken the place of this one, which is forgotten; the journal of the other."""

@@ -1,0 +1,73 @@
+"""How a run ended."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from executive.run.snapshot import Snapshot
+from executive.tree.compiler import CompiledTree
+from skills.api import Cause
+from skills.robot import Pose2D
+
+
+class Outcome(enum.Enum):
+    """The end of a mission, the worst last."""
+
+    SUCCESS = "success"  # all that was asked for is done, as far as the tree knows
+    FAILURE = "failure"  # something could not be done
+    CANCELLED = "cancelled"  # somebody stopped it
+    ERROR = "error"  # a defect: an exception, a hung verb
+
+
+@dataclass(frozen=True)
+class RobotResult:
+    """How one robot's mission ended: its answers to status checks by path id, and the last state of its tree.
+
+    `preempting` are the results of the missions that came in between, in the order of their ends.
+    """
+
+    robot_name: str
+    outcome: Outcome
+    cause: Cause | None
+    message: str
+    answers: Mapping[str, bool]
+    states: Snapshot
+    mission: str = ""
+    preempting: tuple[RobotResult, ...] = ()
+
+
+@dataclass(frozen=True)
+class Glance:
+    """A robot at one moment: where it believes to be (world frame; None when lost), and whether it holds something."""
+
+    pose: Pose2D | None
+    holding: bool
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """How a run ended. Times in seconds: `sim_time_s` on the robots' clock, `wall_time_s` on the wall's.
+
+    `overruns` counts the ticks that took longer on the wall's clock than the tick period. `trees` are the missions
+    that the robots began with, or those that took their place, by robot.
+    """
+
+    robots: tuple[RobotResult, ...]
+    ticks: int
+    overruns: int
+    sim_time_s: float
+    wall_time_s: float
+    trees: Mapping[str, CompiledTree] = field(default_factory=dict)
+
+    @property
+    def worst(self) -> RobotResult:
+        """The robot that ended worst, the first by name among equals."""
+        order = list(Outcome)
+        return max(self.robots, key=lambda result: order.index(result.outcome))
+
+    @property
+    def outcome(self) -> Outcome:
+        """Success only when all robots succeeded."""
+        return self.worst.outcome

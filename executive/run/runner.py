@@ -1,0 +1,302 @@
+"""The runner: the only place that advances time and ticks trees."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from executive.record.schemas import CONTROL
+from executive.record.ticks import TickMeter
+from executive.run.control import Control, Event, Wishes
+from executive.run.guarded_robot import guarded, show_lease_behind
+from executive.run.journal import Journal
+from executive.run.lease_keeper import LeaseKeeper
+from executive.run.outcome import Glance, Outcome, RobotResult, RunResult
+from executive.run.session import Session
+from executive.run.snapshot import Snapshot
+from executive.run.tree_run import Ending
+from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, tick_watch
+from executive.tree.behaviours.board import Board
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
+from executive.tree.behaviours.suspension import StoppableTime
+from executive.tree.compiler import CompiledTree
+from executive.tree.compiling.workshop import slug
+from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
+from skills.detection import NO_DETECTOR
+from skills.robot import Clock, LeaseError, Robot
+
+HOLDER = "errand"
+
+
+@dataclass(frozen=True)
+class RunEntry:
+    """One robot with its tree and estimators, what looks through its pictures, and who keeps notes of its mission."""
+
+    tree: CompiledTree
+    robot: Robot
+    localiser: Localiser
+    costmap: Costmap
+    journal: Journal | None = None
+    detector: Detector = NO_DETECTOR
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """`time_limit_s` counts the robots' clock for the whole run, without pauses.
+
+    The other limits are the watchdog's, on the wall's clock: for one verb, for taking a picture, for one robot's tick.
+    """
+
+    seed: int = 0
+    tick_period_s: float = 0.05
+    time_limit_s: float = 1200.0
+    verb_limit_s: float = VERB_LIMIT_S
+    image_limit_s: float = IMAGE_LIMIT_S
+    tick_limit_s: float = TICK_LIMIT_S
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What an observer is told after each tick: by robot, the states of all nodes, the mission, and a glance at it."""
+
+    now_s: float
+    ticks: int
+    overruns: int
+    states: Mapping[str, Snapshot]
+    trees: Mapping[str, CompiledTree] = field(default_factory=dict)
+    glances: Mapping[str, Glance] = field(default_factory=dict)
+
+
+Observer = Callable[[Progress], None]
+
+
+class _CancelledError(Exception):
+    """Somebody cancelled the run."""
+
+
+class _TimeOverError(Exception):
+    """The run's time limit has passed."""
+
+
+def run(
+    entries: Sequence[RunEntry],
+    *,
+    clock: Clock,
+    worker: Worker,
+    publish: Publish,
+    settings: RunSettings = RunSettings(),
+    control: Control | None = None,
+    observer: Observer | None = None,
+) -> RunResult:
+    """Run trees to their end, robots in the order of their names.
+
+    Each tick: heed `control`, advance the clock by the tick period, update each robot's estimators, tick each tree, log
+    what changed. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree is not
+    ticked, and what passes does not count against any limit. Whatever happens, all trees and robots are stopped and
+    all leases returned before this returns. Without control, equal seeds give equal logs.
+
+    Raises:
+        ValueError: no entries, two robots of one name, or a breakpoint at a node that there is not.
+    """
+    names = [entry.robot.name for entry in entries]
+    if not entries or len(set(names)) != len(names):
+        raise ValueError(f"a run needs robots of different names, not {names}")
+    control = control or Control(pace=None)
+    control.begin({entry.tree.robot_name: entry.tree for entry in entries})
+    return _Run(clock, worker, publish, settings, control, observer).run(entries)
+
+
+class _LastingLog:
+    """The log as the parts of a run see it: while a run is ending, a broken log keeps no robot from being stopped."""
+
+    def __init__(self, publish: Publish) -> None:
+        self._publish = publish
+        self.ending = False
+
+    def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
+        """Log a message. Raises what the log raises, but not while the run is ending."""
+        try:
+            self._publish(topic, message)
+        except Exception:
+            if not self.ending:
+                raise
+
+
+class _Run:
+    """The state of one run."""
+
+    def __init__(
+        self,
+        clock: Clock,
+        worker: Worker,
+        publish: Publish,
+        settings: RunSettings,
+        control: Control,
+        observer: Observer | None,
+    ) -> None:
+        self._clock, self._worker, self._publish = clock, worker, _LastingLog(publish)
+        self._settings, self._control, self._observer = settings, control, observer
+        self._sessions: list[Session] = []
+        self._ticks = 0
+        self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
+        self._begun_s, self._begun_wall_s = clock.now(), time.perf_counter()
+        self._time = StoppableTime(clock)
+
+    def run(self, entries: Sequence[RunEntry]) -> RunResult:
+        """The whole run."""
+        ending: Ending | None = None
+        try:
+            for entry in sorted(entries, key=lambda entry: entry.robot.name):
+                self._sessions.append(self._open(entry))
+            while not all(session.finished for session in self._sessions):
+                self._cycle()
+        except (Exception, VerbHung, KeyboardInterrupt) as stop:
+            self._publish.ending = True
+            ending = self._ending(stop)
+        finally:
+            self._publish.ending = True
+            for session in self._sessions:
+                session.close(ending)
+            self._tell(self._control.end())
+        return self._result(entries, ending)
+
+    def _open(self, entry: RunEntry) -> Session:
+        settings = self._settings
+        robot = guarded(entry.robot, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s)
+        keeper = LeaseKeeper(robot, HOLDER)
+        show_lease_behind(robot, keeper.behind)
+        context = RunContext(
+            robot=robot,
+            lease=keeper.token,
+            clock=self._clock,
+            worker=self._worker,
+            localiser=entry.localiser,
+            costmap=entry.costmap,
+            publish=self._publish,
+            seed=self._settings.seed,
+            board=Board(slug(entry.tree.robot_name)),
+            ask=lambda question: self._control.ask(question, self._clock),
+            stop_pressed=lambda: self._control.stop_pressed,
+            detector=entry.detector,
+        )
+        try:
+            return Session(entry.tree, context, keeper, self._control, entry.journal)
+        except BaseException:
+            keeper.give_back()
+            raise
+
+    def _cycle(self) -> None:
+        """One period: wishes are heeded, time passes, estimators see, trees tick."""
+        begun_wall_s = time.perf_counter()
+        live = [session for session in self._sessions if session.result is None]
+        wishes = self._heed(live)
+        self._clock.advance(self._settings.tick_period_s)
+        for session in live:
+            session.sense()
+        self._tick([session for session in live if session.may_move() and wishes.hold is None], wishes.breakpoints)
+        for session in live:
+            if session.finished:
+                session.close()
+        if self._observer is not None:
+            self._observer(self._progress())
+        self._keep_pace(begun_wall_s)
+
+    def _heed(self, live: Sequence[Session]) -> Wishes:
+        """Do what is wished before time passes. Raises _CancelledError or _TimeOverError."""
+        wishes = self._control.heed()
+        self._tell(wishes.events)
+        if wishes.cancel is not None:
+            raise _CancelledError(wishes.cancel)
+        for session in live:
+            for wish in wishes.instead:
+                if wish.tree.robot_name == session.name:
+                    session.replace(wish.tree, wish.instead_of)
+            for tree in _for_robot(session, wishes.preempts):
+                session.preempt(tree)
+            for tree in _for_robot(session, wishes.later):
+                session.later(tree)
+        if wishes.hold is None:
+            self._time.go_on()
+        else:
+            self._time.stop()
+            self._control.held(self._settings.tick_period_s)
+            for session in live:
+                session.hold()
+        if self._time.elapsed_s() >= self._settings.time_limit_s:
+            raise _TimeOverError(f"the mission was not done within {self._settings.time_limit_s:g} s")
+        return wishes
+
+    def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> None:
+        """Tick the trees of robots that may move."""
+        begun = time.perf_counter()
+        changes = []
+        for session in moving:
+            with tick_watch(session.name, self._settings.tick_limit_s):
+                changes.append(session.tick(breakpoints))
+        self._ticks += 1
+        self._meter(time.perf_counter() - begun)
+        if moving:
+            self._control.ticked(changed=any(changes))
+        for path_id in filter(None, (session.waiting_at for session in moving)):
+            self._control.arrived_at(path_id)
+
+    def _progress(self) -> Progress:
+        states = {session.name: session.states for session in self._sessions}
+        trees = {session.name: session.tree for session in self._sessions}
+        glances = {session.name: session.glance for session in self._sessions}
+        return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees, glances)
+
+    def _keep_pace(self, begun_wall_s: float) -> None:
+        """Do not let simulated time run ahead of people who have something to decide."""
+        if self._control.pace is None or not self._control.slow:
+            return
+        left_s = self._settings.tick_period_s / self._control.pace - (time.perf_counter() - begun_wall_s)
+        if left_s > 0.0:
+            self._control.rest(left_s)
+
+    def _tell(self, events: Sequence[Event]) -> None:
+        for event in events:
+            self._publish(CONTROL, {"t": round(self._clock.now(), 6), "what": event.what, "message": event.message})
+
+    def _ending(self, stop: BaseException) -> Ending:
+        """What an exception means for the missions that are not done yet."""
+        for kind, (outcome, cause, sentence) in _ENDINGS.items():
+            if isinstance(stop, kind):
+                return Ending(outcome, cause, str(stop) or sentence)
+        trace = "".join(traceback.format_exception(stop))
+        self._publish(ERROR_TOPIC, {"node": "runner", "traceback": trace})
+        return Ending(Outcome.ERROR, Cause.ERROR, f"{type(stop).__name__}: {stop}")
+
+    def _result(self, entries: Sequence[RunEntry], ending: Ending | None) -> RunResult:
+        robots = tuple(session.close(ending) for session in self._sessions)
+        for session in self._sessions:
+            session.log_end(self._ticks)
+        wall_time_s = time.perf_counter() - self._begun_wall_s
+        self._meter.close(wall_time_s)
+        began = {session.name for session in self._sessions}
+        absent = tuple(_never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
+        sim_time_s = self._clock.now() - self._begun_s
+        trees = {session.name: session.main_tree for session in self._sessions}
+        return RunResult(robots + absent, self._ticks, self._meter.overruns, sim_time_s, wall_time_s, trees)
+
+
+def _for_robot(session: Session, trees: Sequence[CompiledTree]) -> Sequence[CompiledTree]:
+    return [tree for tree in trees if tree.robot_name == session.name]
+
+
+def _never_began(entry: RunEntry, ending: Ending) -> RobotResult:
+    """The result of a robot whose mission did not begin."""
+    return RobotResult(entry.robot.name, ending.outcome, ending.cause, ending.message, {}, {})
+
+
+_ENDINGS: dict[type[BaseException], tuple[Outcome, Cause, str]] = {
+    _CancelledError: (Outcome.CANCELLED, Cause.CANCELLED, "cancelled"),
+    KeyboardInterrupt: (Outcome.CANCELLED, Cause.CANCELLED, "cancelled from the keyboard"),
+    _TimeOverError: (Outcome.FAILURE, Cause.TIMEOUT, "time over"),
+    LeaseError: (Outcome.FAILURE, Cause.PRECONDITION, "the lease is held by another"),
+    VerbHung: (Outcome.ERROR, Cause.ERROR, "a verb hung"),
+}

@@ -1,0 +1,262 @@
+"""One robot in a run: its lease, its missions (others may come in between), and its orderly end."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from executive.record.drawable import stamp
+from executive.record.schemas import OUTCOME, POSE
+from executive.run.control import Control
+from executive.run.journal import Journal
+from executive.run.lease_keeper import LeaseKeeper
+from executive.run.outcome import Glance, Outcome, RobotResult
+from executive.run.snapshot import NodeState, Snapshot
+from executive.run.tree_run import Ending, TreeRun
+from executive.run.watchdog import VerbHung
+from executive.tree.behaviours.board import Board
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
+from executive.tree.compiler import CompiledTree
+from executive.tree.compiling.workshop import slug, start_key
+from skills.api import Cause
+from skills.robot import Pose2D
+
+POSE_PERIOD_S = 0.5
+LEASE_PATIENCE_S = 60.0
+_EPSILON_S = 1e-9
+
+
+class Session:
+    """One robot. The runner calls `sense`, `may_move` and `tick` or `hold` in turn until `finished`, then `close`."""
+
+    def __init__(
+        self,
+        tree: CompiledTree,
+        context: RunContext,
+        keeper: LeaseKeeper,
+        control: Control,
+        journal: Journal | None = None,
+    ) -> None:
+        self.context = context
+        self._keeper, self._control = keeper, control
+        self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal),)
+        self._held = False
+        self._lost_since_s: float | None = None
+        self._preempting: tuple[RobotResult, ...] = ()
+        self._later: tuple[CompiledTree, ...] = ()
+        self.result: RobotResult | None = None
+        self._pose_due_s = context.clock.now()
+        self._asked_at: Pose2D | None = None
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self.context.robot.name
+
+    @property
+    def tree(self) -> CompiledTree:
+        """The mission under way."""
+        return self._top.tree
+
+    @property
+    def states(self) -> Snapshot:
+        """The states of all nodes, those of suspended missions included."""
+        if len(self._stack) == 1:
+            return self._top.states
+        merged: dict[str, NodeState] = {}
+        for run in self._stack:
+            merged |= run.states
+        return merged
+
+    @property
+    def finished(self) -> bool:
+        """True when the mission that the robot began with has come to an end."""
+        return self.result is not None or (len(self._stack) == 1 and self._top.finished and not self._later)
+
+    @property
+    def main_tree(self) -> CompiledTree:
+        """The mission that the robot began with, or the one that took its place."""
+        return self._stack[0].tree
+
+    @property
+    def glance(self) -> Glance:
+        """Where the robot is and whether it holds something."""
+        estimate = self.context.localiser.estimate()
+        X_WB = estimate.X_WO @ self.context.robot.odometry().X_OB
+        pose = Pose2D.from_transform(X_WB) if estimate.localised else None
+        return Glance(pose, self.context.robot.gripper().holding)
+
+    @property
+    def waiting_at(self) -> str | None:
+        """The breakpoint that the mission under way waits at."""
+        return self._top.waiting_at
+
+    def sense(self) -> None:
+        """Bring the estimators up to date, and log the pose twice a second."""
+        context = self.context
+        context.localiser.update(context.robot)
+        context.costmap.update(context.robot, context.localiser.estimate())
+        self._asked_at = self._asked_at or self.glance.pose
+        if context.clock.now() >= self._pose_due_s - _EPSILON_S:
+            self._pose_due_s += POSE_PERIOD_S
+            self._publish_pose()
+
+    def may_move(self) -> bool:
+        """Whether the lease counts. A lost one suspends the mission until it can be had again.
+
+        Raises nothing; when that takes longer than LEASE_PATIENCE_S, the session is closed with cause EXECUTION.
+        """
+        lost = self._keeper.lost()
+        if lost is None:
+            return True
+        now_s = self.context.clock.now()
+        if self._lost_since_s is None:
+            self._lost_since_s = now_s
+            self._top.suspend()
+            self._control.lease_lost(self.name, lost)
+        if self._keeper.regain():
+            self._lost_since_s = None
+            self._control.lease_lost(self.name, None)
+            return True
+        if now_s - self._lost_since_s > LEASE_PATIENCE_S:
+            message = f"{lost} and did not give it back within {LEASE_PATIENCE_S:g} s"
+            self._control.lease_lost(self.name, None)
+            self.close(Ending(Outcome.FAILURE, Cause.EXECUTION, message))
+        return False
+
+    def tick(self, breakpoints: frozenset[str]) -> bool:
+        """Tick the mission under way once; True when a node changed its status. Its end takes up the one before."""
+        self._held = False
+        changed = self._top.tick(breakpoints)
+        if self._top.finished and len(self._stack) > 1:
+            self._take_up_the_one_before()
+        if self._top.finished and self._later:
+            tree, *later = self._later
+            self._later = tuple(later)
+            self._begin(tree, self._start_of(self._top))
+        return changed
+
+    def hold(self) -> None:
+        """Suspend the mission and stop the robot; done once until the next tick."""
+        if not self._held:
+            self._held = True
+            self._top.suspend()
+            if self._lost_since_s is None:
+                self.context.robot.stop(lease=self.context.lease)
+
+    def preempt(self, tree: CompiledTree) -> None:
+        """Suspend the mission under way and begin another; nothing of the one leaks into the other."""
+        self.hold()
+        self._begin(tree)
+
+    def later(self, tree: CompiledTree) -> None:
+        """Begin another mission when the one that the robot began with is done; it comes back to the same start."""
+        self._later += (tree,)
+
+    def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
+        """Give up the mission under way, or not begin one that waits, and have another in its place, from its start.
+
+        Where the mission called `instead_of` is neither, the other is done first.
+        """
+        if any(waiting.mission_name == instead_of for waiting in self._later):
+            self._later = tuple(tree if one.mission_name == instead_of else one for one in self._later)
+        elif instead_of in (None, self.tree.mission_name):
+            self._give_up_for(tree)
+        else:
+            self.preempt(tree)
+
+    def _give_up_for(self, tree: CompiledTree) -> None:
+        self.hold()
+        given_up = self._top
+        given_up.halt(self._attempt)
+        self._stack = self._stack[:-1]
+        self._control.mission_ended(self.name)
+        journal = None if self._stack or given_up.journal is None else given_up.journal.replaced(tree)
+        self._begin(tree, self._start_of(given_up), journal)
+        message = f"given up for '{tree.mission_name}'"
+        self._note_result(given_up.judge(Ending(Outcome.CANCELLED, Cause.CANCELLED, message)))
+
+    def close(self, ending: Ending | None = None) -> RobotResult:
+        """Stop the trees and the robot, give the lease back, log the end. Idempotent; raises nothing."""
+        if self.result is None:
+            for run in reversed(self._stack):
+                run.halt(self._attempt)
+            context = self.context
+            self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
+            self._attempt("return the lease", self._keeper.give_back)
+            for run in reversed(self._stack[1:]):
+                self._note_end(run.judge(ending))
+            self._stack = self._stack[:1]
+            self.result = self._top.judge(ending, self._preempting)
+        return self.result
+
+    def log_end(self, ticks: int) -> None:
+        """Write the outcome to the log."""
+        assert self.result is not None
+        self._publish_outcome(self.result, ticks)
+
+    @property
+    def _top(self) -> TreeRun:
+        return self._stack[-1]
+
+    def _start_of(self, run: TreeRun) -> Pose2D | None:
+        """Where a mission began: where it noted that, else where the robot stood at first."""
+        key = start_key(run.tree.robot_name, run.tree.mission_name)
+        start: Pose2D | None = run.context.board.get(key) if key in run.context.board else self._asked_at
+        return start
+
+    def _begin(self, tree: CompiledTree, start: Pose2D | None = None, journal: Journal | None = None) -> None:
+        self._held = False
+        context = replace(self.context, board=Board(slug(tree.robot_name)))
+        if start is not None:
+            context.board.put(start_key(tree.robot_name, tree.mission_name), start)
+        self._stack = (*self._stack, TreeRun(tree, context, journal))
+        self._control.mission_begun(self.name, tree)
+
+    def _take_up_the_one_before(self) -> None:
+        done = self._top
+        done.halt(self._attempt)
+        self._note_end(done.judge(None))
+        self._stack = self._stack[:-1]
+        self._top.show()
+
+    def _note_end(self, result: RobotResult) -> None:
+        """A mission that came in between is over."""
+        self._control.mission_ended(self.name)
+        self._note_result(result)
+
+    def _note_result(self, result: RobotResult) -> None:
+        self._preempting += (result,)
+        self._publish_outcome(result, None)
+
+    def _publish_outcome(self, result: RobotResult, ticks: int | None) -> None:
+        end = {"robot": self.name, "outcome": result.outcome, "cause": result.cause, "message": result.message}
+        more: Mapping[str, object] = {"mission": result.mission} if ticks is None else {"ticks": ticks}
+        self.context.publish(OUTCOME, {**end, "answers": result.answers, **more})
+
+    def _publish_pose(self) -> None:
+        X_WB = self.context.localiser.estimate().X_WO @ self.context.robot.odometry().X_OB
+        p, q = X_WB.translation(), X_WB.rotation().ToQuaternion()
+        flat = Pose2D.from_transform(X_WB)
+        self.context.publish(
+            POSE,
+            {
+                "timestamp": stamp(self.context.clock.now()),
+                "frame_id": "world",
+                "robot": self.name,
+                "pose": {
+                    "position": {"x": p[0], "y": p[1], "z": p[2]},
+                    "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
+                },
+                "yaw_rad": flat.yaw_rad,
+            },
+        )
+
+    def _attempt(self, what: str, call: Callable[[], object]) -> None:
+        """Do it; a defect goes to the log, since the rest of the end must still happen."""
+        try:
+            call()
+        except (Exception, VerbHung):
+            self.context.publish(ERROR_TOPIC, {"node": self.name, "what": what, "traceback": traceback.format_exc()})

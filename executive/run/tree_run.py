@@ -1,0 +1,155 @@
+"""One mission's tree under way: ticked, suspended, stopped, its changes logged, its end judged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from py_trees.common import Status
+
+from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
+from executive.run.journal import Journal, TickNote
+from executive.run.outcome import Outcome, RobotResult
+from executive.run.snapshot import NodeState, Observed, Snapshot, Transition, activities, transitions
+from executive.tree.behaviours.answer import Answer
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviours.gate import Gate
+from executive.tree.behaviours.skill_leaf import SkillLeaf
+from executive.tree.behaviours.suspension import suspend
+from executive.tree.compiler import CompiledTree
+from executive.view.model import node_view
+from skills.api import Cause
+from skills.robot import Pose2D
+
+Attempt = Callable[[str, Callable[[], object]], None]
+
+
+@dataclass(frozen=True)
+class Ending:
+    """An end that a tree did not come to by itself."""
+
+    outcome: Outcome
+    cause: Cause
+    message: str
+
+
+class TreeRun:
+    """One tree, built and ticked. Its nodes' last states are in `states`; a journal hears of every tick."""
+
+    def __init__(self, tree: CompiledTree, context: RunContext, journal: Journal | None = None) -> None:
+        self.tree = tree
+        self.context = context
+        self.journal = journal
+        self.root = tree.build(context)
+        self._observed = Observed(self.root)
+        self._skills = frozenset(node.path_id for node in self._observed.nodes if isinstance(node, SkillLeaf))
+        self.states: Snapshot = self._observed.snapshot()
+        self._gates: dict[str, Gate] = {}
+        self._breakpoints: frozenset[str] = frozenset()
+        self.show()
+
+    @property
+    def finished(self) -> bool:
+        """True when the tree has come to an end."""
+        return self.root.status in (Status.SUCCESS, Status.FAILURE)
+
+    @property
+    def waiting_at(self) -> str | None:
+        """The path id of the breakpoint that a node waits at."""
+        return next((path_id for path_id, gate in self._gates.items() if gate.waiting), None)
+
+    def show(self) -> None:
+        """Log the tree."""
+        structure = node_view(self.tree.root, self.states).structure()
+        self.context.publish(TREE, {"robot": self.tree.robot_name, "root": structure})
+
+    def tick(self, breakpoints: frozenset[str]) -> bool:
+        """Tick once and log what changed; True when anything did."""
+        self._breakpoints = breakpoints
+        if not breakpoints <= self._gates.keys():
+            self._set_gates(breakpoints)
+        self.root.tick_once()
+        changes = self.log_changes()
+        if self.journal is not None:
+            self.journal.note(self._tick_note(changes))
+        return bool(changes)
+
+    def suspend(self) -> None:
+        """Keep the place and let go of the robot."""
+        suspend(self.root)
+
+    def log_changes(self) -> Sequence[Transition]:
+        """Log the transitions since the last time, and what running skills do by now; the transitions."""
+        before, self.states = self.states, self._observed.snapshot()
+        changes = tuple(transitions(before, self.states))
+        for change in changes:
+            self.context.publish(TRANSITIONS, self._transition(change))
+        for path_id, state in activities(before, self.states):
+            if path_id in self._skills:
+                self.context.publish(ACTIVITY, self._activity(path_id, state))
+        return changes
+
+    def halt(self, attempt: Attempt) -> None:
+        """Stop all that runs; results that are there stay in sight. Also after an exception in the middle of a tick.
+
+        Each part is done through `attempt`, so that a defect in one does not keep the others from being done.
+        """
+        if not self.finished:
+            attempt("stop the tree", lambda: self.root.stop(Status.INVALID))
+        for node in self._observed.nodes:
+            if isinstance(node, SkillLeaf):
+                attempt(f"end {node.path_id}", node.abandon)
+        self.log_changes()
+
+    def judge(self, ending: Ending | None, preempting: tuple[RobotResult, ...] = ()) -> RobotResult:
+        """How it ended: by itself, else by `ending`."""
+        root = self.root
+        cause = root.cause if isinstance(root, Explained) else None
+        message = root.message if isinstance(root, Explained) else root.feedback_message
+        outcome = _OUTCOMES.get(root.status, Outcome.CANCELLED)
+        if outcome is Outcome.FAILURE and cause is Cause.ERROR:
+            outcome = Outcome.ERROR
+        if ending is not None and not self.finished:
+            outcome, cause, message = ending.outcome, ending.cause, ending.message
+        answers = {
+            node.path_id: node.answer
+            for node in self._observed.nodes
+            if isinstance(node, Answer) and node.answer is not None
+        }
+        name, mission = self.tree.robot_name, self.tree.mission_name
+        return RobotResult(name, outcome, cause, message, answers, self.states, mission, preempting)
+
+    def _set_gates(self, breakpoints: frozenset[str]) -> None:
+        for node in self._observed.nodes:
+            path_id = node.path_id if isinstance(node, Explained) else None
+            if path_id in breakpoints and path_id is not None and path_id not in self._gates:
+                self._gates[path_id] = Gate(node, self._closed(path_id))
+
+    def _closed(self, path_id: str) -> Callable[[], bool]:
+        return lambda: path_id in self._breakpoints
+
+    def _tick_note(self, changes: Sequence[Transition]) -> TickNote:
+        context = self.context
+        estimate = context.localiser.estimate()
+        X_WB = estimate.X_WO @ context.robot.odometry().X_OB
+        pose = Pose2D.from_transform(X_WB) if estimate.localised else None
+        leaves = (node for node in self._observed.nodes if isinstance(node, SkillLeaf))
+        checkpoints = {leaf.path_id: leaf.checkpoint for leaf in leaves if leaf.checkpoint}
+        return TickNote(context.clock.now(), changes, context.board.values(), pose, checkpoints)
+
+    def _transition(self, change: Transition) -> dict[str, object]:
+        after = change.after
+        return {
+            **self._activity(change.path_id, after),
+            "from": change.before.status.value,
+            "to": after.status.value,
+            "cause": after.cause,
+        }
+
+    def _activity(self, path_id: str, state: NodeState) -> dict[str, object]:
+        now_s = round(self.context.clock.now(), 6)
+        return {"t": now_s, "robot": self.tree.robot_name, "node": path_id, "message": state.message}
+
+
+_OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}

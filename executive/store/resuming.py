@@ -1,0 +1,294 @@
+"""Takes up a mission that was broken off: the same tree, in which finished skills give their results once more.
+
+The tree finds its way by itself: its composites see the same results as before and come to the same node. Nothing is
+done to reach that but ticking; a skill that had finished gives its result in its first tick. Guards look at the robot
+as it is now. The skill that was under way is told to `resume`, not to `begin`, so that it looks before it repeats
+what changed the world. Counts of attempts begin anew.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.decorators import Decorator
+
+from executive.store.recollection import Recollection
+from executive.store.records import Memory, StepRecord
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.decorators import Guard
+from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviours.freshness import Remembered
+from executive.tree.compiler import CompiledTree
+from executive.tree.compiling.interrupts import InterruptsPlan
+from executive.tree.compiling.plans import NodePlan, SelectorPlan, SkillPlan
+from executive.tree.compiling.policies import AskPlan, SkipPlan
+from executive.tree.compiling.recovery import OnlyIfHoldingPlan, OnlyIfKnownPlan, RecoverPlan, RemedyPlan
+from skills.api import Cause, Failed, Running, Skill, SkillContext, Step
+
+BEFORE: Final = "before the restart"
+_DECLARED: Final = tuple(name for name, hint in Skill.__annotations__.items() if str(hint).startswith("ClassVar"))
+
+
+@dataclass(frozen=True)
+class ResumedTree(CompiledTree):
+    """A tree that begins with a blackboard as it was left."""
+
+    board: Mapping[str, Any] = field(default_factory=dict)
+
+    def build(self, context: RunContext) -> Behaviour:
+        """The py_trees tree, its blackboard filled."""
+        for key, value in self.board.items():
+            context.board.put(key, value)
+        return super().build(context)
+
+
+def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection]:
+    """The tree of a mission that goes on, and what it remembers; path ids stay the same."""
+    skills = {node.path_id: node for node in _mission(tree.root).walk() if isinstance(node, SkillPlan)}
+    kept = [path for path, plan in skills.items() if all(key in memory.board for _, key in plan.outputs)]
+    recollection = Recollection(tree.path_ids, memory.steps).only(kept)
+    parents = {child.path_id: node for node in tree.root.walk() for child in node.children}
+    change = _Change(memory, recollection, parents)
+    root = tree.root
+    if isinstance(root, InterruptsPlan):
+        root = dataclasses.replace(root, mission=change.all_of(root.mission))
+    else:
+        root = change.all_of(root)
+    own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(tree)}
+    return ResumedTree(**{**own, "root": root, "board": memory.board}), recollection
+
+
+def _mission(root: NodePlan) -> NodePlan:
+    """The mission without what it is interrupted for: that is not taken up, but called for again where need be."""
+    return root.mission if isinstance(root, InterruptsPlan) else root
+
+
+@dataclass(frozen=True)
+class _Change:
+    """Turns the plans of a tree into those of one that goes on."""
+
+    memory: Memory
+    recollection: Recollection
+    parents: Mapping[str, NodePlan]
+
+    def all_of(self, plan: NodePlan) -> NodePlan:
+        """The plan and all below, children first."""
+        fields = {each.name: getattr(plan, each.name) for each in dataclasses.fields(plan) if each.init}
+        changed = {name: self._value(value) for name, value in fields.items()}
+        new = {name: value for name, value in changed.items() if value is not fields[name]}
+        return self._one(dataclasses.replace(plan, **new) if new else plan)
+
+    def _value(self, value: Any) -> Any:
+        """The same for all plans inside a field's value."""
+        if isinstance(value, NodePlan):
+            return self.all_of(value)
+        if isinstance(value, RemedyPlan):
+            return dataclasses.replace(value, node=self.all_of(value.node))
+        if type(value) is tuple:
+            items = tuple(map(self._value, value))
+            return value if all(a is b for a, b in zip(items, value, strict=True)) else items
+        return value
+
+    def _one(self, plan: NodePlan) -> NodePlan:
+        step = self.memory.steps.get(plan.path_id)
+        if isinstance(plan, SkillPlan):
+            ports = {port: self.memory.board[key] for port, key in plan.outputs if key in self.memory.board}
+            skill = resumed_skill(plan.skill, plan.path_id, ports, self.recollection)
+            bound = {port for port, _ in plan.outputs}
+            skill.outputs = {port: kind for port, kind in plan.skill.outputs.items() if port in bound}
+            return dataclasses.replace(plan, skill=skill)
+        if isinstance(plan, OnlyIfKnownPlan | OnlyIfHoldingPlan) and self._was_reached(plan.path_id):
+            return _built(plan, lambda node: _applies_as_before(node, self._begun(plan.path_id)))
+        if isinstance(plan, RecoverPlan) and step is not None and step.status is Status.RUNNING:
+            return dataclasses.replace(plan, forgets=())
+        if step is None or not step.ended:
+            return plan
+        if plan.kind == "guard" and (step.status is Status.SUCCESS or self._failed(plan.children[0].path_id)):
+            return _built(plan, _Unguarded)
+        if isinstance(plan, AskPlan) and step.status is Status.SUCCESS and self._failed(plan.child.path_id):
+            return SkipPlan(path_id=plan.path_id, name=plan.name, source=plan.source, child=plan.child, step=plan.step)
+        known = all(key in self.memory.board for key in plan.writes())
+        if plan.kind == "guard" or (not plan.children and known):
+            return _built(plan, lambda node: _AsBefore(node, step))
+        return plan
+
+    def _failed(self, path_id: str) -> bool:
+        step = self.memory.steps.get(path_id)
+        return step is not None and step.status is Status.FAILURE
+
+    def _was_reached(self, path_id: str) -> bool:
+        """Whether a way of a selector was gone or passed over, which a later one that was begun tells."""
+        parent = self.parents[path_id]
+        ways = [child.path_id for child in parent.children]
+        if not isinstance(parent, SelectorPlan):
+            return False
+        step = self.memory.steps.get(parent.path_id)
+        ended = step is not None and step.ended
+        return ended or any(map(self._begun, ways[ways.index(path_id) :]))
+
+    def _begun(self, path_id: str) -> bool:
+        step = self.memory.steps.get(path_id)
+        return step is not None and step.status is not Status.INVALID
+
+
+def _built(plan: NodePlan, change: Callable[[Any], object]) -> NodePlan:
+    """The plan of the same node, to which something is done once it is built."""
+    kind = type(plan)
+
+    def build(self: NodePlan, context: RunContext) -> Behaviour:
+        node = kind.build(self, context)
+        change(node)
+        return node
+
+    fields = {each.name: getattr(plan, each.name) for each in dataclasses.fields(plan) if each.init}
+    made: NodePlan = type(kind.__name__, (kind,), {"build": build})(**fields)
+    return made
+
+
+class _AsBefore:
+    """Stands before a node: at its first tick it has the status that it had before the restart, and does nothing."""
+
+    def __init__(self, node: Behaviour, step: StepRecord) -> None:
+        self._node = node
+        self._step: StepRecord | None = step
+        self._pass_on: Callable[[], Iterator[Behaviour]] = node.tick
+        vars(node)["tick"] = self._tick
+
+    def _tick(self) -> Iterator[Behaviour]:
+        node, step, self._step = self._node, self._step, None
+        if step is None:
+            yield from self._pass_on()
+            return
+        node.status = step.status
+        if isinstance(node, Explained):
+            node.cause, node.message = step.cause, _before(step.message)
+        yield node
+
+
+class _Unguarded:
+    """Stands before a guard that came to its end before the restart: what it guarded need not be so any more.
+
+    The first time the nodes below are ticked without it, so that they give their results once more.
+    """
+
+    def __init__(self, node: Guard) -> None:
+        self._node: Guard = node
+        self._pass_on: Callable[[], Iterator[Behaviour]] | None = None
+        self._guarded = node.tick
+        vars(node)["tick"] = self._tick
+
+    def _tick(self) -> Iterator[Behaviour]:
+        if self._pass_on is not None:
+            yield from self._pass_on()
+            return
+        yield from Decorator.tick(self._node)
+        if self._node.status is not Status.RUNNING:
+            self._pass_on = self._guarded
+
+
+def _applies_as_before(node: Any, applied: bool) -> None:
+    """Let a way of a selector say at first whether it was gone before the restart: the blackboard knows more by now."""
+    answers = [applied]
+    asked: Callable[[], bool] = node.applies
+    vars(node)["applies"] = lambda: answers.pop() if answers else asked()
+
+
+def told_before(message: str) -> bool:
+    """Whether a node's sentence is that of a result from before a restart."""
+    return message.endswith(f"({BEFORE})")
+
+
+def _before(message: str) -> str:
+    return message if told_before(message) else f"{message} ({BEFORE})"
+
+
+def resumed_skill(
+    skill: type[Skill[Any]], path: str, ports: Mapping[str, Any], recollection: Recollection
+) -> type[Skill[Any]]:
+    """A stand-in for a skill at one place of a tree that goes on: gives its result from before, or does its work."""
+
+    class Resumed(_Resumed):
+        def __init__(self, context: SkillContext) -> None:
+            super().__init__(context, skill(context), path, ports, recollection)
+
+    for name in _DECLARED:
+        if hasattr(skill, name):
+            setattr(Resumed, name, getattr(skill, name))
+    return Resumed
+
+
+class _Resumed(Skill[Any]):
+    """Wraps a skill of a tree that goes on."""
+
+    def __init__(
+        self, context: SkillContext, inner: Skill[Any], path: str, ports: Mapping[str, Any], recollection: Recollection
+    ) -> None:
+        super().__init__(context)
+        self._inner, self._path, self._ports, self._recollection = inner, path, ports, recollection
+        self._inputs: Any = None
+        self._working = False
+
+    def begin(self, inputs: Any) -> None:
+        """Nothing yet: the first step tells whether there is a result already."""
+        self._inputs, self._working = inputs, False
+        self.checkpoint = self._recollection.checkpoint(self._path)
+
+    def step(self) -> Step:
+        """The result from before, or a step of the skill."""
+        if not self._working:
+            known = self._known()
+            if known is not None:
+                return known
+        step = self._inner.step()
+        self.checkpoint = self._inner.checkpoint
+        return step
+
+    def suspend(self) -> None:
+        """As the skill, if it works."""
+        if self._working:
+            self._inner.suspend()
+
+    def resume(self, inputs: Any) -> None:
+        """As the skill, if it works."""
+        if self._working:
+            self._inner.resume(inputs)
+
+    def end(self) -> None:
+        """As the skill, if it works."""
+        if self._working:
+            self._inner.end()
+
+    def _known(self) -> Step | None:
+        """The result from before the restart; None when the skill has begun to work."""
+        result, context = self._recollection.result(self._path), self.context
+        trusted = result is not None and not self._recollection.is_last(self._path)
+        if not trusted and not self._recollection.awake(context.clock.now(), context.localiser.estimate().localised):
+            return Running("looks how things stand after the restart")
+        if result is None:
+            self._work("goes on here")
+            return None
+        undone = None if trusted else self._inner.undone(self._inputs)
+        if undone is not None:
+            self._work(f"does it again, since {undone}")
+            return None
+        return self._told(result)
+
+    def _work(self, sentence: str) -> None:
+        self._working, self._inner.checkpoint = True, self.checkpoint
+        self._recollection.goes_on(self._path, sentence)
+        if self._recollection.looks_first(self._inner.changes_world):
+            self._inner.resume(self._inputs)
+        else:
+            self._inner.begin(self._inputs)
+
+    def _told(self, result: StepRecord) -> Step:
+        self._recollection.used(self._path, f"{result.status.value.lower()} {BEFORE}: {result.message}")
+        message = _before(result.message)
+        if result.status is Status.SUCCESS:
+            return Remembered(message, self._ports)
+        return Failed(result.cause or Cause.EXECUTION, message)

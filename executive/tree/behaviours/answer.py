@@ -1,0 +1,114 @@
+"""The answer to a status check: an honest no is a success, a no without having looked is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.tree.behaviours.board import Board
+from executive.tree.behaviours.decorators import ExplainedDecorator
+from executive.tree.behaviours.explained import Explained
+from skills.api import Cause, Failed, ObjectObservation, Publish
+from skills.detect.tally import told_apart
+from skills.detect.words import counted
+
+ANSWER_TOPIC: Final = "answer"
+
+
+@dataclass(frozen=True)
+class Tally:
+    """What is to be counted: all that the leaves of looks saw, each under a blackboard key; yes is `needed` of them."""
+
+    keys: Mapping[str, str]
+    needed: int
+
+
+class Answer(ExplainedDecorator):
+    """Turns a search into a yes or a no.
+
+    Child RUNNING: RUNNING. Child SUCCESS: SUCCESS, answer True. Child FAILURE with every surface looked at: SUCCESS,
+    answer False. Child FAILURE with a surface that could not be looked at: FAILURE with what kept the robot from it.
+    `looks` names for each surface the leaves that look at it, one for each viewpoint: all of them must have looked,
+    which means that they succeeded, or failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; one
+    that `tells` repeats what was seen where.
+
+    With a `tally` the child looks at all surfaces, and what its leaves saw is counted, each thing once. Enough of them
+    is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface looked at, and else FAILURE as above.
+    """
+
+    def __init__(
+        self,
+        *,
+        path_id: str,
+        name: str,
+        child: Behaviour,
+        question: str,
+        looks: Mapping[str, Sequence[str]],
+        key: str,
+        board: Board,
+        publish: Publish,
+        tells: bool = False,
+        tally: Tally | None = None,
+    ) -> None:
+        super().__init__(path_id=path_id, name=name, child=child)
+        self.answer: bool | None = None
+        self._question, self._looks, self._key, self._board = question, looks, key, board
+        self._publish, self._tells, self._tally = publish, tells, tally
+
+    def initialise(self) -> None:
+        """Forget an earlier answer."""
+        self.answer = None
+
+    def update(self) -> Status:
+        """The answer, as soon as the search is over."""
+        status = self.pass_on()
+        if status == Status.RUNNING:
+            return status
+        nodes = {node.path_id: node for node in self.iterate() if isinstance(node, Explained)}
+        unseen = [surface for surface, leaves in self._looks.items() if not _looked(leaves, nodes)]
+        if self._tally is not None:
+            return self._counted(self._tally, nodes, unseen)
+        if status == Status.FAILURE and unseen:
+            return self._not_looked(nodes, unseen)
+        answer = status == Status.SUCCESS
+        return self._answered(answer, self.message if answer and self._tells else "")
+
+    def _counted(self, tally: Tally, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
+        seen = [key for leaf, key in tally.keys.items() if leaf in nodes and nodes[leaf].status == Status.SUCCESS]
+        looks: list[tuple[ObjectObservation, ...]] = [self._board.get(key) for key in seen]
+        found = told_apart(looks)
+        enough = len(found) >= tally.needed
+        if unseen and not enough:
+            return self._not_looked(nodes, unseen)
+        limits = f", as far as was seen: not {', '.join(unseen)}" if unseen else ""
+        return self._answered(enough, f"{counted(found, ())}{limits}" if found else "")
+
+    def _not_looked(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
+        return self.fail(Failed(_obstacle(nodes), f"could not look at {', '.join(unseen)}: {self.message}"))
+
+    def _answered(self, answer: bool, found: str) -> Status:
+        self.answer, self.cause = answer, None
+        self.message = f"{'yes' if answer else 'no'}: {self._question}" + (f"; {found}" if found else "")
+        self._board.put(self._key, answer)
+        told = {"node": self.path_id, "question": self._question, "answer": answer, "message": self.message}
+        self._publish(ANSWER_TOPIC, told)
+        return Status.SUCCESS
+
+
+def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
+    """True when each of the leaves took a look, whether it saw something or nothing."""
+    return all(leaf in nodes and _took_a_look(nodes[leaf]) for leaf in leaves)
+
+
+def _took_a_look(leaf: Explained) -> bool:
+    return leaf.status == Status.SUCCESS or leaf.cause == Cause.POSTCONDITION
+
+
+def _obstacle(nodes: Mapping[str, Explained]) -> Cause:
+    """The first cause in the tree that is not merely "not seen"."""
+    causes = (node.cause for node in nodes.values())
+    return next((cause for cause in causes if cause not in (None, Cause.POSTCONDITION)), None) or Cause.EXECUTION

@@ -1,0 +1,179 @@
+"""What becomes of a step that failed: skipped, asked about, or the robot goes back first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.tree.behaviours.composites import MemorySequence
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.decorators import ExplainedDecorator
+from executive.tree.behaviours.explained import Explained, message_of
+from skills.api import Asked, Cause, Failed, Question
+
+FINAL_CAUSES: Final = frozenset({Cause.ERROR, Cause.CANCELLED})
+"""A defect and somebody's wish to stop are neither skipped, nor asked about, nor tried again."""
+RETRY: Final = "retry"
+SKIP: Final = "skip"
+STOP: Final = "stop"
+
+
+class Skip(ExplainedDecorator):
+    """A step that may fail; `step` is the step in words.
+
+    Child FAILURE: SUCCESS, and `skipped` says why; but FAILURE when its cause is ERROR or CANCELLED. Else as the child.
+    """
+
+    def __init__(self, *, path_id: str, name: str, child: Behaviour, step: str) -> None:
+        super().__init__(path_id=path_id, name=name, child=child)
+        self.step = step
+        self.skipped: str | None = None
+
+    def initialise(self) -> None:
+        """Nothing is skipped yet."""
+        self.skipped = None
+
+    def update(self) -> Status:
+        """The child's status, a failure turned into a success that is noted."""
+        status = self.pass_on()
+        if status != Status.FAILURE or self.cause in FINAL_CAUSES:
+            return status
+        return self.skip()
+
+    def skip(self) -> Status:
+        """SUCCESS without the child's."""
+        self.skipped, self.cause = self.message, None
+        self.message = f"skipped: {self.skipped}"
+        return Status.SUCCESS
+
+
+class AskOperator(Skip):
+    """A step about which the operator is asked when it fails.
+
+    Child FAILURE: RUNNING until the operator answers or the question's time is over. Answer retry: RUNNING, and the
+    child starts anew at the next tick. Answer skip: SUCCESS, and `skipped` says why. Answer stop: FAILURE as the child.
+    A failure with cause ERROR or CANCELLED is passed on without a question. Else as the child.
+    """
+
+    def __init__(
+        self,
+        *,
+        path_id: str,
+        name: str,
+        child: Behaviour,
+        step: str,
+        options: tuple[str, ...],
+        default: str,
+        limit_s: float,
+        text: str | None,
+        context: RunContext,
+    ) -> None:
+        super().__init__(path_id=path_id, name=name, child=child, step=step)
+        self._options, self._default, self._limit_s, self._text = options, default, limit_s, text
+        self._context = context
+        self._asked: Asked | None = None
+        self._failure = Failed(Cause.EXECUTION, "")
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Tick the child, or wait for the answer."""
+        if self._asked is None:
+            yield from super().tick()
+            return
+        self._wait(self._asked)
+        yield self
+
+    def update(self) -> Status:
+        """As the child, until it fails: then the question is put."""
+        status = self.pass_on()
+        if status != Status.FAILURE or self.cause is None or self.cause in FINAL_CAUSES:
+            return status
+        self._failure = Failed(self.cause, self.message)
+        text = f"{self._text} ({self.message})" if self._text else f"{self.message}. What now?"
+        question = Question(self.path_id, text, self._options, self._default, self._limit_s)
+        self._asked = self._context.ask(question)
+        self.cause, self.message = None, f"asks the operator: {text}"
+        return Status.RUNNING
+
+    def stop(self, new_status: Status) -> None:
+        """Take an open question back when the tree is stopped."""
+        if new_status == Status.INVALID and self._asked is not None:
+            self._asked.withdraw()
+            self._asked = None
+        super().stop(new_status)
+
+    def _wait(self, asked: Asked) -> None:
+        """Act on the answer once it is there."""
+        if not asked.done():
+            return
+        answer, self._asked = asked.result(), None
+        if answer == RETRY:
+            self.message = f"tries again, as the operator said, since {self._failure.message}"
+        elif answer == SKIP:
+            self.message = self._failure.message
+            super().stop(self.skip())
+        else:
+            super().stop(self.fail(self._failure))
+
+
+class GoBack(MemorySequence):
+    """A way back after a failure: two children, the first what is to be done, the second the way back.
+
+    First child RUNNING or SUCCESS: the same. First child FAILURE: the second is ticked, RUNNING while it runs; at its
+    end FAILURE with the first's cause and sentence, and whether the robot is back.
+    """
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Tick what is to be done, or the way back."""
+        if self.status != Status.RUNNING:
+            self._restart()
+        deed, way_back = self.children
+        child = deed if self._index == 0 else way_back
+        self.current_child = child
+        yield from child.tick()
+        if child is deed and deed.status == Status.FAILURE and self._may_go_back(deed):
+            self._index, self.status = 1, Status.RUNNING
+            self.message = f"goes back, since {message_of(deed)}"
+        elif child is deed:
+            self._take_over(deed)
+        elif way_back.status == Status.RUNNING:
+            self.message = f"goes back ({message_of(way_back)})"
+        else:
+            self._end(deed, way_back)
+        yield self
+
+    def _may_go_back(self, deed: Behaviour) -> bool:
+        return not (isinstance(deed, Explained) and deed.cause in FINAL_CAUSES)
+
+    def _end(self, deed: Behaviour, way_back: Behaviour) -> None:
+        back = way_back.status == Status.SUCCESS
+        told = "is back where it started" if back else f"could not go back: {message_of(way_back)}"
+        self.cause, self.message = self._explanation(deed)
+        self.message = f"{self.message}; the robot {told}"
+        self.stop(Status.FAILURE)
+
+
+class Summary(ExplainedDecorator):
+    """The end of a mission in which steps may be skipped; `steps` are the path ids of its steps' outermost nodes.
+
+    As the child, but a SUCCESS names what was skipped, and it is FAILURE when every one of the steps was skipped.
+    """
+
+    def __init__(self, *, path_id: str, name: str, child: Behaviour, steps: Sequence[str]) -> None:
+        super().__init__(path_id=path_id, name=name, child=child)
+        self._steps = frozenset(steps)
+
+    def update(self) -> Status:
+        """The child's status, and what was skipped."""
+        status = self.pass_on()
+        nodes = [node for node in self.iterate() if isinstance(node, Skip) and node.status == Status.SUCCESS]
+        skipped = {node.path_id: f"{node.step} ({node.skipped})" for node in nodes if node.skipped is not None}
+        if status != Status.SUCCESS or not skipped:
+            return status
+        told = "; ".join(skipped.values())
+        if self._steps <= skipped.keys():
+            return self.fail(Failed(Cause.EXECUTION, f"all steps were skipped: {told}"))
+        self.message = f"done, but skipped: {told}"
+        return status

@@ -1,0 +1,184 @@
+"""The one leaf that wraps every skill: binds its ports, keeps its time, survives its defects, always ends it."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.tree.behaviours.board import Binding
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviours.freshness import refuse_stale
+from executive.tree.behaviours.suspension import StoppableTime
+from executive.tree.types import conforms, describe_type
+from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
+
+ResultT = TypeVar("ResultT")
+ERROR_TOPIC = "errors"
+
+
+class SkillLeaf(Explained, Behaviour):
+    """Runs one skill.
+
+    RUNNING while the skill says `Running` and its time is not over. SUCCESS when it says `Succeeded` in time and
+    its output ports are filled with the declared types. FAILURE with the skill's cause when it says `Failed`; with
+    TIMEOUT when the robot's clock ran past `limit_s`, a late success included; with ERROR when it raised anything
+    or returned no `Step`. INVALID with CANCELLED when stopped from outside. `end` is called on every way out.
+    Each attempt gets a new skill object, so that nothing leaks from one attempt to the next. A suspended leaf stays
+    RUNNING; its skill goes on at the next tick (`Skill.resume`), and the time between does not count.
+    """
+
+    def __init__(
+        self,
+        *,
+        path_id: str,
+        name: str,
+        skill: type[Skill[Any]],
+        inputs: Mapping[str, Binding],
+        outputs: Mapping[str, str],
+        limit_s: float,
+        context: RunContext,
+    ) -> None:
+        super().__init__(name)
+        self.path_id = path_id
+        self.progress: float | None = None
+        self._skill_class, self._inputs, self._outputs = skill, dict(inputs), dict(outputs)
+        self._limit_s, self._context = limit_s, context
+        self._skill: Skill[Any] | None = None
+        self._values: Any = None
+        self._time = StoppableTime(context.clock)
+        self._false_start: Failed | None = None
+        self.clear_explanation()
+
+    @property
+    def active(self) -> bool:
+        """True between the skill's `begin` and its `end`."""
+        return self._skill is not None
+
+    @property
+    def checkpoint(self) -> Mapping[str, Any]:
+        """What the active skill keeps for a restart; empty on an idle leaf."""
+        return {} if self._skill is None else self._skill.checkpoint
+
+    @property
+    def skill_name(self) -> str:
+        """The registered name of the skill."""
+        return self._skill_class.name
+
+    @property
+    def suspended(self) -> bool:
+        """True between `suspend` and the next tick."""
+        return self.active and self._time.stopped
+
+    def initialise(self) -> None:
+        """Begin a new attempt; a defect is kept for `update`, since an exception here would leave the tree hanging."""
+        self.clear_explanation()
+        self.progress = None
+        self._false_start = self._guarded(self._begin)
+
+    def update(self) -> Status:
+        """One step of the skill, judged."""
+        if self.suspended:
+            self._go_on()
+        step = self._false_start or self._judged(self._guarded(self._step))
+        if isinstance(step, Running):
+            self.message, self.progress = step.message, step.progress
+            return Status.RUNNING
+        step = self._ended() or self._written(step)
+        self.message = self.feedback_message = step.message
+        self.cause = step.cause if isinstance(step, Failed) else None
+        return Status.FAILURE if isinstance(step, Failed) else Status.SUCCESS
+
+    def suspend(self) -> None:
+        """Let the skill stop its motion and keep its place; does nothing on an idle or suspended leaf."""
+        if not self.active or self.suspended:
+            return
+        assert self._skill is not None
+        self._time.stop()
+        self._false_start = self._guarded(self._skill.suspend) or self._false_start
+
+    def terminate(self, new_status: Status) -> None:
+        """Stopped from outside: end the skill if it is still active, else merely forget an old result."""
+        if new_status != Status.INVALID:
+            return
+        if self.active:
+            self.abandon()
+        else:
+            self.clear_explanation()
+
+    def abandon(self) -> None:
+        """End an active skill and say that it was cancelled; does nothing on an idle leaf."""
+        if not self.active:
+            return
+        defect = self._ended()
+        self.explain_cancelled()
+        if defect is not None:
+            self.cause, self.message = defect.cause, defect.message
+
+    def _begin(self) -> None:
+        self._time = StoppableTime(self._context.clock)
+        board = self._context.board
+        values = {port: binding.read(board) for port, binding in self._inputs.items()}
+        self._skill = self._skill_class(self._context.for_skill(self.path_id))
+        self._values = self._skill_class.Inputs(**values)
+        self._skill.begin(self._values)
+
+    def _go_on(self) -> None:
+        """The first tick after a suspension; a defect is kept, as in `initialise`."""
+        assert self._skill is not None
+        skill = self._skill
+        self._time.go_on()
+        self._false_start = self._false_start or self._guarded(lambda: skill.resume(self._values))
+
+    def _step(self) -> Step:
+        assert self._skill is not None
+        step = self._skill.step()
+        if not isinstance(step, Running | Succeeded | Failed):
+            return Failed(Cause.ERROR, f"{self.name} gave back {step!r} instead of a step")
+        return step
+
+    def _judged(self, step: Step) -> Step:
+        """Time over turns going on, and a success that comes too late, into a failure."""
+        late = self._time.elapsed_s() > self._limit_s
+        if late and not isinstance(step, Failed):
+            return Failed(Cause.TIMEOUT, f"{self.name} took longer than {self._limit_s:g} s ({step.message})")
+        if isinstance(step, Succeeded):
+            success = step
+            return self._guarded(lambda: refuse_stale(self._skill_class, success, self._context))
+        return step
+
+    def _ended(self) -> Failed | None:
+        """Call `end` once; a Failed when it raised."""
+        skill, self._skill = self._skill, None
+        return None if skill is None else self._guarded(skill.end)
+
+    def _written(self, step: Succeeded | Failed) -> Succeeded | Failed:
+        """Put the outputs on the blackboard; a missing or wrongly typed output is a defect of the skill.
+
+        A failure need not fill all ports: what it learnt is for the next attempt.
+        """
+        given = step.outputs if isinstance(step, Failed) else self._skill_class.outputs
+        for port, kind in self._skill_class.outputs.items():
+            if port not in given:
+                continue
+            if not conforms(step.outputs.get(port), kind):
+                found = type(step.outputs[port]).__name__ if port in step.outputs else "nothing"
+                return Failed(Cause.ERROR, f"{self.name} gave {found} on port '{port}', not {describe_type(kind)}")
+        for port, key in self._outputs.items():
+            if port in given:
+                self._context.board.put(key, step.outputs[port])
+        return step
+
+    def _guarded(self, call: Callable[[], ResultT]) -> ResultT | Failed:
+        """The call's result, or Failed(ERROR) with the traceback in the log when it raised."""
+        try:
+            return call()
+        except Exception as defect:
+            trace = traceback.format_exc()
+            self._context.publish(ERROR_TOPIC, {"node": self.path_id, "traceback": trace})
+            text = str(defect.args[0]) if isinstance(defect, KeyError) and defect.args else str(defect)
+            return Failed(Cause.ERROR, f"{self.name} raised {type(defect).__name__}: {text}")

@@ -1,0 +1,110 @@
+"""Whether a mission can be done at all, as far as that is knowable before it runs, and what it will take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from executive.mission.command import Task
+from executive.mission.errors import InputError, listing
+from executive.mission.knowledge import Knowledge
+from executive.tree.compiler import CompiledTree, StepPart
+from executive.tree.estimate import Estimate, Estimates, Itinerary, Way, estimate_tree
+from skills.api import Costmap
+from skills.navigate.footprint import Footprint
+from skills.navigate.path import path_length
+from skills.navigate.planner import PlanningError, plan_path
+from skills.robot import Pose2D
+
+__all__ = ["Abilities", "Checked", "PlannedWays", "check_tree"]
+
+
+@dataclass(frozen=True)
+class Abilities:
+    """What is known of robot and things: masses (kg) of the classes that can be handled, and what the arm lifts (kg).
+
+    A class that is not in `masses_kg` has no model: there is no such thing in any world. `classes` and `attributes` are
+    those that the robot knows by sight; one that it does not know spoils a search for several.
+    """
+
+    masses_kg: Mapping[str, float]
+    lift_kg: float
+    classes: frozenset[str]
+    attributes: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What speaks against a mission, and what it takes when all goes well."""
+
+    errors: tuple[InputError, ...]
+    estimate: Estimate
+
+
+class PlannedWays(Itinerary):
+    """Ways by the planner of `navigate` on the surveyed map; each is planned once."""
+
+    def __init__(self, costmap: Costmap, footprint: Footprint) -> None:
+        self._costmap, self._footprint = costmap, footprint
+        self._ways: dict[tuple[Pose2D, Pose2D], Way | PlanningError] = {}
+
+    def way(self, start: Pose2D, goal: Pose2D) -> Way:
+        """The way from start to goal. Raises ValueError with one sentence when there is none."""
+        if (start, goal) not in self._ways:
+            self._ways[start, goal] = self._planned(start, goal)
+        way = self._ways[start, goal]
+        if isinstance(way, PlanningError):
+            raise ValueError(str(way)) from way
+        return way
+
+    def _planned(self, start: Pose2D, goal: Pose2D) -> Way | PlanningError:
+        try:
+            path = plan_path(self._costmap, self._footprint, start, goal)
+        except PlanningError as error:
+            return error
+        return Way(path_length(path), float(path.progress_m()[-1]))
+
+
+def check_tree(
+    tree: CompiledTree,
+    *,
+    knowledge: Knowledge,
+    start: Pose2D,
+    abilities: Abilities,
+    itinerary: Itinerary,
+    estimates: Estimates,
+) -> Checked:
+    """Check a compiled mission that begins at `start`: are its things there and light enough, its places in reach?"""
+    impossible = tuple(error for part in tree.parts for error in _impossible(part, tree, knowledge, abilities))
+    estimate, unreachable = estimate_tree(tree.root, start=start, itinerary=itinerary, estimates=estimates)
+    return Checked((*impossible, *unreachable), estimate)
+
+
+def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[InputError]:
+    """What makes a command impossible: its thing is not known by sight, or nothing that it means can be lifted."""
+    command = part.command
+    if command is None or command.task not in (Task.GRASP, Task.FIND) or command.object is None:
+        return
+    thing = command.object
+    classes = knowledge.classes(knowledge.thing(thing.name) or thing.name)
+    masses = [abilities.masses_kg[one] for one in classes if one in abilities.masses_kg]
+    unseen = [one for one in classes if one not in abilities.classes]
+    unseen += [word for word in thing.attributes if word not in abilities.attributes]
+    if command.task is Task.GRASP and not masses:
+        known = [one for one in knowledge.things if one in abilities.masses_kg]
+        yield _at(part, tree, f"there is no '{thing.name}' that could be picked up", f"known are {listing(known)}")
+    elif command.task is Task.GRASP and min(masses) > abilities.lift_kg:
+        message = f"'{thing.name}' is too heavy: {min(masses):g} kg, and the arm lifts {abilities.lift_kg:g} kg"
+        yield _at(part, tree, message, "ask for something lighter")
+    elif unseen:
+        known = [one for one in knowledge.things if one in abilities.classes]
+        message = f"the robot does not know what {listing(unseen)} looks like"
+        yield _at(part, tree, message, f"it knows {listing(known)} by sight")
+
+
+def _at(part: StepPart, tree: CompiledTree, message: str, mend: str) -> InputError:
+    """An error at the line that the part comes from."""
+    source = next((node.source for node in tree.root.walk() if node.path_id == part.path_id), None)
+    if source is None:
+        return InputError(message, mend=mend)
+    return InputError(message, mend=mend, file=source.file, line=source.line)

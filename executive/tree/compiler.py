@@ -1,0 +1,88 @@
+"""From missions to trees: a pure function; the same mission gives the same tree, path ids included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from py_trees.behaviour import Behaviour
+
+from executive.mission.command import Command
+from executive.mission.errors import InputError
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
+from executive.mission.knowledge import Knowledge
+from executive.tree.behaviours.context import RunContext
+from executive.tree.compiling.assembly import StepPart, assemble, step_name
+from executive.tree.compiling.interrupts import InterruptsPlan, watched
+from executive.tree.compiling.plans import NodePlan, Source
+from executive.tree.compiling.wiring import check_wiring
+from executive.tree.compiling.workshop import Registry, Workshop, start_key
+
+__all__ = ["CompiledTree", "Step", "StepPart", "compile_commands", "compile_mission", "step_name"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A command, and the line of the mission file that it comes from."""
+
+    command: Command
+    source: Source | None = None
+
+
+@dataclass(frozen=True)
+class CompiledTree:
+    """A mission's tree for one robot, as data; `parts` are what it is to bring about, in order.
+
+    Its root watches over the mission itself: see `executive.tree.compiling.interrupts`.
+    """
+
+    robot_name: str
+    mission_name: str
+    commands: tuple[Command, ...]
+    root: NodePlan
+    parts: tuple[StepPart, ...] = ()
+
+    @property
+    def mission(self) -> NodePlan:
+        """The mission below its watches."""
+        return self.root.mission if isinstance(self.root, InterruptsPlan) else self.root
+
+    def build(self, context: RunContext) -> Behaviour:
+        """The py_trees tree for one run."""
+        return self.root.build(context)
+
+    @property
+    def path_ids(self) -> tuple[str, ...]:
+        """All path ids, parents first."""
+        return tuple(node.path_id for node in self.root.walk())
+
+
+def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> CompiledTree:
+    """Compile a mission to a tree and check its wiring; each node keeps the line of the file that it comes from.
+
+    Args:
+        mission: what to do; its robot and name become the first parts of the path ids.
+        knowledge: the world's places, surfaces, things and people.
+        registry: the skills by name.
+
+    Raises:
+        InputError: no steps, an unknown place, thing or skill, ports wired wrongly, or a command that cannot be
+            carried out; with the file and line where known, and all that was found in `others`.
+    """
+    if not mission.steps:
+        raise InputError(f"the mission '{mission.name}' has no commands", mend="add at least one step")
+    made = assemble(mission, knowledge=knowledge, registry=registry)
+    base = made.root.path_id
+    start = start_key(mission.robot_name, mission.name)
+    root = watched(Workshop(knowledge, registry, base, start, Command(), mission.source), made.root)
+    check_wiring(root)
+    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, made.parts)
+
+
+def compile_commands(
+    mission_name: str, steps: Sequence[Step], *, knowledge: Knowledge, registry: Registry, robot_name: str
+) -> CompiledTree:
+    """Compile commands, each with its source, as `compile_mission` does. Raises InputError."""
+    made = tuple(MissionStep((step.command,), step.source) for step in steps)
+    mission = Mission(mission_name, DEFAULT_WORLD, robot_name, made)
+    return compile_mission(mission, knowledge=knowledge, registry=registry)

@@ -1,0 +1,162 @@
+"""Looking for a thing: which surfaces, in which order, and the subtree that visits them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from executive.mission.command import Thing
+from executive.mission.errors import listing
+from executive.mission.knowledge import Knowledge
+from executive.tree.behaviours.board import FromBoard, SurfaceOfSighting, beside
+from executive.tree.compiling.geometry import inside
+from executive.tree.compiling.plans import NodePlan, SelectorPlan, SequencePlan
+from executive.tree.compiling.recovery import OnlyIfKnownPlan
+from executive.tree.compiling.workshop import Workshop, pose_2d
+from skills.api import Cause, ObjectObservation
+
+Ports = Mapping[str, object]
+
+NO_PORTS: Final[Ports] = MappingProxyType({})
+MOST_ELSEWHERE: Final = 3
+MOST_ASIDE: Final = 2
+ASIDE_M: Final = 0.45
+
+
+def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
+    """The surfaces to look at, those where the thing usually is first; without a place, all that there are.
+
+    A usual place may be a room: then its surfaces count as usual.
+    """
+    inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
+    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
+    return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
+
+
+def surfaces_elsewhere(
+    knowledge: Knowledge, thing: str, place: str | None, avoided: frozenset[str] = frozenset()
+) -> tuple[str, ...]:
+    """The surfaces to look at when the thing is not in its place: where it usually is, then others of the same room,
+    then any others; `MOST_ELSEWHERE` at most, and none that are `avoided`."""
+    if place is None:
+        return ()
+    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
+    near = knowledge.surfaces_in(knowledge.room(place))
+    inside = knowledge.surfaces_in(place)
+    others = dict.fromkeys(name for name in (*usual, *near, *knowledge.surfaces) if name not in {*inside, *avoided})
+    return tuple(others)[:MOST_ELSEWHERE]
+
+
+def look_plans(
+    shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str, extra: Ports = NO_PORTS, *, tallied: bool = False
+) -> tuple[tuple[str, SequencePlan], ...]:
+    """For each surface and viewpoint: drive there and look. The sighting goes to `key`; `extra` are detect's.
+
+    With `tallied`, all that a look saw goes to the key that `tally_key` gives for its leaf.
+    """
+    views = [(name, n) for name in surfaces for n in range(1, len(shop.knowledge.surfaces[name].viewpoints) + 1)]
+    return tuple((name, _look_plan(shop.at(f"{name}-{n}"), thing, name, n, key, extra, tallied)) for name, n in views)
+
+
+def tally_key(leaf: str) -> str:
+    """The blackboard key of all that the leaf of a look saw."""
+    return f"{leaf}/all"
+
+
+def _look_plan(
+    shop: Workshop, thing: Thing, surface: str, number: int, key: str, extra: Ports, tallied: bool
+) -> SequencePlan:
+    view = shop.knowledge.surfaces[surface].viewpoints[number - 1]
+    return shop.sequence(
+        f"look at {surface}" + (f" ({number})" if number > 1 else ""),
+        shop.navigate(pose_2d(view)),
+        detect_plan(shop, thing, (surface,), key, extra, tallied=tallied),
+    )
+
+
+def detect_plan(
+    shop: Workshop,
+    thing: Thing,
+    surfaces: tuple[str, ...] | FromBoard,
+    key: str,
+    extra: Ports = NO_PORTS,
+    *,
+    tallied: bool = False,
+) -> NodePlan:
+    """Look for the thing on some surfaces, by name or from the blackboard, from where the robot stands."""
+    where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(shop.surface, surfaces))
+    ports = {"classes": shop.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
+    tally = {"observations": tally_key(f"{shop.path_id}/detect")} if tallied else {}
+    return shop.skill("detect", {**ports, **extra}, {"observation": key, **tally})
+
+
+def find_again_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodePlan:
+    """When it was seen before: look from here first, where it was seen. Else passed over."""
+    seen_on = SurfaceOfSighting(key, tuple(map(shop.surface, surfaces)))
+    return OnlyIfKnownPlan(
+        path_id=shop.path_id,
+        name="look from here, if seen before",
+        source=shop.source,
+        child=detect_plan(shop, thing, seen_on, key),
+        key=key,
+        holds=ObjectObservation,
+    )
+
+
+def search_plan(shop: Workshop, thing: Thing, place: str | None, key: str, *, anywhere: bool = True) -> SelectorPlan:
+    """Look from here when it was seen before, else at each surface in turn; the first sighting ends the search.
+
+    When it is nowhere in its place, look at some of its surfaces from aside, then, with `anywhere`, at surfaces
+    elsewhere.
+
+    Raises:
+        InputError: the place has no surfaces.
+    """
+    surfaces = required_surfaces(shop, thing, place)
+    name = shop.knowledge.thing(thing.name) or thing.name
+    elsewhere = surfaces_elsewhere(shop.knowledge, name, place, shop.avoided) if anywhere and shop.anywhere else ()
+    looks = look_plans(shop, thing, surfaces, key)
+    further = look_plans(shop.at("elsewhere"), thing, elsewhere, key)
+    looked = where(place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
+    return SelectorPlan(
+        path_id=shop.path_id,
+        name=f"find {thing}",
+        source=shop.source,
+        steps=(
+            find_again_plan(shop.at("again"), thing, (*surfaces, *elsewhere), key),
+            *(look for _, look in looks),
+            *_looks_from_aside(shop, thing, surfaces, key),
+            *(look for _, look in further),
+        ),
+        exhausted_cause=Cause.PRECONDITION,
+        exhausted_message=f"found no {thing} {looked}",
+    )
+
+
+def _looks_from_aside(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> Iterator[SequencePlan]:
+    """Look again at surfaces that have only one viewpoint, from beside it."""
+    facts = shop.knowledge.surfaces
+    single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
+    for name in single[:MOST_ASIDE]:
+        room = shop.knowledge.places[facts[name].place].polygon
+        view = pose_2d(facts[name].viewpoints[0])
+        poses = (beside(view, 0.0, left_m) for left_m in (ASIDE_M, -ASIDE_M))
+        aside = next((pose for pose in poses if inside(room, (pose.x_m, pose.y_m))), None)
+        if aside is not None:
+            below = shop.at(f"{name}-aside")
+            look = detect_plan(below, thing, (name,), key)
+            yield below.sequence(f"look at {name} from aside", below.navigate(aside), look)
+
+
+def required_surfaces(shop: Workshop, thing: Thing, place: str | None) -> tuple[str, ...]:
+    """The surfaces to look at. Raises InputError when there are none."""
+    surfaces = surfaces_to_search(shop.knowledge, shop.knowledge.thing(thing.name) or thing.name, place)
+    if not surfaces:
+        raise shop.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")
+    return surfaces
+
+
+def where(place: str | None) -> str:
+    """The place as the end of a sentence."""
+    return "anywhere" if place is None else f"in the {place}"

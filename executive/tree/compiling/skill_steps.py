@@ -1,0 +1,93 @@
+"""A step that names a skill and its ports: values from the file become bindings, outputs get names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from executive.mission.errors import did_you_mean, listing
+from executive.mission.file.model import SkillCall
+from executive.mission.knowledge import Knowledge
+from executive.tree.behaviours.board import Binding, Constant, FromBoard
+from executive.tree.compiling.plans import SkillPlan, Source
+from executive.tree.compiling.workshop import Registry, slug
+from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_value
+from executive.tree.types import field_types
+from skills.api import Skill
+
+__all__ = ["skill_plan"]
+
+
+def skill_plan(
+    call: SkillCall,
+    path_id: str,
+    source: Source | None,
+    *,
+    knowledge: Knowledge,
+    registry: Registry,
+    names: dict[str, str],
+) -> SkillPlan:
+    """The leaf of a skill step. `names` are the outputs of earlier steps and their blackboard keys; its own are added.
+
+    Raises:
+        InputError: no such skill, a value that does not fit its port, an unknown port or name.
+    """
+    skill = _registered(call, registry)
+    inputs = _inputs(call, skill, knowledge, names)
+    outputs = {port: f"{path_id}/{slug(port)}" for port in _given_ports(call, skill)}
+    names.update({call.gives[port]: key for port, key in outputs.items()})
+    return SkillPlan(
+        path_id=path_id,
+        name=call.skill,
+        source=source,
+        skill=skill,
+        inputs=tuple(inputs.items()),
+        outputs=tuple(outputs.items()),
+        limit_s=skill.default_timeout_s,
+    )
+
+
+def _registered(call: SkillCall, registry: Registry) -> type[Skill[Any]]:
+    if call.skill not in registry:
+        near = did_you_mean(call.skill, registry)
+        mend = f"did you mean '{near}'?" if near else f"registered are {listing(sorted(registry))}"
+        raise call.error(("skill",), f"there is no skill '{call.skill}'", mend)
+    return registry[call.skill]
+
+
+def _inputs(
+    call: SkillCall, skill: type[Skill[Any]], knowledge: Knowledge, names: Mapping[str, str]
+) -> dict[str, Binding]:
+    """A binding for each input port that has a value."""
+    hints = field_types(skill.Inputs)
+    try:
+        ports = gathered(call.values, skill.Inputs)
+        return {
+            port: _named_output(call, path, value[FROM_KEY], names)
+            if isinstance(value, dict) and set(value) == {FROM_KEY}
+            else Constant(port_value(value, hints[port], knowledge, path))
+            for port, (path, value) in ports.items()
+        }
+    except PortValueError as error:
+        where = ".".join(map(str, error.path))
+        message = f"{call.skill}: {where + ': ' if where and where not in error.message else ''}{error.message}"
+        raise call.error(("with", *error.path), message, error.mend) from error
+
+
+def _named_output(call: SkillCall, path: tuple[str | int, ...], name: Any, names: Mapping[str, str]) -> FromBoard:
+    if not isinstance(name, str) or name not in names:
+        near = did_you_mean(str(name), names)
+        known = f"known are {listing(names)}" if names else "name one with 'gives: {PORT: NAME}' in an earlier step"
+        mend = f"did you mean '{near}'?" if near else known
+        raise call.error(("with", *path), f"no earlier step gives '{name}'", mend)
+    return FromBoard(names[name])
+
+
+def _given_ports(call: SkillCall, skill: type[Skill[Any]]) -> tuple[str, ...]:
+    for port in call.gives:
+        if port not in skill.outputs:
+            near = did_you_mean(port, skill.outputs)
+            known = f"its outputs are {listing(skill.outputs)}" if skill.outputs else "it has none"
+            mend = f"did you mean '{near}'?" if near else known
+            raise call.error(("gives", port), f"{call.skill} has no output port '{port}'", mend)
+    return tuple(call.gives)

@@ -1,0 +1,72 @@
+"""Several things at once: the robot carries one at a time, so it goes as often as there are things."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from executive.mission.command import Command, Task
+from executive.tree.compiling.plans import NodePlan
+from executive.tree.compiling.search import surfaces_to_search
+from executive.tree.compiling.steps import START, carry_plan, grasp_plan
+from executive.tree.compiling.workshop import Workshop
+
+__all__ = ["are_trips", "refuse_several", "trips_plan"]
+
+MAX_TRIPS: Final = 20
+
+
+def are_trips(get: Command, bring: Command | None) -> bool:
+    """True when two commands in a row ask to get several things and to bring as many of them somewhere."""
+    if bring is None or get.task is not Task.GRASP or get.object is None or get.object_count < 2:
+        return False
+    carried, count = (bring.item, bring.item_count) if bring.task is None else (bring.object, bring.object_count)
+    return bring.task in (None, Task.PLACE) and carried == get.object and count == get.object_count
+
+
+def trips_plan(shop: Workshop, bring: Command) -> NodePlan:
+    """Get one and bring it there, as often as was said; `shop` is that of the command to get them.
+
+    Raises:
+        InputError: too many; to a person, who does not take them from the gripper; no place to take them from, or one
+            where those that were brought would be found again.
+    """
+    get, goal = shop.command, bring.goal
+    count, thing = get.object_count, get.object
+    several = f"{count} of '{thing}'"
+    if count > MAX_TRIPS:
+        raise shop.error(f"{several} are too many trips", f"ask for {MAX_TRIPS} at most")
+    if goal == START or (goal is not None and shop.knowledge.person(goal) is not None):
+        mend = "name a place with a surface to put them on"
+        raise shop.error(f"{several} cannot be handed over: the first stays in the gripper until it is taken", mend)
+    if get.goal is None:
+        raise shop.error(f"it is not said where to take {several} from", "name the place")
+    brought = set(shop.knowledge.surfaces_in(shop.place(goal))) if goal is not None else set()
+    if thing is not None and brought & set(surfaces_to_search(shop.knowledge, thing.name, shop.place(get.goal))):
+        mend = "name the surface that they are to be taken from"
+        raise shop.error(f"{several} that lie in the {get.goal} already cannot be told from those brought there", mend)
+    trips = tuple(_trip(shop, bring, number) for number in range(1, count + 1))
+    return shop.sequence(f"bring {count} {thing} to {goal}, one at a time", *trips)
+
+
+def refuse_several(shop: Workshop) -> None:
+    """Refuse a count that no trips are made of; in a question any count will do.
+
+    Raises:
+        InputError: more than one thing, or an open number of things.
+    """
+    command = shop.command
+    asked = 1 if command.task is Task.FIND else command.object_count
+    for thing, count in ((command.item, command.item_count), (command.object, asked)):
+        if count != 1:
+            said = f"{count} of '{thing}'" if count else f"an open number of '{thing}'"
+            mend = "say from where to where, and how many, or ask for one at a time"
+            raise shop.error(f"{said} cannot be carried in one go", mend)
+
+
+def _trip(shop: Workshop, bring: Command, number: int) -> NodePlan:
+    """Get one thing and bring it."""
+    trip = shop.at(f"trip-{number}")
+    get_one = replace(trip.at("get"), command=replace(shop.command, object_count=1))
+    bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))
+    return trip.sequence(f"trip {number}", grasp_plan(get_one, anywhere=False), carry_plan(bring_one))

@@ -1,0 +1,75 @@
+"""Checks of the ports before any tick: every input bound, every bound value of the right type, written before read."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from executive.mission.errors import InputError, did_you_mean
+from executive.tree.behaviours.board import Binding, Constant, FromBoard, FromBoardOr
+from executive.tree.compiling.plans import NodePlan, SkillPlan
+from executive.tree.types import assignable, conforms, describe_type, field_types
+
+
+def check_wiring(root: NodePlan) -> None:
+    """Check all ports of a tree.
+
+    Raises:
+        InputError: an input port without a value, an unknown port, a value of a wrong type, a blackboard key that no
+            earlier node writes, an output bound to a port that the skill does not have, or a path id used twice.
+    """
+    written: dict[str, Any] = {}
+    seen: set[str] = set()
+    for node in root.walk():
+        if node.path_id in seen:
+            raise _error(node, "two nodes have this path id", "give the steps different names")
+        seen.add(node.path_id)
+        if isinstance(node, SkillPlan):
+            for message, mend in _faults(node, written):
+                raise _error(node, message, mend)
+        written.update(node.writes())
+
+
+def _faults(node: SkillPlan, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """What is wrong with one skill's ports, and the mend."""
+    types, bound = field_types(node.skill.Inputs), dict(node.inputs)
+    for field in dataclasses.fields(node.skill.Inputs):
+        optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
+        if field.name not in bound and not optional:
+            yield f"input port '{field.name}' has no value", f"give it a {describe_type(types[field.name])}"
+    for port, binding in node.inputs:
+        if port not in types:
+            near = did_you_mean(port, types)
+            yield (
+                f"there is no input port '{port}'",
+                f"did you mean '{near}'?" if near else f"known: {', '.join(types)}",
+            )
+        else:
+            yield from _misfit(port, binding, types[port], written)
+    for port, _ in node.outputs:
+        if port not in node.skill.outputs:
+            yield f"there is no output port '{port}'", f"known: {', '.join(node.skill.outputs) or 'none'}"
+
+
+def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """What is wrong with one bound input."""
+    wanted = f"give it a {describe_type(kind)}"
+    if isinstance(binding, Constant) and not conforms(binding.value, kind):
+        yield f"input port '{port}' got {binding.value!r}", wanted
+    if isinstance(binding, FromBoardOr) and not conforms(binding.default, kind):
+        yield f"input port '{port}' has the default {binding.default!r}", wanted
+    if not isinstance(binding, FromBoard) or (isinstance(binding, FromBoardOr) and binding.key not in written):
+        return
+    if binding.key not in written:
+        yield f"input port '{port}' reads '{binding.key}', which nothing before it writes", wanted
+        return
+    given = binding.gives or written[binding.key]
+    if not assignable(given, kind):
+        yield f"input port '{port}' reads '{binding.key}', a {describe_type(given)}", wanted
+
+
+def _error(node: NodePlan, message: str, mend: str) -> InputError:
+    source = node.source
+    where = {} if source is None else {"file": source.file, "line": source.line}
+    return InputError(f"{node.path_id}: {message}", mend=mend, **where)  # type: ignore[arg-type]

@@ -1,0 +1,218 @@
+"""What a mission will take when all goes well: time, way and charge, and what of it cannot be done at all.
+
+A plan's nodes are followed in the order in which they run without failures: of several ways the first that can be gone.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Final, Protocol
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from executive.mission.errors import InputError
+from executive.mission.yaml_source import read_yaml, validate
+from executive.tree.behaviours.board import Constant, FromBoard
+from executive.tree.compiling.plans import NodePlan, RememberPosePlan, RoundPlan, SelectorPlan, SkillPlan
+from executive.tree.compiling.recovery import OnlyIfKnownPlan
+from skills.robot import Pose2D
+
+__all__ = ["Estimate", "Estimates", "Itinerary", "Way", "estimate_tree", "load_estimates"]
+
+Positive = Annotated[float, Field(gt=0.0)]
+NAVIGATE: Final = "navigate"
+
+
+class _Data(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class DriveTimes(_Data):
+    """A drive takes `overhead_s` and `per_metre_s` for each metre of progress along its path."""
+
+    overhead_s: Positive
+    per_metre_s: Positive
+
+
+class BatteryUse(_Data):
+    """What is drawn in a second, as a share of a full battery."""
+
+    driving_per_s: Positive
+    standing_per_s: Positive
+
+
+class Estimates(_Data):
+    """The schema of `estimates.yaml`: typical durations and what they draw."""
+
+    drive: DriveTimes
+    skills: dict[str, Positive]
+    other_skill_s: Positive
+    battery: BatteryUse
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way between two poses: its length (m), and its progress (m), in which turns count as well."""
+
+    length_m: float
+    progress_m: float
+
+
+class Itinerary(Protocol):
+    """Plans ways on the surveyed map."""
+
+    def way(self, start: Pose2D, goal: Pose2D) -> Way:
+        """The way from start to goal. Raises ValueError with one sentence when there is none."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Time on the robot's clock (s), way driven (m), and charge used (share of a full battery)."""
+
+    duration_s: float = 0.0
+    distance_m: float = 0.0
+    charge: float = 0.0
+
+    def __add__(self, other: Estimate) -> Estimate:
+        return Estimate(
+            self.duration_s + other.duration_s, self.distance_m + other.distance_m, self.charge + other.charge
+        )
+
+
+class _CannotError(Exception):
+    """A node that cannot succeed; `error` is None where that is nothing to tell the user."""
+
+    def __init__(self, error: InputError | None) -> None:
+        super().__init__(str(error))
+        self.error = error
+
+
+@dataclass
+class _Walk:
+    """Where the robot would be by now, and which poses it would have noted."""
+
+    itinerary: Itinerary
+    estimates: Estimates
+    pose: Pose2D
+    noted: dict[str, Pose2D] = field(default_factory=dict)
+    written: set[str] = field(default_factory=set)
+    errors: list[InputError] = field(default_factory=list)
+
+
+def estimate_tree(
+    root: NodePlan, *, start: Pose2D, itinerary: Itinerary, estimates: Estimates
+) -> tuple[Estimate, tuple[InputError, ...]]:
+    """What a tree will take from `start` on, and the places in it that cannot be reached, with their lines."""
+    walk = _Walk(itinerary, estimates, start)
+    return _followed(root, walk, first=False), tuple(walk.errors)
+
+
+@functools.cache
+def load_estimates() -> Estimates:
+    """The typical durations that come with the project."""
+    return validate(Estimates, read_yaml(Path(__file__).with_name("estimates.yaml")))
+
+
+def _followed(node: NodePlan, walk: _Walk, *, first: bool) -> Estimate:
+    """A node's estimate. What cannot be done is noted and left out; with `first` it is raised instead."""
+    visit = next((visit for kind, visit in _VISITS.items() if isinstance(node, kind)), _all_of)
+    try:
+        return visit(node, walk, first)
+    except _CannotError as cannot:
+        if first:
+            raise
+        if cannot.error is not None:
+            walk.errors.append(cannot.error)
+        return Estimate()
+
+
+def _all_of(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+    """One after the other."""
+    return sum((_followed(child, walk, first=first) for child in node.expected), Estimate())
+
+
+def _first_of(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+    """The first way that can be gone; when there is none, the first one's reason."""
+    reasons: list[InputError] = []
+    for child in node.expected:
+        tried = _tried(child, walk, reasons)
+        if tried is not None:
+            return tried
+    raise _CannotError(reasons[0] if reasons else None)
+
+
+def _all_that_can(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+    """All ways that can be gone; when there is none, the first one's reason."""
+    reasons: list[InputError] = []
+    done = [tried for child in node.expected if (tried := _tried(child, walk, reasons)) is not None]
+    if not done:
+        raise _CannotError(reasons[0] if reasons else None)
+    return sum(done, Estimate())
+
+
+def _tried(way: NodePlan, walk: _Walk, reasons: list[InputError]) -> Estimate | None:
+    """One way; None where it cannot be gone: then the walk stands as before, and `reasons` has its reason."""
+    here, noted = walk.pose, dict(walk.noted)
+    try:
+        return _followed(way, walk, first=True)
+    except _CannotError as cannot:
+        walk.pose, walk.noted = here, noted
+        reasons += [] if cannot.error is None else [cannot.error]
+        return None
+
+
+def _if_known(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+    """What runs only after an earlier node has written something."""
+    assert isinstance(node, OnlyIfKnownPlan)
+    if node.key not in walk.written:
+        raise _CannotError(None)
+    return _followed(node.child, walk, first=first)
+
+
+def _remember(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+    assert isinstance(node, RememberPosePlan)
+    walk.noted[node.key] = walk.pose
+    return Estimate()
+
+
+def _skill(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+    assert isinstance(node, SkillPlan)
+    goal = _goal(node, walk)
+    walk.written.update(key for _, key in node.outputs)
+    if goal is None:
+        duration_s = walk.estimates.skills.get(node.name, walk.estimates.other_skill_s)
+        return Estimate(duration_s, 0.0, duration_s * walk.estimates.battery.standing_per_s)
+    try:
+        way = walk.itinerary.way(walk.pose, goal)
+    except ValueError as error:
+        place = {} if node.source is None else {"file": node.source.file, "line": node.source.line}
+        mend = "name another place or pose, or mend the world's map"
+        raise _CannotError(_located(str(error).rstrip("."), mend, place)) from error
+    walk.pose = goal
+    drive = walk.estimates.drive
+    duration_s = drive.overhead_s + drive.per_metre_s * way.progress_m
+    return Estimate(duration_s, way.length_m, duration_s * walk.estimates.battery.driving_per_s)
+
+
+def _located(message: str, mend: str, place: Mapping[str, Any]) -> InputError:
+    return InputError(message, mend=mend, **place)
+
+
+def _goal(node: SkillPlan, walk: _Walk) -> Pose2D | None:
+    """Where a drive leads, as far as that is known before."""
+    binding = dict(node.inputs).get("goal") if node.name == NAVIGATE else None
+    if isinstance(binding, FromBoard):
+        return walk.noted.get(binding.key)
+    return binding.value if isinstance(binding, Constant) and isinstance(binding.value, Pose2D) else None
+
+
+_VISITS: Final[Mapping[type[NodePlan], Callable[[NodePlan, _Walk, bool], Estimate]]] = {
+    SkillPlan: _skill,
+    RememberPosePlan: _remember,
+    OnlyIfKnownPlan: _if_known,
+    SelectorPlan: _first_of,
+    RoundPlan: _all_that_can,
+}

@@ -1,0 +1,270 @@
+"""Values as they stand in YAML files, turned into what a skill's input ports take, by the ports' types.
+
+What a type takes: numbers, texts, true and false as they are; a tuple takes a list; an enum one of its values; a
+dataclass a mapping of its fields, whose units may be left out ("yaw" for "yaw_rad"). A pose may also be the name of a
+place, a `Surface` the name of a surface, several surfaces the name of a room, a `Thing` its words ("red wrench").
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import math
+import re
+import types
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Any, Final, Union
+
+from executive.mission.command import thing
+from executive.mission.errors import did_you_mean, listing
+from executive.mission.knowledge import Knowledge
+from executive.tree.types import describe_type, field_types
+from skills.api import Surface, Thing
+from skills.robot import Pose2D
+
+__all__ = ["FROM_KEY", "PortValueError", "gathered", "port_value"]
+
+FROM_KEY: Final = "from"
+_UNIT: Final = re.compile(r"_(m|rad|s|n|m_s|rad_s|kg|deg)$")
+Path = tuple[str | int, ...]
+
+
+class PortValueError(ValueError):
+    """A value that does not fit its port; `path` leads to the part of it that does not, `mend` says what would."""
+
+    def __init__(self, path: Path, message: str, mend: str) -> None:
+        super().__init__(message)
+        self.path, self.message, self.mend = path, message, mend
+
+
+def gathered(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, Any]]:
+    """The value for each input port of the dataclass `inputs`, with its path in `values`.
+
+    A unit may be left out of a port's name. What names no port, but fields of the one port that is a dataclass with
+    such fields, goes there: `{x: 1, y: 2, yaw: 0}` is the `goal` of navigate.
+
+    Raises:
+        PortValueError: a key names neither a port nor such a field.
+    """
+    hints = field_types(inputs)
+    found: dict[str, tuple[Path, Any]] = {}
+    loose: dict[str, Any] = {}
+    for key, value in values.items():
+        port = _named(key, hints)
+        if port is None:
+            loose[key] = value
+        elif port in found:
+            raise PortValueError((key,), f"port '{port}' has two values", "remove one of them")
+        else:
+            found[port] = ((key,), value)
+    if loose:
+        port = _port_of(loose, hints, taken=found)
+        found[port] = ((), loose)
+    return found
+
+
+def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> Any:
+    """`value` as the type `hint`. Raises PortValueError."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if hint is Any:
+        return value
+    if origin in (Union, types.UnionType):
+        return _union(value, arguments, knowledge, path)
+    if origin is tuple or hint is tuple:
+        return _tuple(value, arguments, knowledge, path)
+    special = _SPECIAL.get(hint) if isinstance(hint, type) else None
+    if special is not None and not isinstance(value, dict | list):
+        return special(value, knowledge, path)
+    if _is_record(hint):
+        return _record(value, hint, knowledge, path)
+    if isinstance(hint, type) and issubclass(hint, enum.Enum):
+        return _word(value, hint, path)
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return _mapping(value, arguments, knowledge, path)
+    return _plain(value, hint, path)
+
+
+def _named(key: str, names: Iterable[str]) -> str | None:
+    """The name that a key means, with or without its unit."""
+    known = list(names)
+    return key if key in known else next((name for name in known if _UNIT.sub("", name) == key), None)
+
+
+def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable[str]) -> str:
+    """The one port whose type has all these fields."""
+    records = {port: field_types(hint) for port, hint in hints.items() if _is_record(hint)}
+    fitting = [
+        port for port, fields in records.items() if port not in taken and all(_named(key, fields) for key in loose)
+    ]
+    if len(fitting) == 1:
+        return fitting[0]
+    fields = {_UNIT.sub("", name) for names in (*records.values(), hints) for name in names}
+    known = {**dict.fromkeys(hints), **dict.fromkeys(sorted(fields))}
+    wrong = next((key for key in loose if _named(key, known) is None), next(iter(loose)))
+    near = did_you_mean(wrong, [word for word in known if word != wrong])
+    ports = f"its ports are {listing(hints)}" if hints else "it has no input ports"
+    raise PortValueError((wrong,), f"there is no input port '{wrong}'", f"did you mean '{near}'?" if near else ports)
+
+
+def _is_record(hint: Any) -> bool:
+    return isinstance(hint, type) and dataclasses.is_dataclass(hint)
+
+
+def _union(value: Any, options: tuple[Any, ...], knowledge: Knowledge, path: Path) -> Any:
+    """The value as the first type that takes it; the last one's refusal when none does."""
+    if value is None and type(None) in options:
+        return None
+    refusals = []
+    for option in (option for option in options if option is not type(None)):
+        try:
+            return port_value(value, option, knowledge, path)
+        except PortValueError as error:
+            refusals.append(error)
+    raise max(refusals, key=lambda error: len(error.path))
+
+
+def _tuple(value: Any, arguments: tuple[Any, ...], knowledge: Knowledge, path: Path) -> tuple[Any, ...]:
+    several = len(arguments) == 2 and arguments[1] is Ellipsis
+    if several and arguments[0] is Surface and isinstance(value, str):
+        return _surfaces(value, knowledge, path)
+    if not isinstance(value, list):
+        raise _refusal(value, "a list", path)
+    kinds = arguments[:1] * len(value) if several else arguments
+    if arguments and len(kinds) != len(value):
+        raise _refusal(value, f"a list of {len(kinds)} values", path)
+    pairs = zip(value, kinds or (Any,) * len(value), strict=True)
+    return tuple(port_value(item, kind, knowledge, (*path, n)) for n, (item, kind) in enumerate(pairs))
+
+
+def _mapping(value: Any, arguments: tuple[Any, ...], knowledge: Knowledge, path: Path) -> Mapping[str, Any]:
+    if not isinstance(value, dict):
+        raise _refusal(value, "a mapping of keys to values", path)
+    kind = arguments[1] if len(arguments) == 2 else Any
+    return MappingProxyType(
+        {str(key): port_value(item, kind, knowledge, (*path, str(key))) for key, item in value.items()}
+    )
+
+
+def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
+    """A dataclass from a mapping of its fields."""
+    hints = field_types(record)
+    plain = [_UNIT.sub("", field.name) for field in dataclasses.fields(record)]
+    if not isinstance(value, dict):
+        raise _refusal(value, f"a mapping with {listing(plain)}", path)
+    read: dict[str, Any] = {}
+    for key, item in value.items():
+        name = _named(str(key), hints)
+        if name is None:
+            near = did_you_mean(str(key), plain)
+            mend = f"did you mean '{near}'?" if near else f"known are {listing(plain)}"
+            raise PortValueError((*path, str(key)), f"{record.__name__} has no '{key}'", mend)
+        read[name] = port_value(item, hints[name], knowledge, (*path, str(key)))
+    filled = {**_DEFAULTS.get(record, {}), **read}
+    for field in dataclasses.fields(record):
+        optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
+        if field.name not in filled and not optional:
+            missing = _UNIT.sub("", field.name)
+            raise PortValueError(path, f"'{missing}' is missing", f"give {listing(plain)}")
+    try:
+        return record(**filled)
+    except (ValueError, TypeError) as error:
+        raise PortValueError(path, str(error), f"give {listing(plain)}") from error
+
+
+def _word(value: Any, words: type[enum.Enum], path: Path) -> enum.Enum:
+    for member in words:
+        if value in (member.value, member.name, member.name.lower()):
+            return member
+    known = [str(member.value) for member in words]
+    near = did_you_mean(str(value), known)
+    mend = f"did you mean '{near}'?" if near else f"known are {listing(known)}"
+    raise PortValueError(path, f"{value!r} is none of its words", mend)
+
+
+def _plain(value: Any, hint: Any, path: Path) -> Any:
+    """Numbers, texts, truth values and nothing, as they are."""
+    if hint is None or hint is type(None):
+        if value is None:
+            return None
+        raise _refusal(value, "nothing (null)", path)
+    kinds = _PLAIN.get(hint)
+    if kinds is None:
+        mend = f"let an earlier step give it, and write {{{FROM_KEY}: NAME}}"
+        raise PortValueError(path, f"a {describe_type(hint)} cannot be written in a file", mend)
+    fits = isinstance(value, kinds[0]) and (hint is bool or not isinstance(value, bool))
+    if not fits or (isinstance(value, float) and not math.isfinite(value)):
+        raise _refusal(value, kinds[1], path)
+    return float(value) if hint is float else value
+
+
+def _pose(value: Any, knowledge: Knowledge, path: Path) -> Pose2D:
+    """The pose of a place that is named."""
+    name = _name(value, "x, y and yaw, or the name of a place", path)
+    place = knowledge.place(name)
+    if place is None:
+        raise _unknown("place", name, knowledge.place_names(), knowledge, path)
+    pose = knowledge.place_pose(place)
+    return Pose2D(pose.x, pose.y, pose.yaw)
+
+
+def _surface(value: Any, knowledge: Knowledge, path: Path) -> Surface:
+    """A surface that is named."""
+    name = _name(value, "the name of a surface", path)
+    known = knowledge.place(name)
+    if known is None or known not in knowledge.surfaces:
+        raise _unknown("surface", name, tuple(knowledge.surfaces), knowledge, path)
+    facts = knowledge.surfaces[known]
+    return Surface(name=known, polygon_W=facts.polygon, height_m=facts.height)
+
+
+def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...]:
+    """All surfaces of a room, or the one that is named."""
+    place = knowledge.place(name)
+    surfaces = () if place is None else knowledge.surfaces_in(place)
+    if not surfaces:
+        known = tuple(one for one in knowledge.place_names() if knowledge.surfaces_in(one))
+        raise _unknown("surface or room with surfaces", name, known, knowledge, path)
+    return tuple(_surface(surface, knowledge, path) for surface in surfaces)
+
+
+def _thing(value: Any, knowledge: Knowledge, path: Path) -> Thing:
+    """A thing in words, by its own name."""
+    said = thing(_name(value, "a thing in words", path))
+    known = knowledge.thing(said.name)
+    if known is None:
+        raise _unknown("thing", said.name, knowledge.thing_names(), knowledge, path)
+    return Thing(known, said.attributes)
+
+
+def _name(value: Any, wanted: str, path: Path) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise _refusal(value, wanted, path)
+    return value
+
+
+def _refusal(value: Any, wanted: str, path: Path) -> PortValueError:
+    return PortValueError(
+        path, f"{str(value)[:60]!r} does not fit" if value is not None else "it is empty", f"give {wanted}"
+    )
+
+
+def _unknown(kind: str, name: str, known: tuple[str, ...], knowledge: Knowledge, path: Path) -> PortValueError:
+    near = did_you_mean(name, knowledge.spellings(known))
+    mend = f"did you mean '{near}'?" if near else f"known are {listing(known)}"
+    return PortValueError(path, f"unknown {kind} '{name}'", mend)
+
+
+_PLAIN: Final[Mapping[Any, tuple[tuple[type, ...], str]]] = MappingProxyType(
+    {
+        str: ((str,), "a text"),
+        bool: ((bool,), "true or false"),
+        int: ((int,), "a whole number"),
+        float: ((int, float), "a number"),
+    }
+)
+_SPECIAL: Final[Mapping[type, Callable[[Any, Knowledge, Path], Any]]] = MappingProxyType(
+    {Pose2D: _pose, Surface: _surface, Thing: _thing}
+)
+_DEFAULTS: Final[Mapping[type, Mapping[str, Any]]] = MappingProxyType({Pose2D: MappingProxyType({"yaw_rad": 0.0})})

@@ -1,0 +1,69 @@
+"""The flat as missions see it; the parser is loaded once."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from executive.language import load_parser
+from executive.mission.knowledge import load_knowledge
+from executive.mission.mission import load_mission, mission_from_file, overridden
+from executive.tree.compiler import compile_mission
+from executive.tree.registry import installed_skills
+
+ROOT = Path(__file__).parents[4]
+
+
+@pytest.fixture(scope="session")
+def parser():
+    return load_parser()
+
+
+@pytest.fixture(scope="session")
+def flat():
+    return load_knowledge(ROOT / "plant" / "worlds" / "flat" / "knowledge.yaml")
+
+
+@pytest.fixture(scope="session")
+def skills():
+    return installed_skills()
+
+
+@pytest.fixture(scope="session")
+def missions():
+    """The mission files that come with the project."""
+    return sorted((ROOT / "missions").glob("*.yaml"))
+
+
+@pytest.fixture(scope="session")
+def compile_file(parser, flat, skills):
+    """Load and compile a file, as `errand run` does before it runs."""
+
+    def compile_path(path):
+        loaded = load_mission(path)
+        knowledge = overridden(loaded, flat)
+        mission = mission_from_file(loaded, parser=parser, knowledge=knowledge)
+        return compile_mission(mission, knowledge=knowledge, registry=skills)
+
+    return compile_path
+
+
+@pytest.fixture
+def compile_text(compile_file, tmp_path):
+    """Compile a text as `mission.yaml` in a folder with other files given by name."""
+
+    def compile_here(text, **others):
+        for name, other in others.items():
+            (tmp_path / f"{name}.yaml").write_text(other, encoding="utf-8")
+        (tmp_path / "mission.yaml").write_text(text, encoding="utf-8")
+        return compile_file(tmp_path / "mission.yaml")
+
+    return compile_here
+
+
+@pytest.fixture
+def mission_folder(tmp_path, missions):
+    """A folder with copies of all missions that come with the project."""
+    for path in missions:
+        shutil.copy(path, tmp_path)
+    return tmp_path

@@ -1,0 +1,86 @@
+"""The missions that come with the project: each compiles for the flat and runs to its end with scripted skills."""
+
+import pytest
+
+from executive.mission.mission import load_mission, mission_from_file, overridden
+from executive.run.outcome import Outcome
+from executive.tree.compiler import compile_mission
+from skills.api import Cause, Failed, Succeeded
+
+NAMES = (
+    "check_hammer", "deliver", "fetch_drink", "go_living_room", "go_to_pose", "guarded_delivery", "hammer_to_kitchen",
+    "look_and_approach", "patrol", "take_beer_to_bedroom", "tidy_cube", "tidy_table", "two_drinks", "visit_room",
+    "welcome",
+)  # fmt: skip
+SURFACES_WITH_THINGS = ("kitchen counter", "kitchen table", "workbench", "tool trolley")
+
+
+def test_all_missions_are_named_here(missions):
+    assert tuple(path.stem for path in missions) == NAMES
+
+
+@pytest.fixture
+def run_mission(parser, flat, skills, run_tree, script, missions, make):
+    """Run a mission file with scripted skills that have the real skills' ports."""
+
+    def put_down(skill):
+        skill.context.robot._robot.holding = False
+        return Succeeded("put down")
+
+    def hold(skill):
+        skill.context.robot._robot.holding = True
+        return Succeeded("held", dict.fromkeys(skills["grasp"].outputs, ()))
+
+    script.seen_on = SURFACES_WITH_THINGS
+    script.ends |= {"place": put_down, "grasp": hold}
+    registry = {name: make.scripted_skill(script, name, one.Inputs, one.outputs) for name, one in skills.items()}
+
+    def run_file(name):
+        loaded = load_mission(next(path for path in missions if path.stem == name))
+        knowledge = overridden(loaded, flat)
+        mission = mission_from_file(loaded, parser=parser, knowledge=knowledge)
+        return run_tree(compile_mission(mission, knowledge=knowledge, registry=registry)).robots[0]
+
+    return run_file
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_compiles_with_the_real_skills(compile_file, missions, name):
+    tree = compile_file(next(path for path in missions if path.stem == name))
+    assert tree.parts
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_runs_to_success_with_scripted_skills(run_mission, name):
+    result = run_mission(name)
+    assert result.outcome is Outcome.SUCCESS, result.message
+
+
+def test_a_raw_pose_is_driven_to(run_mission, script):
+    assert run_mission("go_to_pose").outcome is Outcome.SUCCESS
+    assert script.begun == ["navigate"]
+
+
+def test_two_drinks_are_fetched_and_put_down_one_after_the_other(run_mission, script):
+    run_mission("two_drinks")
+    assert [name for name in script.begun if name in ("grasp", "place")] == ["grasp", "place"] * 2
+
+
+def test_a_table_that_is_tidy_already_is_told(run_mission, script):
+    script.ends["detect"] = lambda skill: Failed(Cause.POSTCONDITION, "not seen")
+    result = run_mission("tidy_table")
+    assert (result.outcome, result.message.count("grasp")) == (Outcome.SUCCESS, 2)
+
+
+def test_a_mission_of_100_steps_compiles(tmp_path, parser, flat, skills):
+    steps = [
+        "  - {to: kitchen, do: grasp, object: drink, retries: 1, timeout: 300}",
+        "  - {take: drink, to: coffee table, on_failure: skip}",
+        "  - say: is there a hammer in the workshop",
+        "  - {skill: navigate, with: {x: 5.2, y: 4.5, yaw: 0.0}}",
+    ]
+    path = tmp_path / "m.yaml"
+    path.write_text("name: long\nsteps:\n" + "\n".join(steps * 25) + "\n")
+    mission = mission_from_file(path, parser=parser, knowledge=flat)
+    tree = compile_mission(mission, knowledge=flat, registry=skills)
+    assert len(tree.commands) == 75

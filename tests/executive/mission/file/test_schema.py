@@ -1,0 +1,115 @@
+"""The schema of mission files: what is refused, with which line and mend; and the JSON Schema for editors."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from executive.mission.errors import InputError
+from executive.mission.file.schema import MissionFile, mission_json_schema, schema_text
+from executive.mission.mission import OnFailure, OperatorQuestion, StepGuards, StepPolicy, load_mission
+from executive.tree.behaviours.conditions import StaleData
+
+SCHEMA = Path(__file__).parents[4] / "missions" / "mission.schema.json"
+GOOD = """\
+name: round
+timeout: 600
+each: {retries: 1, on_failure: skip}
+steps:
+  - to: kitchen
+    timeout: 20
+    guards: {battery: 0.3, localised: true, time: 300, stale: fail}
+  - say: go to the hall
+    on_failure: ask
+    retries: 0
+    ask: {text: What now?, limit: 9, default: skip}
+  - skill: navigate
+    with: {x: 5.2, y: 4.5}
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    def load_text(text):
+        (tmp_path / "mission.yaml").write_text(text, encoding="utf-8")
+        return load_mission(tmp_path / "mission.yaml")
+
+    return load_text
+
+
+def test_a_steps_policy_is_its_own_and_else_that_of_each(load):
+    file = load(GOOD.replace("What now?", '"What now?"'))
+    first, second, third = (step.over(file.each) for step in file.steps)
+    guards = StepGuards(0.3, True, 300.0, StaleData.FAIL)
+    assert first == StepPolicy(20.0, 1, OnFailure.SKIP, OperatorQuestion(), guards)
+    assert second == StepPolicy(None, 0, OnFailure.ASK, OperatorQuestion("What now?", 9.0, "skip"))
+    assert third == StepPolicy(None, 1, OnFailure.SKIP)
+    assert file.over(None) == StepPolicy(600.0)
+
+
+def test_on_failure_retry_is_one_retry_unless_said(load):
+    text = "name: x\nsteps:\n  - {to: hall, on_failure: retry}\n  - {to: hall, on_failure: retry, retries: 3}\n"
+    assert [step.over(None).retries for step in load(text).steps] == [1, 3]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "says"),
+    [
+        ("timeout: 600", "timeuot: 600", 2, "did you mean 'timeout'?"),
+        ("timeout: 600", "timeout: 0", 2, "greater than 0"),
+        ("timeout: 600", "timeout: soon", 2, "timeout: should be a number"),
+        ("timeout: 600", "timeout: true", 2, "timeout: should be a number"),
+        ("timeout: 600", "timeout: .nan", 2, "finite"),
+        ("timeout: 600", "on_failure: skip", 2, "a whole mission cannot be skipped"),
+        ("timeout: 600", "on_failure: ask\nask: {default: skip}", 3, "a whole mission cannot be skipped"),
+        ("retries: 1", "retries: 1.5", 3, "each.retries: should be a whole number"),
+        ("retries: 1", "retries: -1", 3, "greater than or equal to 0"),
+        ("on_failure: skip", "on_failure: skipp", 3, "did you mean 'skip'?"),
+        ("each: {", "each: {to: hall, ", 3, "unknown key 'to'"),
+        ("battery: 0.3", "battery: 30", 7, "less than or equal to 1"),
+        ("battery: 0.3", "batery: 0.3", 7, "did you mean 'battery'?"),
+        ("localised: true", 'localised: "yes"', 7, "guards.localised: should be true or false"),
+        ("stale: fail", "stale: faill", 7, "did you mean 'fail'?"),
+        ("on_failure: ask\n", "on_failure: stop\n", 8, "'ask' is the question of 'on_failure: ask'"),
+        ("default: skip", "default: retry", 11, "'skip' or 'stop'"),
+        ("default: skip", "default: panic", 11, "'skip' or 'stop'"),
+        ("skill: navigate", "skil: navigate", 12, "did you mean 'skill'?"),
+        ("skill: navigate", "to: hall", 12, "'with' goes with 'skill' or 'use'"),
+        ("skill: navigate", "skill: navigate\n    to: hall", 12, "either 'skill' or to, not both"),
+        ("skill: navigate", "skill: navigate\n    use: x.yaml", 12, "either 'skill' or use, not both"),
+        ("skill: navigate", "skill: navigate\n    elsewhere: false", 12, "'elsewhere' goes with a sentence"),
+        ("say: go to the hall", "say: go to the hall\n    gives: {a: b}", 8, "'gives' goes with 'skill'"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_its_line_and_the_mend(load, old, new, line, says):
+    good = GOOD.replace("What now?", '"What now?"')
+    assert old in good
+    with pytest.raises(InputError) as error:
+        load(good.replace(old, new, 1))
+    assert (error.value.line, says in str(error.value)) == (line, True), str(error.value)
+    assert error.value.mend
+
+
+def test_all_errors_are_told_at_once(load):
+    with pytest.raises(InputError) as error:
+        load("name: 3\ntimeout: 0\nsteps:\n  - {too: hall}\n  - {do: juggle, object: coke}\n")
+    lines = [one.line for one in (error.value, *error.value.others)]
+    assert lines == [4, 1, 2, 5]
+
+
+def test_the_committed_json_schema_is_current():
+    assert SCHEMA.read_text(encoding="utf-8") == schema_text(), "write it anew with `write_schema`"
+
+
+def test_the_json_schema_names_every_key_with_a_description():
+    schema = mission_json_schema()
+    step = schema["$defs"]["StepFile"]
+    assert set(schema["properties"]) == {field.alias or name for name, field in MissionFile.model_fields.items()}
+    assert {"say", "take", "to", "do", "object", "skill", "use", "with", "gives", "timeout"} <= set(step["properties"])
+    assert all("description" in facts for facts in (*schema["properties"].values(), *step["properties"].values()))
+    assert step["additionalProperties"] is schema["additionalProperties"] is False
+
+
+def test_where_a_number_is_wanted_a_parameter_may_stand():
+    timeout = mission_json_schema()["$defs"]["StepFile"]["properties"]["timeout"]
+    assert '"pattern"' in json.dumps(timeout)

@@ -1,0 +1,162 @@
+import pytest
+
+from executive.mission.command import Task
+from executive.mission.errors import InputError
+from executive.mission.knowledge import load_knowledge
+
+WORLD = """\
+robot: {name: Alice}
+start: {x: 0.0, y: 0.0, yaw: 0.0}
+dock: {x: -1.0, y: 0.0, yaw: 0.0}
+places:
+  kitchen:
+    aliases: [cook room]
+    pose: {x: 3.0, y: 1.0, yaw: 1.57}
+    polygon: [[2, 0], [4, 0], [4, 2], [2, 2]]
+  workshop:
+    pose: {x: -3.0, y: 1.0, yaw: 0.0}
+    polygon: [[-4, 0], [-2, 0], [-2, 2], [-4, 2]]
+surfaces:
+  kitchen counter:
+    place: kitchen
+    aliases: [counter]
+    height: 0.9
+    polygon: [[3, 1.4], [4, 1.4], [4, 2], [3, 2]]
+    viewpoints: [{x: 3.5, y: 0.8, yaw: 1.57}]
+  workbench:
+    place: workshop
+    height: 0.85
+    polygon: [[-4, 1.4], [-3, 1.4], [-3, 2], [-4, 2]]
+    viewpoints: [{x: -3.5, y: 0.8, yaw: 1.57}]
+things:
+  coke: {aliases: [coca cola], categories: [drink], usual: [kitchen counter]}
+  beer: {categories: [drink], usual: [kitchen counter]}
+  hammer: {categories: [tool], usual: [workbench]}
+  cube: {usual: [workbench]}
+people:
+  Robin: {aliases: [Rob], at: kitchen}
+defaults:
+  grasp: {drink: kitchen, tool: workshop}
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(text):
+        path = tmp_path / "knowledge.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return to_file
+
+
+@pytest.fixture
+def knowledge(write):
+    return load_knowledge(write(WORLD))
+
+
+@pytest.mark.parametrize(
+    ("name", "own"),
+    [
+        ("kitchen", "kitchen"),
+        ("Cook Room", "kitchen"),
+        ("counter", "kitchen counter"),
+        ("workbench", "workbench"),
+        ("cellar", None),
+        ("coke", None),
+    ],
+)
+def test_a_place_is_found_by_name_and_alias(knowledge, name, own):
+    assert knowledge.place(name) == own
+
+
+@pytest.mark.parametrize(
+    ("name", "classes"),
+    [
+        ("coke", ("coke",)),
+        ("coca cola", ("coke",)),
+        ("drink", ("coke", "beer")),
+        ("Tool", ("hammer",)),
+        ("robot", ()),
+    ],
+)
+def test_a_thing_stands_for_its_classes(knowledge, name, classes):
+    assert knowledge.classes(name) == classes
+
+
+def test_a_category_keeps_its_name(knowledge):
+    assert knowledge.thing("Drink") == "drink"
+    assert knowledge.thing("coca cola") == "coke"
+    assert knowledge.thing("banana") is None
+
+
+def test_a_person_is_found_by_alias(knowledge):
+    assert knowledge.person("rob") == "Robin"
+    assert knowledge.person("Bob") is None
+
+
+@pytest.mark.parametrize(
+    ("task", "name", "place"),
+    [
+        (Task.GRASP, "drink", "kitchen"),
+        (Task.GRASP, "coke", "kitchen"),
+        (Task.FIND, "hammer", "workshop"),
+        (Task.GRASP, "cube", "workshop"),
+        (Task.GRASP, "banana", None),
+    ],
+)
+def test_the_default_place_goes_by_thing_then_category_then_habit(knowledge, task, name, place):
+    assert knowledge.default_place(task, name) == place
+
+
+def test_a_room_has_its_surfaces_and_a_surface_has_itself(knowledge):
+    assert knowledge.surfaces_in("kitchen") == ("kitchen counter",)
+    assert knowledge.surfaces_in("workbench") == ("workbench",)
+    assert knowledge.room("workbench") == "workshop"
+
+
+def test_poses_are_those_of_the_file(knowledge):
+    assert knowledge.place_pose("workshop").x == -3.0
+    assert knowledge.place_pose("workbench").yaw == 1.57
+
+
+def test_class_ids_are_the_detectors(knowledge):
+    assert knowledge.class_ids("drink") == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "says"),
+    [
+        ("dock:", "dok:", 3, "unknown key 'dok'; did you mean 'dock'?"),
+        ("    height: 0.9\n", "    hight: 0.9\n", 16, "unknown key 'hight'; did you mean 'height'?"),
+        ("    height: 0.9\n", "", 13, "key 'height' is missing in surfaces.kitchen counter"),
+        ("    height: 0.9\n", "    height: -1\n", 16, "greater than 0"),
+        ("    height: 0.9\n", "    height: high\n", 16, "surfaces.kitchen counter.height"),
+        ("place: kitchen\n", "place: kitchin\n", 14, "'kitchin' is not known; did you mean 'kitchen'?"),
+        ("usual: [workbench]}\n  cube", "usual: [work bench]}\n  cube", 27, "did you mean 'workbench'?"),
+        ("  cube:", "  banana:", 28, "'banana' is not known"),
+        ("tool: workshop}", "tool: garage}", 32, "'garage' is not known"),
+        ("aliases: [counter]", "aliases: [cook room]", 13, "means both 'kitchen' and 'kitchen counter'"),
+        ("  workshop:\n", "  kitchen:\n", 9, "stands twice (first in line 5)"),
+        ("at: kitchen}", "at: [kitchen}", 30, "broken YAML"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_its_line_and_the_mend(write, old, new, line, says):
+    path = write(WORLD.replace(old, new, 1))
+    with pytest.raises(InputError) as error:
+        load_knowledge(path)
+    assert error.value.line == line
+    assert str(error.value).startswith(f"{path}:{line}: ")
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["", "- a\n- b\n", "just words"])
+def test_a_file_without_keys_is_refused(write, text):
+    with pytest.raises(InputError, match="holds no mapping"):
+        load_knowledge(write(text))
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"nowhere\.yaml: cannot read it"):
+        load_knowledge(tmp_path / "nowhere.yaml")

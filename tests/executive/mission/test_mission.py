@@ -1,0 +1,175 @@
+from pathlib import Path
+
+import pytest
+
+from executive.language import load_parser
+from executive.mission.command import parse_command
+from executive.mission.errors import InputError
+from executive.mission.knowledge import load_knowledge
+from executive.mission.mission import load_mission, mission_from_commands, mission_from_file, mission_from_sentence
+
+WORLD = Path(__file__).parents[1] / "language" / "world.yaml"
+MISSION = """\
+name: tidy up
+world: flat
+robot: Bob
+steps:
+  - say: take a beer from the kitchen to the bedroom
+
+  - {to: lounge}
+  - to: workshop
+    do: grasp
+    object: 2 red spanner
+  - take: 2 red wrench
+    to: Robin at entrance
+"""
+COMMANDS = [
+    "Take [Nothing] to [kitchen] and do [grasp] to [beer]",
+    "Take [beer] to [bedroom] and do [Nothing] to [Nothing]",
+    "Take [Nothing] to [living room] and do [Nothing] to [Nothing]",
+    "Take [Nothing] to [workshop] and do [grasp] to [2 red wrench]",
+    "Take [2 red wrench] to [Robin at hall] and do [Nothing] to [Nothing]",
+]
+
+
+@pytest.fixture(scope="module")
+def parser():
+    return load_parser()
+
+
+@pytest.fixture(scope="module")
+def knowledge():
+    return load_knowledge(WORLD)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(text):
+        path = tmp_path / "mission.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return to_file
+
+
+@pytest.fixture
+def load(write, parser, knowledge):
+    return lambda text: mission_from_file(write(text), parser=parser, knowledge=knowledge)
+
+
+def test_a_file_becomes_a_mission(load):
+    mission = load(MISSION)
+    assert (mission.name, mission.world, mission.robot_name) == ("tidy up", "flat", "Bob")
+    assert [str(command) for command in mission.commands] == COMMANDS
+
+
+def test_each_step_keeps_its_line(load):
+    mission = load(MISSION)
+    assert [step.source.line for step in mission.steps] == [5, 7, 8, 11]
+    assert {step.source.file.name for step in mission.steps} == {"mission.yaml"}
+
+
+def test_world_and_robot_have_defaults(load):
+    mission = load("name: go\nsteps:\n  - {to: kitchen}\n")
+    assert (mission.world, mission.robot_name) == ("flat", "Alice")
+
+
+def test_a_sentence_may_begin_with_the_missions_own_robot(load):
+    mission = load("name: go\nrobot: Bob\nsteps:\n  - say: Hey Bob, go to the kitchen\n")
+    assert [str(c) for c in mission.commands] == ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "says"),
+    [
+        ("world:", "wrold:", 2, "unknown key 'wrold'; did you mean 'world'?"),
+        ("    object: 2", "    objekt: 2", 10, "unknown key 'objekt'; did you mean 'object'?"),
+        ("name: tidy up\n", "", 1, "key 'name' is missing in the file; add 'name'"),
+        ("do: grasp", "do: juggle", 9, "'grasp', 'find' or 'place'"),
+        ("    object: 2 red spanner\n", "", 8, "'do' and 'object' go together"),
+        ("{to: lounge}", "{to: lunge}", 7, "unknown place or person 'lunge'; did you mean 'lounge'?"),
+        ("{to: lounge}", "{to: moon base}", 7, "known are hall, kitchen"),
+        ("{to: lounge}", "{}", 7, "the step is empty"),
+        ("{to: lounge}", "{to: hall, say: go}", 7, "either 'say' or to, not both"),
+        ("{to: lounge}", '{to: "[hall]"}', 7, "write names in plain words"),
+        ("object: 2 red spanner", "object: 2 red spaner", 10, "unknown thing 'spaner'"),
+        ("take: 2 red wrench", "take: banana", 11, "unknown thing 'banana'; known are coke, beer"),
+        ("Robin at entrance", "Robin at gate", 12, "unknown place 'gate'"),
+        ("from the kitchen to the bedroom", "and sing", 5, "sing"),
+        ("from the kitchen to", "from the kitchn to", 5, "did you mean 'kitchen'?"),
+        ("{to: lounge}", "{to: lounge", 8, "broken YAML"),
+        ("  - {to: lounge}", "\t- {to: lounge}", 7, "broken YAML"),
+        ("- {to: lounge}", "- lounge", 7, "steps.1"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_its_line_and_the_mend(load, old, new, line, says):
+    assert old in MISSION
+    with pytest.raises(InputError) as error:
+        load(MISSION.replace(old, new, 1))
+    assert (error.value.line, says in str(error.value)) == (line, True), str(error.value)
+    assert f"mission.yaml:{line}: " in str(error.value)
+    assert error.value.mend
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["", "name: x\n", "name: x\nsteps: []\n", "steps: 3\nname: x\n", "- say: go\n"])
+def test_a_file_without_steps_is_refused(load, text):
+    with pytest.raises(InputError, match=r"mission\.yaml:\d: "):
+        load(text)
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(InputError, match="cannot read it"):
+        load_mission(tmp_path / "nowhere.yaml")
+
+
+def test_an_error_can_name_the_line_of_any_key(write):
+    error = load_mission(write(MISSION)).error(("world",), "unknown world 'flat'", "known are x")
+    assert str(error).endswith("mission.yaml:2: unknown world 'flat'; known are x")
+
+
+def test_a_sentence_becomes_a_mission(parser, knowledge):
+    mission = mission_from_sentence("fetch me a drink", parser=parser, knowledge=knowledge)
+    assert (mission.name, mission.world, mission.robot_name) == ("fetch drink", "flat", "Alice")
+    assert [str(command) for command in mission.commands] == [
+        "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
+        "Take [drink] to [start] and do [Nothing] to [Nothing]",
+    ]
+    assert mission.steps[0].source is None
+
+
+@pytest.mark.parametrize(
+    ("sentence", "require_wake", "says"),
+    [
+        ("sing", False, "sing"),
+        ("fetch me a drink", True, "Hey Alice"),
+        ("put the cube on the table", False, "kitchen table or coffee table"),
+    ],
+)
+def test_a_sentence_that_is_not_understood_says_why(parser, knowledge, sentence, require_wake, says):
+    with pytest.raises(InputError, match=says):
+        mission_from_sentence(sentence, parser=parser, knowledge=knowledge, require_wake=require_wake)
+
+
+def test_commands_become_a_mission_named_for_the_first():
+    command = parse_command("Take [Nothing] to [hall] and do [Nothing] to [Nothing]")
+    assert mission_from_commands([command], world="flat", robot_name="Alice").name == "do hall"
+
+
+MISSIONS = sorted((Path(__file__).parents[3] / "missions").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", MISSIONS, ids=[path.stem for path in MISSIONS])
+def test_the_missions_that_come_with_it_load_in_their_world(path, parser):
+    worlds = Path(__file__).parents[3] / "plant" / "worlds"
+    file = load_mission(path)
+    mission = mission_from_file(file, parser=parser, knowledge=load_knowledge(worlds / file.world / "knowledge.yaml"))
+    assert mission.steps
+
+
+def test_the_fetch_drink_file_and_the_sentence_are_the_same_mission(parser):
+    root = Path(__file__).parents[3]
+    knowledge = load_knowledge(root / "plant" / "worlds" / "flat" / "knowledge.yaml")
+    from_file = mission_from_file(root / "missions" / "fetch_drink.yaml", parser=parser, knowledge=knowledge)
+    spoken = mission_from_sentence("fetch me a drink from the kitchen", parser=parser, knowledge=knowledge)
+    assert [str(c) for c in from_file.commands] == [str(c) for c in spoken.commands]

@@ -1,0 +1,568 @@
+"""Control of a run: pause, step, breakpoints, preemption, stop button, lost lease, questions, cancel."""
+
+import threading
+
+import pytest
+from py_trees.common import Status
+
+from executive.run.control import Control, Mode
+from executive.run.outcome import Outcome
+from skills.api import Cause, Failed, Question, Running, Succeeded, nobody_to_ask
+from skills.robot import Lease, Pose2D
+
+GRASP = "alice/fetch-drink/1-kitchen/grasp"
+GO = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
+
+
+@pytest.fixture
+def control():
+    return Control(pace=None)
+
+
+@pytest.fixture
+def notes(published):
+    return lambda: [(m["what"], m["message"]) for topic, m in published if topic == "control"]
+
+
+def at_ticks(actions):
+    """An observer that does something after given ticks."""
+    left = dict(actions)
+
+    def observe(progress):
+        if progress.ticks in left:
+            left.pop(progress.ticks)()
+
+    return observe
+
+
+def test_a_paused_robot_stands_still_and_everything_keeps_its_place(compiled, run_tree, make, control, robot, script):
+    seen = []
+
+    def observe(progress):
+        if progress.ticks == 8:
+            control.pause("somebody walks by")
+        if 9 <= progress.ticks < 30:
+            seen.append((robot.driving, progress.states["Alice"], control.state.mode, control.state.reason))
+        if progress.ticks == 30:
+            control.resume()
+
+    result = run_tree(compiled(*make.FETCH), control=control, observer=observe)
+    assert result.outcome is Outcome.SUCCESS
+    assert {(driving, mode, reason) for driving, _, mode, reason in seen} == {(False, Mode.PAUSED, "somebody walks by")}
+    assert all(states == seen[0][1] for _, states, _, _ in seen)
+    assert script.begun == ["navigate", "detect", "approach", "grasp", "grasp", "stow", "navigate", "hand_over"]
+
+
+def test_a_pause_before_the_run_begins_lets_nothing_move(compiled, run_tree, make, control, robot):
+    control.pause()
+    result = run_tree(
+        compiled(*make.FETCH),
+        control=control,
+        observer=at_ticks({5: lambda: robot.calls.append("5 ticks"), 6: control.resume}),
+    )
+    assert robot.calls[: robot.calls.index("5 ticks")] == ["stop"]
+    assert result.outcome is Outcome.SUCCESS
+
+
+def test_a_pause_counts_against_no_limit(compiled, run_tree, make, control, script):
+    script.steps = 20
+    result = run_tree(
+        compiled(GO),
+        control=control,
+        observer=at_ticks({3: control.pause, 3000: control.resume}),
+        settings={"time_limit_s": 5.0},
+    )
+    assert result.outcome is Outcome.SUCCESS
+    assert result.sim_time_s > 100.0
+
+
+def test_cancel_ends_a_paused_run(compiled, run_tree, make, control, robot, script):
+    actions = {3: control.pause, 6: lambda: control.cancel("enough")}
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
+    assert (result.outcome, result.worst.message, result.ticks) == (Outcome.CANCELLED, "enough", 6)
+    assert (robot.driving, robot.holder, script.ended) == (False, None, script.begun)
+    assert (control.state.mode, control.state.reason) == (Mode.ENDED, "enough")
+
+
+def test_a_step_goes_to_the_next_change_and_holds_again(compiled, run_tree, make, control, robot):
+    changes = []
+
+    def observe(progress):
+        if control.state.mode is Mode.PAUSED and progress.ticks > 1 and len(changes) < 3:
+            changes.append([k for k, s in progress.states["Alice"].items() if s.status is Status.SUCCESS])
+            control.step()
+        elif len(changes) == 3:
+            control.resume()
+
+    control.pause()
+    result = run_tree(compiled(*make.FETCH), control=control, observer=observe)
+    assert result.outcome is Outcome.SUCCESS
+    counts = [len(done) for done in changes]
+    assert counts == sorted(counts)
+    assert counts[-1] > counts[0]
+
+
+def test_a_step_of_ticks_is_as_long(compiled, run_tree, make, control, script):
+    script.steps = 5
+    begun = []
+    control.pause()
+    actions = {2: lambda: control.step(3), 10: lambda: begun.extend(script.begun), 11: control.resume}
+    result = run_tree(compiled(GO), control=control, observer=at_ticks(actions))
+    assert (result.outcome, begun, script.begun) == (Outcome.SUCCESS, ["navigate"], ["navigate", "navigate"])
+    with pytest.raises(ValueError, match="at least 1"):
+        control.step(0)
+
+
+def test_at_a_breakpoint_the_node_has_not_begun(compiled, run_tree, make, control, robot, script, notes):
+    begun, held = [], []
+
+    def observe(progress):
+        if control.state.at == GRASP:
+            begun.append(list(script.begun))
+            held.append((robot.driving, progress.states["Alice"][GRASP].message))
+            if len(begun) == 4:
+                control.resume()
+
+    control.set_breakpoint(GRASP)
+    result = run_tree(compiled(*make.FETCH), control=control, observer=observe)
+    assert result.outcome is Outcome.SUCCESS
+    assert begun == [["navigate", "detect", "approach"]] * 4
+    assert held[1:] == [(False, "waits at the breakpoint")] * 3
+    assert script.begun == ["navigate", "detect", "approach", "grasp", "stow", "navigate", "hand_over"]
+    assert ("breakpoint", f"at the breakpoint {GRASP}") in notes()
+
+
+def test_a_breakpoint_holds_each_time_until_it_is_cleared(compiled, run_tree, make, control, script):
+    script.ends["grasp"] = lambda skill: Failed(Cause.EXECUTION, "slipped")
+    stops = []
+
+    def observe(progress):
+        if control.state.at is not None:
+            stops.append(script.begun.count("grasp"))
+            if len(stops) == 2:
+                control.clear_breakpoint(GRASP)
+            control.resume()
+
+    control.set_breakpoint(GRASP)
+    run_tree(compiled(*make.FETCH), control=control, observer=observe)
+    assert (stops, script.begun.count("grasp")) == ([0, 1], 3)
+
+
+def test_a_breakpoint_at_a_composite_and_cancel_there(compiled, run_tree, make, control, robot, script):
+    path_id = "alice/fetch-drink/2-start"
+    control.set_breakpoint(path_id)
+
+    def observe(progress):
+        if control.state.at == path_id:
+            control.cancel("no further")
+
+    result = run_tree(compiled(*make.FETCH), control=control, observer=observe)
+    assert (result.outcome, script.begun[-1]) == (Outcome.CANCELLED, "stow")
+    assert (robot.driving, robot.holder) == (False, None)
+
+
+def test_a_breakpoint_nowhere_is_refused_with_what_was_meant(compiled, run_tree, make):
+    early = Control()
+    early.set_breakpoint("alice/fetch-drink/1-kitchen/grap")
+    with pytest.raises(ValueError, match=f"did you mean '{GRASP}'"):
+        run_tree(compiled(*make.FETCH), control=early)
+    late = Control()
+    late.begin({"Alice": compiled(*make.FETCH)})
+    with pytest.raises(ValueError, match=f"did you mean '{GRASP}'"):
+        late.set_breakpoint("alice/fetch-drink/1-kitchen/grap")
+
+
+def test_another_mission_first_and_the_old_one_after(compiled, run_tree, make, control, script, published, robot):
+    other = compiled(GO, name="go aside")
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({5: lambda: control.preempt(other)}))
+    assert result.outcome is Outcome.SUCCESS
+    first, aside = ["navigate", "detect", "approach"], ["navigate"]
+    assert script.begun == [*first, *aside, "approach", "grasp", "stow", "navigate", "hand_over"]
+    outcomes = [(m.get("mission"), m["outcome"]) for topic, m in published if topic == "outcome"]
+    assert outcomes == [("go aside", Outcome.SUCCESS), (None, Outcome.SUCCESS)]
+    assert [done.mission for done in result.worst.preempting] == ["go aside"]
+    assert result.worst.preempting[0].states["alice/go-aside"].status is Status.SUCCESS
+    assert (robot.driving, robot.holder) == (False, None)
+
+
+def test_missions_under_way_are_shown_the_present_one_last(compiled, run_tree, make, control):
+    seen = []
+
+    def observe(progress):
+        if progress.ticks == 4:
+            control.preempt(compiled(GO, name="go aside"))
+        stack = control.state.missions["Alice"]
+        if not seen or seen[-1] != (stack, progress.trees["Alice"].mission_name):
+            seen.append((stack, progress.trees["Alice"].mission_name))
+        assert all(path_id in progress.states["Alice"] for path_id in progress.trees["Alice"].path_ids)
+
+    run_tree(compiled(*make.FETCH), control=control, observer=observe)
+    both = ("fetch drink", "go aside")
+    assert seen == [(("fetch drink",), "fetch drink"), (both, "go aside"), (("fetch drink",), "fetch drink")]
+
+
+def test_cancel_ends_all_missions_under_way(compiled, run_tree, make, control, robot, script, published):
+    actions = {3: lambda: control.preempt(compiled(GO, name="go aside")), 5: lambda: control.cancel("enough")}
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
+    assert result.outcome is Outcome.CANCELLED
+    assert [done.outcome for done in result.worst.preempting] == [Outcome.CANCELLED]
+    assert (robot.driving, script.ended) == (False, script.begun)
+
+
+def test_a_mission_that_came_in_between_and_failed_does_not_fail_the_first(compiled, run_tree, make, control, script):
+    other = compiled("Take [coke] to [start] and do [Nothing] to [Nothing]", name="deliver")
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({3: lambda: control.preempt(other)}))
+    assert result.outcome is Outcome.SUCCESS
+    assert [done.outcome for done in result.worst.preempting] == [Outcome.FAILURE]
+
+
+def test_a_mission_for_nobody_or_under_way_already_is_refused(compiled, make, control):
+    tree = compiled(*make.FETCH)
+    control.begin({"Alice": tree})
+    with pytest.raises(ValueError, match="under way already"):
+        control.preempt(tree)
+    from dataclasses import replace
+
+    with pytest.raises(ValueError, match=r"'Bob' is not in this run; there are: Alice"):
+        control.preempt(replace(tree, robot_name="Bob"))
+
+
+def test_nothing_moves_while_the_stop_button_is_pressed(compiled, run_tree, make, control, robot, script):
+    driven = []
+
+    def observe(progress):
+        if progress.ticks == 3:
+            control.stop_button("a hand in the way")
+        if progress.ticks == 6:
+            control.resume()
+            control.step()
+            control.preempt(compiled(GO, name="go aside"))
+        if 3 < progress.ticks < 20:
+            driven.append(robot.driving)
+            assert (control.state.mode, control.state.reason) == (Mode.STOPPED, "a hand in the way")
+        if progress.ticks == 20:
+            control.release_stop_button()
+        if progress.ticks == 25:
+            control.resume()
+
+    result = run_tree(compiled(*make.FETCH), control=control, observer=observe)
+    assert result.outcome is Outcome.SUCCESS
+    assert not any(driven)
+
+
+def test_a_lost_lease_suspends_until_it_is_free_again(compiled, run_tree, make, control, robot, script, notes):
+    modes = []
+
+    def take():
+        robot.driving = False
+        robot.holder = "tablet"
+
+    def give():
+        robot.lease = None
+
+    def observe(progress):
+        at_ticks({4: take})(progress)
+        if progress.ticks == 30:
+            give()
+        if 4 < progress.ticks <= 30:
+            modes.append((control.state.mode, robot.driving))
+
+    result = run_tree(compiled(*make.FETCH), control=control, observer=observe)
+    assert result.outcome is Outcome.SUCCESS
+    assert set(modes) == {(Mode.LEASE_LOST, False)}
+    assert notes() == [
+        ("lease lost", "tablet holds the lease of Alice"),
+        ("lease back", "Alice has its lease again"),
+    ]
+    assert robot.holder is None
+
+
+def test_verbs_are_shown_the_lease_that_counts_now(compiled, run_tree, make, control, robot):
+    shown = []
+    drive = robot.drive
+    robot.drive = lambda *v, until_s, lease: (
+        shown.append((lease, robot.lease)),
+        drive(*v, until_s=until_s, lease=lease),
+    )[1]
+    actions = {4: lambda: setattr(robot, "holder", "tablet"), 9: lambda: setattr(robot, "lease", None)}
+    assert run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions)).outcome is Outcome.SUCCESS
+    assert all(lease == counts for lease, counts in shown)
+    assert len({lease.number for lease, _ in shown}) == 2
+
+
+def test_a_lease_that_does_not_come_back_ends_the_mission_with_a_cause(compiled, run_tree, make, robot, script):
+    result = run_tree(compiled(*make.FETCH), observer=at_ticks({4: lambda: setattr(robot, "holder", "tablet")}))
+    assert (result.outcome, result.worst.cause) == (Outcome.FAILURE, Cause.EXECUTION)
+    assert result.worst.message == "tablet holds the lease of Alice and did not give it back within 60 s"
+    assert 60.0 < result.sim_time_s < 61.0
+    assert (robot.lease.holder, script.ended) == ("tablet", script.begun)
+
+
+QUESTION = Question("alice/fetch/ask", "Go on?", ("retry", "skip"), "skip", 2.0)
+
+
+def test_a_question_waits_for_its_answer(control, clock):
+    asked = control.ask(QUESTION, clock)
+    assert not asked.done()
+    assert [(q.id, q.options, q.until_s) for q in control.state.questions] == [(QUESTION.id, QUESTION.options, 2.0)]
+    with pytest.raises(RuntimeError):
+        asked.result()
+    control.answer(QUESTION.id, "retry")
+    assert (asked.done(), asked.result(), control.state.questions) == (True, "retry", ())
+
+
+def test_nobody_answers_and_the_default_counts(control, clock):
+    asked = control.ask(QUESTION, clock)
+    clock.advance(2.0)
+    assert (asked.done(), asked.result(), control.state.questions) == (True, "skip", ())
+    events = control.heed().events
+    assert [event.what for event in events] == ["question", "question over"]
+
+
+def test_wrong_answers_and_late_ones_are_refused(control, clock):
+    asked = control.ask(QUESTION, clock)
+    with pytest.raises(ValueError, match="choose one of: retry, skip"):
+        control.answer(QUESTION.id, "maybe")
+    with pytest.raises(ValueError, match="open already"):
+        control.ask(QUESTION, clock)
+    asked.withdraw()
+    asked.withdraw()
+    with pytest.raises(ValueError, match="not open"):
+        control.answer(QUESTION.id, "retry")
+    with pytest.raises(ValueError, match="none of"):
+        Question("q", "?", ("a",), "b", 1.0)
+    assert nobody_to_ask(QUESTION).result() == "skip"
+
+
+def test_a_skill_asks_the_operator_in_the_midst_of_a_run(compiled, run_tree, make, control, script):
+    said = []
+
+    def ask(skill):
+        skill.asked = getattr(skill, "asked", None) or skill.context.ask(QUESTION)
+        if not skill.asked.done():
+            return Running("waiting for an answer")
+        said.append(skill.asked.result())
+        return Succeeded("asked")
+
+    def observe(progress):
+        if progress.ticks == 20:
+            control.answer(QUESTION.id, "retry")
+
+    script.ends["navigate"] = ask
+    result = run_tree(compiled(GO), control=control, observer=observe)
+    assert (result.outcome, said) == (Outcome.SUCCESS, ["retry"])
+
+
+def test_a_pause_does_not_count_against_the_time_of_a_question(compiled, run_tree, control, script):
+    said = []
+
+    def ask(skill):
+        skill.asked = getattr(skill, "asked", None) or skill.context.ask(QUESTION)
+        if not skill.asked.done():
+            return Running("waiting for an answer")
+        said.append(skill.asked.result())
+        return Succeeded("asked")
+
+    actions = {10: control.pause, 200: control.resume, 215: lambda: control.answer(QUESTION.id, "retry")}
+    script.ends["navigate"] = ask
+    result = run_tree(compiled(GO), control=control, observer=at_ticks(actions))
+    assert (result.outcome, said) == (Outcome.SUCCESS, ["retry"])
+
+
+def test_another_thread_pauses_waits_and_goes_on(compiled, run_tree, make, script):
+    control = Control(pace=20.0)
+    script.steps = 40
+    modes = []
+
+    def operator():
+        control.pause()
+        state = control.wait(control.state.version, timeout_s=5.0) if not control.state.missions else control.state
+        modes.append(state.mode)
+        control.resume()
+
+    thread = threading.Thread(target=operator)
+    thread.start()
+    result = run_tree(compiled(GO), control=control)
+    thread.join()
+    assert result.outcome is Outcome.SUCCESS
+    assert modes == [Mode.PAUSED]
+
+
+def test_waiting_ends_with_a_change_or_with_its_time(control):
+    version = control.state.version
+    assert control.wait(version, timeout_s=0.01).version == version
+    control.pause()
+    assert control.wait(version, timeout_s=5.0).version > version
+
+
+def test_simulated_time_does_not_run_ahead_of_the_people_while_held(compiled, run_tree, make, clock):
+    import time
+
+    control = Control(pace=2.0)
+    control.pause()
+    walls = []
+
+    def observe(progress):
+        walls.append(time.perf_counter())
+        if progress.ticks == 5:
+            control.resume()
+
+    run_tree(compiled(GO), control=control, observer=observe)
+    assert walls[4] - walls[0] >= 4 * 0.05 / 2.0 * 0.9
+
+
+def test_a_control_has_its_hands_on_one_run_only(compiled, run_tree, make, control):
+    run_tree(compiled(GO), control=control)
+    with pytest.raises(ValueError, match="one run only"):
+        run_tree(compiled(GO), control=control)
+
+
+def test_what_was_done_by_hand_is_logged(compiled, run_tree, make, control, notes):
+    actions = {2: control.toggle_pause, 4: control.toggle_pause, 5: lambda: control.cancel("enough")}
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
+    assert notes() == [
+        ("pause", "paused by the operator"),
+        ("resume", "the mission goes on"),
+        ("cancel", "enough"),
+    ]
+
+
+def test_an_untouched_control_changes_no_log(compiled, run_tree, make, robot, clock, published):
+    logs = []
+    for hands in (None, Control()):
+        clock.time_s, robot.lease, robot.holding = 0.0, None, False
+        published.clear()
+        run_tree(compiled(*make.FETCH), control=hands)
+        logs.append([event for event in published if event[0] != "wall"])
+    assert logs[0] == logs[1]
+
+
+def test_a_lease_shown_by_another_is_left_as_it_is(robot):
+    from executive.run.lease_keeper import LeaseKeeper
+
+    keeper = LeaseKeeper(robot, "errand")
+    foreign = Lease("Alice", "tablet", 99)
+    assert keeper.behind(foreign) == foreign
+
+
+def test_a_mission_can_take_the_place_of_the_one_under_way(compiled, run_tree, make, control, robot, script, notes):
+    other = compiled(GO, name="go to the bedroom")
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({4: lambda: control.replace(other)}))
+    assert (result.outcome, result.worst.mission) == (Outcome.SUCCESS, "go to the bedroom")
+    assert result.trees == {"Alice": other}
+    assert script.begun == ["navigate", "detect", "navigate"]
+    assert script.ended == script.begun
+    (given_up,) = result.worst.preempting
+    assert (given_up.mission, given_up.outcome) == ("fetch drink", Outcome.CANCELLED)
+    assert "given up" in given_up.message
+    assert ("replace", "instead 'go to the bedroom'") in notes()
+    assert control.state.missions == {"Alice": ("go to the bedroom",)}
+
+
+class Notebook:
+    """A journal that knows which mission it is kept of."""
+
+    def __init__(self, name, taken=None):
+        self.name, self.taken, self.notes = name, [] if taken is None else taken, 0
+
+    def note(self, note):
+        self.notes += 1
+
+    def replaced(self, tree):
+        self.taken.append(Notebook(tree.mission_name, self.taken))
+        return self.taken[-1]
+
+
+def test_the_journal_is_kept_of_the_mission_that_took_the_place(compiled, run_tree, make, control):
+    other, journal = compiled(GO, name="go to the bedroom"), Notebook("fetch drink")
+    actions = {4: lambda: control.replace(other)}
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), journal=journal)
+    assert ([each.name for each in journal.taken], journal.notes) == (["go to the bedroom"], 4)
+    assert journal.taken[0].notes > 0
+
+
+def test_of_a_mission_that_comes_in_between_no_journal_is_kept(compiled, run_tree, make, control):
+    between, other, journal = compiled(GO, name="between"), compiled(GO, name="other"), Notebook("fetch drink")
+    actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), journal=journal)
+    assert journal.taken == []
+
+
+def test_a_mission_that_came_in_between_is_replaced_and_the_first_taken_up(compiled, run_tree, make, control, script):
+    between, other = compiled(GO, name="between"), compiled(GO, name="other")
+    actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
+    assert (result.outcome, result.worst.mission) == (Outcome.SUCCESS, "fetch drink")
+    ends = [(each.mission, each.outcome) for each in result.worst.preempting]
+    assert ends == [("between", Outcome.CANCELLED), ("other", Outcome.SUCCESS)]
+
+
+def test_a_mission_for_later_begins_when_the_first_is_done(compiled, run_tree, make, control, script):
+    other = compiled(GO, name="go to the bedroom")
+    result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({4: lambda: control.then(other)}))
+    assert (result.outcome, result.worst.mission) == (Outcome.SUCCESS, "fetch drink")
+    assert script.begun == ["navigate", "detect", "approach", "grasp", "stow", "navigate", "hand_over", "navigate"]
+    assert [each.mission for each in result.worst.preempting] == ["go to the bedroom"]
+
+
+def test_missions_for_later_come_in_their_order(compiled, run_tree, control):
+    first, second = compiled(GO, name="first"), compiled(GO, name="second")
+    control.then(first)
+    control.then(second)
+    result = run_tree(compiled(GO), control=control)
+    assert [each.mission for each in result.worst.preempting] == ["first", "second"]
+
+
+def test_a_mission_for_later_is_refused_when_it_waits_already(compiled, control):
+    control.then(compiled(GO, name="first"))
+    with pytest.raises(ValueError, match="under way already"):
+        control.then(compiled(GO, name="first"))
+
+
+def test_a_robot_that_is_not_in_the_run_gets_no_mission(compiled, control, make):
+    control.begin({"Bob": compiled(GO)})
+    for give in (control.replace, control.then, control.preempt):
+        with pytest.raises(ValueError, match="not in this run"):
+            give(compiled(GO, name="other"))
+
+
+def test_an_observer_sees_where_the_robot_is_and_what_it_holds(compiled, run_tree, make, control):
+    glances = []
+    run_tree(
+        compiled(*make.FETCH), control=control, observer=lambda progress: glances.append(progress.glances["Alice"])
+    )
+    assert (glances[0].pose.x_m, glances[0].pose.y_m, glances[0].holding) == (0.0, 0.0, False)
+    assert glances[-1].holding
+
+
+@pytest.mark.parametrize("give", ["replace", "then"])
+def test_a_mission_in_place_of_another_or_after_it_comes_back_to_the_same_start(
+    compiled, run_tree, make, control, robot, script, registry, give
+):
+    goals = []
+
+    def gone(skill):
+        goals.append((skill.inputs.goal.x_m, skill.inputs.goal.y_m))
+        robot.standing = Pose2D(skill.inputs.goal.x_m, skill.inputs.goal.y_m, 0.0)
+        return Succeeded("there")
+
+    script.ends["navigate"] = gone
+    other = compiled("Take [Nothing] to [start] and do [Nothing] to [Nothing]", name="come back")
+    actions = {12: lambda: getattr(control, give)(other)}
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
+    assert goals[0] != (0.0, 0.0)
+    assert goals[-1] == (0.0, 0.0)
+
+
+def test_a_mission_that_comes_first_begins_where_the_robot_stands(compiled, run_tree, make, control, robot, script):
+    goals = []
+
+    def gone(skill):
+        goals.append((skill.inputs.goal.x_m, skill.inputs.goal.y_m))
+        robot.standing = Pose2D(skill.inputs.goal.x_m, skill.inputs.goal.y_m, 0.0)
+        return Succeeded("there")
+
+    script.ends["navigate"] = gone
+    other = compiled("Take [Nothing] to [start] and do [Nothing] to [Nothing]", name="come back")
+    run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({8: lambda: control.preempt(other)}))
+    assert goals[1] == goals[0] != (0.0, 0.0)

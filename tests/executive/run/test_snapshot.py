@@ -1,0 +1,24 @@
+"""What counts as news between two snapshots of a tree."""
+
+import pytest
+from py_trees.common import Status
+
+from executive.run.snapshot import NodeState, activities
+
+GOING = NodeState(Status.RUNNING, None, "going, 2.5 m to go")
+
+
+# state before, state after -> whether the node does something new while it goes on
+@pytest.mark.parametrize(
+    ("before", "after", "new"),
+    [
+        (GOING, NodeState(Status.RUNNING, None, "stopping"), True),
+        (GOING, NodeState(Status.RUNNING, None, "going, 1 m to go"), False),
+        (GOING, GOING, False),
+        (GOING, NodeState(Status.SUCCESS, None, "there"), False),
+        (NodeState(), GOING, False),
+    ],
+)
+def test_new_words_of_a_running_node_are_news_and_new_numbers_are_not(before, after, new):
+    told = list(activities({"alice/go": before}, {"alice/go": after}))
+    assert told == ([("alice/go", after)] if new else [])

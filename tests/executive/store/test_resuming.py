@@ -1,0 +1,262 @@
+"""A mission is broken off at every moment and taken up by another process: nothing is done twice."""
+
+import dataclasses
+
+import pytest
+from py_trees.common import Status
+
+from executive.mission.command import parse_command
+from executive.mission.file.model import OperatorQuestion
+from executive.run.outcome import Outcome
+from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.store.missions import MissionStore, Order
+from executive.store.records import Memory, StepRecord
+from executive.store.resuming import resumed_tree
+from executive.tree.compiler import Step, compile_commands
+from executive.tree.compiling.policies import AskPlan
+from executive.tree.registry import installed_skills
+from skills.api import Cause, Failed, Running, Succeeded
+
+TIDY = (
+    "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
+    "Take [drink] to [bedroom] and do [place] to [drink]",
+)
+FETCH_AND_ASK = (
+    "Take [Nothing] to [bedroom] and do [find] to [hammer]",
+    "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
+    "Take [drink] to [start] and do [Nothing] to [Nothing]",
+)
+ORDER = Order("fetch drink", "flat", "Alice", 3, "out", (), "print", sentence="fetch me a drink")
+
+
+class KilledError(BaseException):
+    """The process is gone."""
+
+
+class World:
+    """What outlives the process: what the gripper holds and where the thing is."""
+
+    def __init__(self):
+        self.grasps = self.places = 0
+        self.work = []
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+@pytest.fixture
+def handling(world, robot, script, registry):
+    """Skills of which the fourth step changes the world, and the sixth is the last."""
+
+    class Handling(registry["stow"].__mro__[1]):
+        changes_world = True
+
+        def begin(self, inputs):
+            world.work.append(self.name)
+            self.inputs, self.count = inputs, 0
+
+        def step(self):
+            self.count += 1
+            if self.count == 4:
+                self.change()
+            return Succeeded(f"{self.name} done") if self.count == 6 else Running(f"{self.name} goes on")
+
+    class Grasp(Handling):
+        name, Inputs = "grasp", registry["grasp"].Inputs
+
+        def change(self):
+            assert not robot.holding, "grasped what is in the gripper"
+            robot.holding, world.grasps = True, world.grasps + 1
+
+        def resume(self, inputs):
+            self.begin(inputs)
+            self.count = 4 if robot.holding else 0
+
+        def undone(self, inputs):
+            return None if robot.holding else "the jaw is empty"
+
+    class Place(Handling):
+        name, Inputs = "place", registry["place"].Inputs
+
+        def change(self):
+            assert robot.holding, "put down what is not held"
+            robot.holding, world.places = False, world.places + 1
+
+        def step(self):
+            step = super().step()
+            self.checkpoint = {"over": True} if self.count >= 1 else {}
+            return step
+
+        def resume(self, inputs):
+            over = self.checkpoint.get("over", False)
+            self.begin(inputs)
+            assert robot.holding or over, "the checkpoint is lost"
+            self.count = 0 if robot.holding else 4
+
+    return {**installed_skills(), **registry, "grasp": Grasp, "place": Place}
+
+
+@pytest.fixture
+def store(tmp_path):
+    with MissionStore(tmp_path / "store.sqlite") as opened:
+        yield opened
+
+
+@pytest.fixture
+def live(store, clock, robot, make, world, script, handling, knowledge):
+    """One life of the executive: it ends by itself, or is killed in some tick, before or after that was noted."""
+
+    def one_life(texts, *, kill_after=None, kill_when=None, lag=0):
+        missions = store.missions()
+        mission = missions[0] if missions else store.add(ORDER, queued=False)
+        steps = [Step(parse_command(text)) for text in texts]
+        tree = compile_commands("fetch drink", steps, knowledge=knowledge, registry=handling, robot_name="Alice")
+        journal, recollection = store.journal(mission.id), None
+        if missions:
+            tree, recollection = resumed_tree(tree, store.memory(mission.id))
+            journal.remembering(recollection)
+        store.begin(mission.id)
+        ticks = Ticks(journal, kill_after, kill_when, lag)
+        script.begun.clear()
+        world.work.clear()
+        robot.holder = None
+        entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap(), ticks)
+        try:
+            result = run(
+                [entry],
+                clock=clock,
+                worker=LockStepWorker(clock),
+                publish=lambda topic, message: None,
+                settings=RunSettings(seed=3),
+            )
+        except KilledError:
+            return None, ticks.count, recollection
+        return result, ticks.count, recollection
+
+    return one_life
+
+
+class Ticks:
+    """Passes notes on, the last few excepted, and kills."""
+
+    def __init__(self, journal, kill_after, kill_when, lag):
+        self.journal, self.kill_after, self.kill_when, self.lag, self.count = journal, kill_after, kill_when, lag, 0
+
+    def note(self, note):
+        self.count += 1
+        if self.kill_after is None or self.count <= self.kill_after - self.lag:
+            self.journal.note(note)
+        if self.count == self.kill_after or (self.kill_when is not None and any(map(self.kill_when, note.changes))):
+            raise KilledError
+
+
+def begins(leaf):
+    return lambda change: change.path_id.endswith(f"/{leaf}") and change.after.status is Status.RUNNING
+
+
+@pytest.mark.parametrize("lag", [0, 1, 3])
+def test_a_kill_in_any_tick_repeats_nothing(tmp_path, live, store, robot, world, lag):
+    result, ticks, _ = live(TIDY)
+    assert result.outcome is Outcome.SUCCESS
+    assert (world.grasps, world.places) == (1, 1)
+    for moment in range(1 + lag, ticks):
+        store.remove(store.missions()[0].id)
+        robot.holding, world.grasps, world.places = False, 0, 0
+        assert live(TIDY, kill_after=moment, lag=lag)[0] is None
+        result, _, recollection = live(TIDY)
+        told = (moment, result.worst.message, recollection.told, world.work)
+        assert result.outcome is Outcome.SUCCESS, told
+        assert (world.grasps, world.places, robot.holding) == (1, 1, False), told
+
+
+def test_kills_one_after_another_lead_to_the_end_all_the_same(live, robot, world):
+    lives = 0
+    while live(TIDY, kill_after=15)[0] is None:
+        lives += 1
+        assert lives < 30
+    assert (world.grasps, world.places) == (1, 1)
+    assert lives >= 2
+
+
+def test_what_was_finished_is_told_and_not_done_again(live, script, world):
+    live(TIDY, kill_after=20)
+    result, _, recollection = live(TIDY)
+    assert result.outcome is Outcome.SUCCESS
+    assert "detect" not in script.begun
+    told = "\n".join(recollection.told)
+    assert "find/counter-1/detect: success before the restart: seen" in told
+    assert "goes on here" in told
+
+
+def test_answers_and_the_start_pose_outlive_the_process(live, script):
+    live(FETCH_AND_ASK, kill_after=30)
+    result, _, _ = live(FETCH_AND_ASK)
+    assert result.outcome is Outcome.SUCCESS
+    assert list(result.worst.answers.values()) == [False]
+    remembered = next(state for path, state in result.worst.states.items() if path.endswith("remember-start"))
+    assert remembered.message.endswith("(before the restart)")
+
+
+def test_a_thing_lost_over_the_restart_is_taken_anew(live, robot, world):
+    live(TIDY, kill_when=begins("stow"))
+    assert (robot.holding, world.grasps) == (True, 1)
+    robot.holding = False
+    result, _, recollection = live(TIDY)
+    assert result.outcome is Outcome.SUCCESS
+    assert world.grasps == 2
+    assert any(told.endswith("/grasp: does it again, since the jaw is empty") for told in recollection.told)
+
+
+def test_a_failed_look_before_the_kill_is_not_looked_again(live, script):
+    script.seen_on = ("shelf",)
+    live(TIDY, kill_after=17)
+    result, _, _ = live(TIDY)
+    assert result.outcome is Outcome.SUCCESS
+    assert script.begun.count("detect") <= 1
+
+
+def test_the_tree_of_a_resumed_mission_has_the_same_path_ids(live, store, compiled):
+    tree = compiled(*TIDY)
+    live(TIDY, kill_after=12)
+    again, _ = resumed_tree(tree, store.memory(1))
+    assert again.path_ids == tree.path_ids
+    assert [type(node).__name__ for node in again.root.walk()] == [type(node).__name__ for node in tree.root.walk()]
+
+
+def test_a_step_whose_output_could_not_be_kept_is_done_again(live, store, script):
+    live(TIDY, kill_after=20)
+    memory = store.memory(1)
+    seen = {path for path, step in memory.steps.items() if path.endswith("/detect") and step.status is Status.SUCCESS}
+    assert seen
+    bare = dataclasses.replace(memory, board={k: v for k, v in memory.board.items() if not k.endswith("/sighting")})
+    store.memory = lambda number: bare
+    result, _, _ = live(TIDY)
+    assert result.outcome is Outcome.SUCCESS
+    assert "detect" in script.begun
+
+
+def test_causes_come_back_with_failures(live, store, script):
+    script.ends["navigate"] = lambda skill: Failed(Cause.PLANNING, "no way")
+    live(TIDY, kill_when=lambda change: change.after.cause is Cause.PLANNING)
+    failed = [step for step in store.memory(1).steps.values() if step.status is Status.FAILURE]
+    assert failed
+    assert all(step.cause is Cause.PLANNING for step in failed)
+
+
+def test_the_operator_is_not_asked_again_about_a_step_that_was_skipped(compiled):
+    tree = compiled(*TIDY)
+    first, *others = tree.root.mission.steps
+    ask = AskPlan(
+        path_id="alice/ask", name="ask", child=first, step="get it", question=OperatorQuestion(), options=("skip",)
+    )
+    mission = dataclasses.replace(tree.root.mission, steps=(ask, *others))
+    asking = dataclasses.replace(tree, root=dataclasses.replace(tree.root, mission=mission))
+    ended = {ask.path_id: Status.SUCCESS, first.path_id: Status.FAILURE}
+    steps = {path: StepRecord(status, None, "", 1.0, {}) for path, status in ended.items()}
+    again, _ = resumed_tree(asking, Memory(steps, {}, None))
+    assert next(node.kind for node in again.root.walk() if node.path_id == ask.path_id) == "skip"
+    fresh, _ = resumed_tree(asking, Memory({}, {}, None))
+    assert next(node.kind for node in fresh.root.walk() if node.path_id == ask.path_id) == "ask"

@@ -1,0 +1,198 @@
+"""Conditions, and what they make of readings that are too old."""
+
+import dataclasses
+
+import pytest
+from py_trees.behaviours import StatusQueue
+from py_trees.common import Status
+
+from executive.tree.behaviours.conditions import (
+    BatteryAbove,
+    BatteryReserve,
+    Fresh,
+    Freshness,
+    Holding,
+    LeaseHeld,
+    Localised,
+    StaleData,
+    StopReleased,
+    Waiting,
+    battery_reserve,
+    holding,
+    localised,
+)
+from executive.tree.behaviours.decorators import Guard
+from skills.api import Cause, Failed
+from skills.robot import Lease, Pose2D
+
+R, S, F = Status.RUNNING, Status.SUCCESS, Status.FAILURE
+
+
+class Readings:
+    """A condition that counts how often it was asked, with readings whose age is set by hand."""
+
+    def __init__(self):
+        self.stamp_s, self.asked, self.begun = 0.0, 0, 0
+
+    def begin(self, context):
+        self.begun += 1
+
+    def violated(self, context):
+        self.asked += 1
+
+    def fresh(self, policy, patience_s=2.0):
+        return Fresh(self, "the sensor", lambda context: self.stamp_s, Freshness(1.0, policy, patience_s))
+
+
+@pytest.fixture
+def readings():
+    return Readings()
+
+
+@pytest.mark.parametrize("policy", StaleData)
+def test_fresh_readings_are_judged_under_every_policy(readings, context, clock, policy):
+    clock.advance(1.0)
+    assert readings.fresh(policy).violated(context) is None
+    assert readings.asked == 1
+
+
+def test_accept_judges_by_what_there_is(readings, context, clock):
+    clock.advance(60.0)
+    assert readings.fresh(StaleData.ACCEPT).violated(context) is None
+    assert readings.asked == 1
+
+
+def test_fail_counts_an_old_reading_as_violated_at_once(readings, context, clock):
+    clock.advance(1.5)
+    verdict = readings.fresh(StaleData.FAIL).violated(context)
+    assert verdict == Failed(Cause.PRECONDITION, "the last reading of the sensor is 1.5 s old")
+    assert readings.asked == 0
+
+
+def test_wait_waits_and_goes_on_with_a_new_reading(readings, context, clock):
+    condition = readings.fresh(StaleData.WAIT)
+    clock.advance(1.5)
+    said = "waits for the sensor: the last reading of the sensor is 1.5 s old"
+    assert condition.violated(context) == Waiting(said)
+    readings.stamp_s = 1.5
+    assert condition.violated(context) is None
+    clock.advance(3.0)
+    readings.stamp_s = 4.5
+    assert condition.violated(context) is None
+
+
+def test_wait_fails_when_the_patience_is_over_and_begins_anew_with_each_start(readings, context, clock):
+    condition = readings.fresh(StaleData.WAIT)
+    clock.advance(2.0)
+    assert isinstance(condition.violated(context), Waiting)
+    clock.advance(2.1)
+    assert isinstance(condition.violated(context), Failed)
+    condition.begin(context)
+    assert isinstance(condition.violated(context), Waiting)
+    assert readings.begun == 1
+
+
+def test_a_reading_that_never_came_is_named(readings, context):
+    readings.stamp_s = float("-inf")
+    assert readings.fresh(StaleData.FAIL).violated(context).message == "there is no reading of the sensor yet"
+
+
+def guard_of(context, condition, *script):
+    child = StatusQueue(name="child", queue=list(script), eventually=script[-1])
+    return Guard(path_id="alice/g", name="g", child=child, condition=condition, context=context), child
+
+
+def test_a_guard_that_waits_ticks_nothing_below(readings, context, clock):
+    # reading   fresh  old    fresh
+    # guard     R      R      S
+    guard, _ = guard_of(context, readings.fresh(StaleData.WAIT), R, S)
+    said = []
+    for stamp_s in (0.0, None, 2.0):
+        readings.stamp_s = readings.stamp_s if stamp_s is None else stamp_s
+        guard.tick_once()
+        said.append(guard.status)
+        clock.advance(2.0 if stamp_s == 0.0 else 0.0)
+    assert said == [R, R, S]
+
+
+def test_a_guard_may_wait_before_it_begins(readings, context, clock):
+    clock.advance(5.0)
+    guard, child = guard_of(context, readings.fresh(StaleData.WAIT), S)
+    guard.tick_once()
+    assert (guard.status, child.status) == (R, Status.INVALID)
+    readings.stamp_s = 5.0
+    guard.tick_once()
+    assert (guard.status, readings.begun) == (S, 1)
+
+
+def test_holding_waits_while_the_gripper_tells_nothing_new(context, robot, clock):
+    robot.holding = True
+    condition, old = holding("coke"), robot.gripper()
+    assert condition.violated(context) is None
+    robot.gripper = lambda: old
+    clock.advance(2.0)
+    assert isinstance(condition.violated(context), Waiting)
+    clock.advance(6.0)
+    assert condition.violated(context).cause is Cause.PRECONDITION
+
+
+def test_holding_lets_a_short_loss_pass_and_tells_a_loss_from_never_held(context, robot, clock):
+    condition = Holding("coke", patience_s=0.5)
+    assert condition.violated(context).cause is Cause.PRECONDITION
+    robot.holding = True
+    assert condition.violated(context) is None
+    robot.holding = False
+    clock.advance(0.4)
+    assert condition.violated(context) is None
+    clock.advance(0.2)
+    assert condition.violated(context).cause is Cause.EXECUTION
+
+
+def test_localised_lets_a_short_loss_pass(context, clock):
+    condition = Localised(patience_s=2.0)
+    context.localiser.localised = False
+    verdicts = []
+    for _ in range(3):
+        verdicts.append(condition.violated(context))
+        clock.advance(1.5)
+    assert verdicts[:2] == [None, None]
+    assert verdicts[2].cause is Cause.PRECONDITION
+
+
+def test_localised_waits_for_scans(context, clock):
+    clock.advance(3.0)
+    assert isinstance(localised().violated(context), Waiting)
+
+
+@pytest.mark.parametrize(("charge", "holds"), [(0.5, True), (0.3, True), (0.29, False)])
+def test_the_battery_is_above_a_level_or_not(context, robot, charge, holds):
+    robot.charge = charge
+    assert (BatteryAbove(0.3).violated(context) is None) == holds
+
+
+def test_the_reserve_grows_with_the_way_to_the_dock(context, robot):
+    robot.charge = 0.2
+    assert BatteryReserve(0.15, Pose2D(5.0, 0.0, 0.0)).violated(context) is None
+    far = BatteryReserve(0.15, Pose2D(300.0, 0.0, 0.0)).violated(context)
+    assert far == Failed(Cause.PRECONDITION, "the battery is at 20%, less than 48%")
+
+
+def test_an_old_battery_reading_will_do(context, robot, clock):
+    old = robot.battery()
+    robot.battery = lambda: old
+    clock.advance(100.0)
+    assert battery_reserve(0.15, Pose2D(0.0, 0.0, 0.0)).violated(context) is None
+
+
+def test_the_mission_stands_while_the_stop_button_is_pressed(context):
+    assert StopReleased().violated(context) is None
+    pressed = dataclasses.replace(context, stop_pressed=lambda: "somebody pressed it")
+    assert StopReleased().violated(pressed) == Waiting("somebody pressed it")
+
+
+def test_the_mission_stands_while_another_holds_the_lease(context, robot):
+    assert LeaseHeld().violated(context) is None
+    robot.lease = Lease("Alice", context.lease.holder, 5)
+    assert LeaseHeld().violated(context) is None
+    robot.lease = Lease("Alice", "the tablet", 6)
+    assert LeaseHeld().violated(context) == Waiting("the tablet holds the lease of Alice")

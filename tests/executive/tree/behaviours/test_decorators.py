@@ -1,0 +1,192 @@
+"""Timeout, Retry and Guard on the robot's clock."""
+
+import pytest
+from py_trees.behaviours import StatusQueue
+from py_trees.common import Status
+
+from executive.tree.behaviours.composites import MemorySequence
+from executive.tree.behaviours.conditions import Holding
+from executive.tree.behaviours.decorators import Guard, Retry, Timeout
+from executive.tree.behaviours.explained import Explained
+from skills.api import Cause, Failed
+
+R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
+
+
+class Queue(Explained, StatusQueue):
+    """A scripted leaf that says why it fails."""
+
+    def __init__(self, *statuses: Status, cause: Cause = Cause.EXECUTION) -> None:
+        super().__init__(name="queue", queue=list(statuses), eventually=S)
+        self.path_id, self.fails_with, self.stopped = "a/queue", cause, 0
+        self.clear_explanation()
+
+    def update(self) -> Status:
+        status = super().update()
+        self.cause, self.message = (self.fails_with, "slipped") if status == F else (None, "goes on")
+        return status
+
+    def terminate(self, new_status: Status) -> None:
+        self.stopped += new_status == N and self.status == R
+
+
+def ticked(root, clock, times: int, dt_s: float = 1.0) -> list[Status]:
+    statuses = []
+    for _ in range(times):
+        clock.advance(dt_s)
+        root.tick_once()
+        statuses.append(root.status)
+    return statuses
+
+
+def timeout(child, clock, limit_s=1.5):
+    return Timeout(path_id="a/t", name="t", child=child, limit_s=limit_s, clock=clock)
+
+
+@pytest.mark.parametrize("last", [R, S])
+def test_timeout_fails_on_the_robots_clock_even_when_success_comes_late(clock, last):
+    # time     1   2   3      limit 1.5 s after 1 s
+    # child    R   R   R or S
+    # timeout  R   R   F
+    child = Queue(R, R, last, R)
+    root = timeout(child, clock)
+    assert ticked(root, clock, 3) == [R, R, F]
+    assert root.cause is Cause.TIMEOUT
+    assert child.status != R
+
+
+def test_timeout_stops_a_running_child(clock):
+    child = Queue(R, R, R, R)
+    ticked(timeout(child, clock), clock, 3)
+    assert child.stopped == 1
+
+
+def test_timeout_lets_success_in_time_and_failure_pass(clock):
+    assert ticked(timeout(Queue(R, S), clock), clock, 2) == [R, S]
+    root = timeout(Queue(R, R, F), clock)
+    assert ticked(root, clock, 3) == [R, R, F]
+    assert root.cause is Cause.EXECUTION
+
+
+def test_timeout_starts_anew_after_an_end(clock):
+    root = timeout(Queue(R, R, R, R, S), clock)
+    assert ticked(root, clock, 3) == [R, R, F]
+    assert ticked(root, clock, 2) == [R, S]
+
+
+def retry(child, attempts=3, causes=frozenset({Cause.EXECUTION}), final=None):
+    return Retry(path_id="a/r", name="r", child=child, attempts=attempts, causes=causes, final=final)
+
+
+def test_retry_tries_again_one_tick_later_until_it_works(clock):
+    # child  F  F  S
+    # retry  R  R  S
+    root = retry(Queue(F, F, S))
+    assert ticked(root, clock, 2) == [R, R]
+    assert "attempt 3 of 3, since slipped" in root.message
+    assert ticked(root, clock, 1) == [S]
+
+
+def test_retry_is_bounded_and_says_how_often(clock):
+    root = retry(Queue(F, F, F))
+    assert ticked(root, clock, 3) == [R, R, F]
+    assert (root.cause, root.message) == (Cause.EXECUTION, "slipped (after 3 attempts)")
+
+
+@pytest.mark.parametrize("cause", [Cause.TIMEOUT, Cause.ERROR, Cause.PRECONDITION])
+def test_retry_leaves_other_causes_alone(clock, cause):
+    root = retry(Queue(F, S, cause=cause))
+    assert ticked(root, clock, 1) == [F]
+    assert root.cause is cause
+
+
+def test_retry_gives_up_when_the_final_node_failed(clock):
+    final, later = Queue(F, S), Queue(F, S)
+    final.path_id, later.path_id = "a/final", "a/later"
+    root = retry(MemorySequence(path_id="a/s", name="s", children=[final, later]), final="a/final")
+    assert ticked(root, clock, 1) == [F]
+    root = retry(MemorySequence(path_id="a/s", name="s", children=[Queue(S, S), Queue(F, S)]), final="a/final")
+    assert ticked(root, clock, 2) == [R, S]
+
+
+def test_retry_begins_a_sequence_at_its_first_step(clock):
+    first, second = Queue(S, R, S), Queue(F, S)
+    root = retry(MemorySequence(path_id="a/s", name="s", children=[first, second]))
+    assert ticked(root, clock, 3) == [R, R, S]
+    assert first.status == S
+
+
+def test_retry_counts_from_one_after_an_end(clock):
+    root = retry(Queue(F, F, F, F, F, S))
+    assert ticked(root, clock, 3) == [R, R, F]
+    assert ticked(root, clock, 3) == [R, R, S]
+
+
+class Flag:
+    """A condition that the test switches."""
+
+    def __init__(self) -> None:
+        self.bad = False
+        self.begun = 0
+
+    def begin(self, context) -> None:
+        self.begun += 1
+
+    def violated(self, context):
+        return Failed(Cause.EXECUTION, "the flag fell") if self.bad else None
+
+
+def test_guard_halts_its_child_when_the_condition_breaks(context, clock):
+    flag, child = Flag(), Queue(R, R, R, S)
+    root = Guard(path_id="a/g", name="g", child=child, condition=flag, context=context)
+    assert ticked(root, clock, 2) == [R, R]
+    flag.bad = True
+    assert ticked(root, clock, 1) == [F]
+    assert (root.cause, root.message, child.stopped, flag.begun) == (Cause.EXECUTION, "the flag fell", 1, 1)
+
+
+def test_guard_does_not_begin_its_child_when_the_condition_is_broken_before(context, clock):
+    flag, child = Flag(), Queue(S)
+    flag.bad = True
+    root = Guard(path_id="a/g", name="g", child=child, condition=flag, context=context)
+    assert ticked(root, clock, 1) == [F]
+    assert child.status == N
+
+
+def test_guard_passes_its_child_on(context, clock):
+    root = Guard(path_id="a/g", name="g", child=Queue(R, F), condition=Flag(), context=context)
+    assert ticked(root, clock, 2) == [R, F]
+    assert (root.cause, root.message) == (Cause.EXECUTION, "slipped")
+
+
+def test_interrupted_decorators_say_so(context, clock):
+    for root in (timeout(Queue(R, R), clock), retry(Queue(R, R))):
+        ticked(root, clock, 1)
+        root.stop(N)
+        assert (root.cause, root.children[0].status) == (Cause.CANCELLED, N)
+
+
+def test_holding_lets_short_losses_pass_and_tells_long_ones(context, clock, robot):
+    # time  0.0   0.4        0.6        1.2
+    # held  yes   no         yes        no ... since 0.6
+    condition = Holding("coke", patience_s=0.5)
+    condition.begin(context)
+    robot.holding = True
+    assert condition.violated(context) is None
+    for dt_s, held in ((0.4, False), (0.2, True)):
+        clock.advance(dt_s)
+        robot.holding = held
+        assert condition.violated(context) is None
+    clock.advance(0.6)
+    robot.holding = False
+    failure = condition.violated(context)
+    assert failure is not None
+    assert (failure.cause, failure.message) == (Cause.EXECUTION, "the coke was lost on the way")
+
+
+def test_holding_nothing_at_the_start_is_a_precondition(context, robot):
+    condition = Holding("coke")
+    condition.begin(context)
+    failure = condition.violated(context)
+    assert failure is not None
+    assert failure.cause is Cause.PRECONDITION

@@ -1,0 +1,201 @@
+"""Recovery by cause, tidying up, and ways that do not apply: status tables."""
+
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.tree.behaviours.board import Board
+from executive.tree.behaviours.composites import MemorySelector, MemorySequence
+from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviours.recovery import Afterwards, OnlyIfHolding, OnlyIfKnown, Recover, Remedy, Trigger
+from skills.api import Cause
+
+R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
+PLANNING, EXECUTION, POST = Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION
+
+
+class Leaf(Explained, Behaviour):
+    """Ends each of its ticks as scripted: a Status, or the Cause of a failure; the last entry is repeated."""
+
+    def __init__(self, name, *script):
+        super().__init__(name)
+        self.path_id, self.script, self.ticks, self.begun = f"alice/{name}", list(script), 0, 0
+        self.clear_explanation()
+
+    def initialise(self):
+        self.begun += 1
+        self.clear_explanation()
+
+    def update(self):
+        entry = self.script[min(self.ticks, len(self.script) - 1)]
+        self.ticks += 1
+        self.message = f"{self.name} {self.ticks}"
+        self.cause = entry if isinstance(entry, Cause) else None
+        return F if isinstance(entry, Cause) else entry
+
+
+def recover(attempt, *remedies, attempts=5, forgets=(), board=None):
+    return Recover(
+        path_id="alice/recover", name="recover", attempt=attempt, remedies=remedies, attempts=attempts,
+        forgets=forgets, board=board or Board("alice"),
+    )  # fmt: skip
+
+
+def remedy(leaf, *causes, node=None, own=False, uses=1):
+    return Remedy(leaf, (Trigger(frozenset(causes), node, own),), uses)
+
+
+def table(root, ticks):
+    """Statuses of the root and its children after each tick."""
+    rows = []
+    for _ in range(ticks):
+        root.tick_once()
+        rows.append((root.status, *(child.status for child in root.children)))
+    return rows
+
+
+def test_the_remedy_for_the_cause_is_chosen_and_the_attempt_starts_anew():
+    attempt, clear, back_off = Leaf("go", R, PLANNING, S), Leaf("clear", EXECUTION), Leaf("back", R, S)
+    root = recover(attempt, remedy(clear, POST), remedy(back_off, PLANNING))
+    # tick     root go clear back
+    assert table(root, 5) == [
+        (R, R, N, N),
+        (R, F, N, N),  # the failure stays in sight for a tick
+        (R, F, N, R),
+        (R, F, N, S),
+        (S, S, N, S),
+    ]
+    assert (attempt.begun, clear.begun, back_off.begun, root.attempt) == (2, 0, 1, 2)
+
+
+def test_without_a_remedy_for_the_cause_it_fails_at_once_with_that_cause():
+    root = recover(Leaf("go", EXECUTION), remedy(Leaf("clear", S), PLANNING))
+    assert table(root, 1) == [(F, F, N)]
+    assert (root.cause, root.message) == (EXECUTION, "go 1")
+
+
+def test_a_remedy_is_used_so_often_and_no_more_then_the_next_one():
+    clear, back_off = Leaf("clear", S), Leaf("back", S)
+    root = recover(Leaf("go", PLANNING), remedy(clear, PLANNING, uses=2), remedy(back_off, PLANNING))
+    while root.status != F:
+        root.tick_once()
+    assert (clear.begun, back_off.begun) == (2, 1)
+    assert (root.cause, root.message) == (PLANNING, "go 4 (after 4 attempts)")
+
+
+def test_attempts_are_bounded_whatever_the_remedies_allow():
+    attempt = Leaf("go", PLANNING)
+    root = recover(attempt, remedy(Leaf("clear", S), PLANNING, uses=99), attempts=3)
+    while root.status != F:
+        root.tick_once()
+    assert attempt.begun == 3
+
+
+def test_a_failed_remedy_gives_way_to_the_next_that_fits():
+    attempt, back_off = Leaf("go", PLANNING, S), Leaf("back", S)
+    root = recover(attempt, remedy(Leaf("clear", EXECUTION), PLANNING), remedy(back_off, PLANNING))
+    assert [row[0] for row in table(root, 4)] == [R, R, R, S]
+
+
+@pytest.mark.parametrize(("cause", "expected"), [(EXECUTION, PLANNING), (Cause.ERROR, Cause.ERROR)])
+def test_when_all_remedies_fail_both_sentences_are_told(cause, expected):
+    root = recover(Leaf("go", PLANNING), remedy(Leaf("clear", cause), PLANNING))
+    assert [row[0] for row in table(root, 2)] == [R, F]
+    assert (root.cause, root.message) == (expected, "go 1; clear: clear 1")
+
+
+def test_a_new_start_counts_remedies_from_zero_and_forgets_what_attempts_shared():
+    board, clear = Board("alice"), Leaf("clear", S)
+    root = recover(Leaf("go", PLANNING), remedy(clear, PLANNING), forgets=("alice/tried",), board=board)
+    for number in (1, 2):
+        board.put("alice/tried", number)
+        while root.status != F:
+            root.tick_once()
+            assert ("alice/tried" in board) is False
+        assert (clear.begun, root.attempt) == (number, 2)
+        root.stop(N)
+
+
+def test_what_attempts_write_stays_from_one_to_the_next():
+    board = Board("alice")
+    root = recover(Leaf("go", PLANNING, S), remedy(Leaf("clear", S), PLANNING), forgets=("alice/tried",), board=board)
+    root.tick_once()
+    board.put("alice/tried", 1)
+    table(root, 2)
+    assert root.status == S
+    assert board.get("alice/tried") == 1
+
+
+def test_a_trigger_may_name_the_node_that_failed():
+    find, take = Leaf("find", S), Leaf("take", POST, S)
+    attempt = MemorySequence(path_id="alice/pick", name="pick", children=[find, take])
+    look, other = Leaf("look", S), Leaf("other", S)
+    root = recover(attempt, remedy(other, POST, node="alice/find"), remedy(look, POST, node="alice/take"))
+    assert [row[0] for row in table(root, 3)] == [R, R, S]
+    assert (look.begun, other.begun, find.begun) == (1, 0, 2)
+
+
+def test_a_trigger_may_want_the_nodes_own_failure():
+    below = MemorySequence(path_id="alice/guard", name="guard", children=[Leaf("go", EXECUTION)])
+    root = recover(below, remedy(Leaf("pick up", S), EXECUTION, node="alice/guard", own=True))
+    assert table(root, 1) == [(F, F, N)]
+
+
+def test_interrupted_it_says_so_and_begins_anew_afterwards():
+    attempt = Leaf("go", PLANNING, R)
+    root = recover(attempt, remedy(Leaf("clear", R), PLANNING))
+    table(root, 2)
+    root.stop(N)
+    assert (root.cause, [child.status for child in root.children]) == (Cause.CANCELLED, [F, N])
+    assert table(root, 1) == [(R, R, N)]
+    assert root.attempt == 1
+
+
+@pytest.mark.parametrize(("first", "status"), [((R, S), S), ((R, POST), F)])
+def test_what_tidies_up_runs_whatever_came_before_and_leaves_the_result(first, status):
+    # tick        root     first    then
+    root = Afterwards(path_id="alice/a", name="a", first=Leaf("look", *first), then=Leaf("stow", R, S))
+    assert table(root, 3) == [(R, R, N), (R, status, R), (status, status, S)]
+    assert root.message == "look 2"
+    assert root.cause == (POST if status == F else None)
+
+
+def test_tidying_up_only_after_a_failure_leaves_a_success_alone():
+    stow = Leaf("stow", S)
+    root = Afterwards(path_id="alice/a", name="a", first=Leaf("look", S), then=stow, after=frozenset({F}))
+    assert table(root, 1) == [(S, S, N)]
+
+
+def test_a_failure_to_tidy_up_is_told_but_changes_nothing():
+    root = Afterwards(path_id="alice/a", name="a", first=Leaf("look", S), then=Leaf("stow", PLANNING))
+    assert table(root, 1) == [(S, S, F)]
+    assert (root.cause, root.message) == (None, "look 1 (stow failed: stow 1)")
+
+
+def only_if_known(child, board):
+    return OnlyIfKnown(path_id="alice/again", name="again", child=child, key="alice/seen", board=board)
+
+
+def test_what_does_not_apply_is_passed_over_and_stays_idle():
+    board, again = Board("alice"), Leaf("again", POST)
+    root = MemorySelector(path_id="alice/f", name="f", children=[only_if_known(again, board), Leaf("there", POST)])
+    assert table(root, 1) == [(F, N, F)]
+    assert (root.cause, root.message) == (POST, "there 1")
+    board.put("alice/seen", 1)
+    assert table(root, 1) == [(F, F, F)]
+    assert again.begun == 1
+
+
+def test_a_selector_of_which_nothing_applies_fails():
+    root = MemorySelector(path_id="alice/f", name="f", children=[only_if_known(Leaf("again", S), Board("alice"))])
+    assert table(root, 1) == [(F, N)]
+    assert (root.cause, root.message) == (Cause.PRECONDITION, "nothing of it applies")
+
+
+@pytest.mark.parametrize(("holding", "status"), [(True, S), (False, F)])
+def test_a_way_may_apply_only_while_something_is_held(robot, holding, status):
+    robot.holding = holding
+    anyway = OnlyIfHolding(path_id="alice/h", name="h", child=Leaf("stow", S), robot=robot)
+    root = MemorySelector(path_id="alice/f", name="f", children=[Leaf("grasp", PLANNING), anyway])
+    root.tick_once()
+    assert (root.status, root.cause) == (status, None if holding else PLANNING)

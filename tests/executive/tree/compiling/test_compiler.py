@@ -1,0 +1,242 @@
+"""From commands to trees: which nodes, which ids, and what is refused."""
+
+import pytest
+
+from executive.mission.command import parse_command
+from executive.mission.errors import InputError
+from executive.run.outcome import Outcome
+from executive.tree.behaviours.board import FromBoard
+from executive.tree.compiler import Step, compile_commands
+from executive.tree.compiling.plans import AnswerPlan, HoldingPlan, RememberPosePlan, SkillPlan, Source
+from executive.tree.compiling.search import surfaces_to_search
+from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
+from skills.robot import Pose2D
+
+
+def skills_of(tree):
+    """The skills that run when all goes well."""
+    return [node for node in expected(tree.mission) if isinstance(node, SkillPlan)]
+
+
+def expected(plan):
+    yield plan
+    for child in plan.expected:
+        yield from expected(child)
+
+
+def port(node, name):
+    return dict(node.inputs)[name]
+
+
+def test_the_leaves_of_a_fetch_have_these_path_ids(compiled, make):
+    base = "alice/fetch-drink"
+    assert [node.path_id for node in compiled(*make.FETCH).mission.walk() if not node.children] == [
+        f"{base}/{rest}"
+        for rest in (
+            "remember-start",
+            "1-kitchen/find/again/detect",
+            *looked("1-kitchen/find/counter-1"),
+            *looked("1-kitchen/find/counter-2"),
+            *looked("1-kitchen/find/shelf-1"),
+            *looked("1-kitchen/find/elsewhere/bedside-table-1"),
+            "1-kitchen/approach",
+            "1-kitchen/grasp",
+            "1-kitchen/look-again",
+            "1-kitchen/plan-again",
+            "1-kitchen/around/clear-costmap",
+            "1-kitchen/around/back-off",
+            "1-kitchen/tidy/stow",
+            "1-kitchen/stow",
+            "1-kitchen/carry-as-it-is/settle",
+            *gone("2-start"),
+            *gone("2-start/nearby-1"),
+            *gone("2-start/nearby-2"),
+            *gone("2-start/nearby-3"),
+            "2-start/hand-over",
+            "2-start/carry-on/again/first/stow",
+            "2-start/carry-on/again/surfaces-near",
+            "2-start/carry-on/again/detect",
+            "2-start/carry-on/again/approach",
+            "2-start/carry-on/again/grasp",
+            "2-start/carry-on/again/look-again",
+            "2-start/carry-on/again/plan-again",
+            "2-start/carry-on/again/around/clear-costmap",
+            "2-start/carry-on/again/around/back-off",
+            "2-start/carry-on/again/tidy/stow",
+            "2-start/carry-on/again/stow",
+            "2-start/carry-on/again/carry-as-it-is/settle",
+        )
+    ]
+
+
+def gone(place):
+    return f"{place}/navigate", f"{place}/way/clear-costmap", f"{place}/way/back-off"
+
+
+def looked(place):
+    return *gone(place), f"{place}/detect"
+
+
+def test_every_mission_is_watched_in_order_of_priority(compiled, make):
+    tree = compiled(*make.FETCH)
+    watches = [node.path_id.rpartition("/")[2] for node in tree.root.children[:-1]]
+    assert watches == ["stop-button", "lease", "battery", "lost"]
+    assert (tree.root.path_id, tree.root.children[-1]) == ("alice/fetch-drink/watch", tree.mission)
+
+
+def test_compiling_twice_gives_equal_trees(compiled, make):
+    assert compiled(*make.FETCH) == compiled(*make.FETCH)
+
+
+def test_usual_surfaces_come_first_and_the_others_after(knowledge):
+    assert surfaces_to_search(knowledge, "drink", "kitchen") == ("counter", "shelf")
+    assert surfaces_to_search(knowledge, "hammer", "kitchen") == ("shelf", "counter")
+    assert surfaces_to_search(knowledge, "drink", None) == ("counter", "shelf", "bedside table")
+    assert surfaces_to_search(knowledge, "drink", "shelf") == ("shelf",)
+
+
+def test_a_category_is_looked_for_by_its_classes(compiled, make):
+    detect = next(node for node in skills_of(compiled(*make.FETCH)) if node.name == "detect")
+    assert port(detect, "classes").value == ("coke", "beer")
+
+
+def test_attributes_reach_the_detector(compiled):
+    tree = compiled("Take [Nothing] to [kitchen] and do [grasp] to [red hammer]")
+    detect = next(node for node in skills_of(tree) if node.name == "detect")
+    assert port(detect, "attributes").value == ("red",)
+
+
+def test_the_way_back_leads_to_the_remembered_pose_under_a_guard(compiled, make):
+    tree = compiled(*make.FETCH)
+    (guard,) = [node for node in tree.root.walk() if isinstance(node, HoldingPlan)]
+    (navigate,) = [node for node in skills_of(tree) if node.path_id.endswith("2-start/navigate")]
+    assert port(navigate, "goal") == FromBoard("alice/fetch-drink/start-pose")
+    assert navigate in list(guard.walk())
+
+
+def test_the_start_is_remembered_only_when_needed(compiled):
+    tree = compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")
+    assert not [node for node in tree.mission.walk() if isinstance(node, RememberPosePlan)]
+    assert port(skills_of(tree)[0], "goal").value == Pose2D(-4.0, 0.0, 0.0)
+
+
+def test_a_thing_is_put_on_any_surface_of_a_room(compiled):
+    tree = compiled("Take [coke] to [kitchen] and do [Nothing] to [Nothing]")
+    places = [node for node in skills_of(tree) if node.name == "place"]
+    assert [port(node, "surface").value.name for node in places] == ["shelf", "counter"]
+    assert "selector" in [node.kind for node in tree.mission.children[0].walk()]
+
+
+def test_placing_is_carrying(compiled):
+    texts = (
+        "Take [coke] to [shelf] and do [Nothing] to [Nothing]",
+        "Take [Nothing] to [shelf] and do [place] to [coke]",
+    )
+    first, second = (compiled(text).path_ids for text in texts)
+    assert first == second
+
+
+def test_a_person_gets_it_where_they_are_and_is_faced(compiled):
+    tree = compiled("Take [coke] to [Sam] and do [Nothing] to [Nothing]")
+    navigate, hand_over = skills_of(tree)
+    goal = port(navigate, "goal").value
+    assert (goal.x_m, goal.y_m, round(goal.yaw_rad, 4)) == (0.0, 4.0, 0.7854)
+    assert port(hand_over, "person").value == "Sam"
+
+
+def test_a_person_said_to_be_elsewhere_is_met_there(compiled):
+    tree = compiled("Take [coke] to [Sam at bedroom] and do [Nothing] to [Nothing]")
+    assert port(skills_of(tree)[0], "goal").value == Pose2D(-4.0, 0.0, 0.0)
+
+
+def test_the_person_at_the_start_is_named_when_known(compiled, make):
+    hand_over = skills_of(compiled(*make.FETCH))[-1]
+    assert port(hand_over, "person").value == "Robin"
+
+
+def test_a_status_check_names_every_look(compiled):
+    tree = compiled("Take [Nothing] to [kitchen] and do [find] to [drink]", name="check")
+    (answer,) = [node for node in tree.root.walk() if isinstance(node, AnswerPlan)]
+    base = "alice/check/1-kitchen/search"
+    assert answer.looks == (
+        ("counter", (f"{base}/counter-1/detect", f"{base}/counter-2/detect")),
+        ("shelf", (f"{base}/shelf-1/detect",)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("asked", "seen_on", "answer", "told"),
+    [
+        (
+            "some coke",
+            ("counter", "shelf"),
+            True,
+            "yes: cokes in the kitchen; there are two cokes on the counter and",
+        ),
+        ("2 coke", ("counter", "shelf"), True, "yes: two cokes in the kitchen; there are two cokes"),
+        ("2 coke", ("shelf",), False, "no: two cokes in the kitchen; there is one coke on the shelf"),
+        ("some coke", (), False, "no: cokes in the kitchen"),
+    ],
+)
+def test_things_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, script, asked, seen_on, answer, told):
+    def look(skill):
+        (surface,) = skill.inputs.surfaces
+        if surface.name not in seen_on:
+            return Failed(Cause.POSTCONDITION, "not seen")
+        x_m, y_m = surface.polygon_W[0]
+        seen = ObjectObservation(0.0, Thing("coke"), (x_m, y_m, 1.0), (0.1, 0.1, 0.1), 0.0, 0.9, surface.name)
+        return Succeeded("seen", {"observation": seen, "observations": (seen,)})
+
+    script.ends["detect"] = look
+    worst = run_tree(compiled(f"Take [Nothing] to [kitchen] and do [find] to [{asked}]")).worst
+    assert (worst.outcome, list(worst.answers.values())) == (Outcome.SUCCESS, [answer])
+    assert worst.message.startswith(told)
+    assert script.begun.count("detect") == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "Take [Nothing] to [kichen] and do [grasp] to [coke]",
+            "the place 'kichen' is not known.*did you mean 'kitchen'",
+        ),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [unicorn]", "the thing 'unicorn' is not known.*known are"),
+        ("Take [Nothing] to [bathroom] and do [grasp] to [coke]", "no surface to look at"),
+        ("Take [coke] to [bathroom] and do [Nothing] to [Nothing]", "no surface to put the coke on"),
+        ("Take [Nothing] to [Nothing] and do [Nothing] to [Nothing]", "asks for nothing"),
+        ("Take [coke] to [Nothing] and do [Nothing] to [Nothing]", "not said where"),
+        ("Take [coke] to [kitchen] and do [grasp] to [beer]", "one gripper"),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [2 coke]", "2 of 'coke' cannot be carried in one go"),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [some coke]", "cannot be carried in one go|is no"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_a_reason(compiled, text, words):
+    with pytest.raises((InputError, ValueError), match=words):
+        compiled(text)
+
+
+def test_refusals_name_the_line(knowledge, registry, tmp_path):
+    command = parse_command("Take [Nothing] to [moon] and do [Nothing] to [Nothing]")
+    step = Step(command, Source(tmp_path / "m.yaml", 7))
+    with pytest.raises(InputError, match=r"m\.yaml:7: the place 'moon'"):
+        compile_commands("m", [step], knowledge=knowledge, registry=registry, robot_name="Alice")
+
+
+def test_nodes_keep_their_line(knowledge, registry, tmp_path):
+    source = Source(tmp_path / "m.yaml", 4)
+    command = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
+    tree = compile_commands("m", [Step(command, source)], knowledge=knowledge, registry=registry, robot_name="Alice")
+    assert {node.source for node in tree.mission.children[0].walk()} == {source}
+
+
+def test_an_absent_skill_and_an_empty_mission_are_refused(knowledge, registry):
+    command = parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")
+    with pytest.raises(InputError, match="no skill 'navigate'"):
+        compile_commands("m", [Step(command)], knowledge=knowledge, registry={}, robot_name="Alice")
+    with pytest.raises(InputError, match="no commands"):
+        compile_commands("m", [], knowledge=knowledge, registry=registry, robot_name="Alice")
+
+
+def test_a_mission_of_a_hundred_steps_compiles(compiled, make):
+    assert len(compiled(*(make.FETCH * 50)).mission.children) == 101

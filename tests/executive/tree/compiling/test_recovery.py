@@ -1,0 +1,304 @@
+"""Recovery in compiled trees, with scripted skills that fail as told: chosen by cause, bounded, nothing leaks."""
+
+import pytest
+
+from executive.run.outcome import Outcome
+from executive.run.runner import RunSettings
+from executive.tree.compiling.interrupts import BatteryPlan, LostPlan
+from executive.tree.compiling.search import surfaces_elsewhere
+from skills.api import Cause, Failed, Succeeded
+from skills.robot import Pose2D
+
+GO = "Take [Nothing] to [hall] and do [Nothing] to [Nothing]"
+GRASP = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
+FIND = "Take [Nothing] to [kitchen] and do [find] to [coke]"
+PUT = "Take [coke] to [bedroom] and do [Nothing] to [Nothing]"
+STOWED = ["stow"]
+
+
+def held(skill):
+    """The grasp works."""
+    skill.context.robot._robot.holding = True
+    return Succeeded("held", {"tried": (*skill.inputs.avoid, len(skill.inputs.avoid) + 1)})
+
+
+class Script1:
+    """Ends of one skill in order, then its usual end."""
+
+    def __init__(self, script, name, *causes, then=None):
+        self.left, self.name, self.inputs = list(causes), name, []
+        usual = then or (held if name == "grasp" else lambda skill: Succeeded("done"))
+
+        def end(skill):
+            self.inputs.append(skill.inputs)
+            cause = self.left.pop(0) if self.left else None
+            return usual(skill) if cause is None else Failed(cause, f"{name} {cause.value}")
+
+        script.ends[name] = end
+
+
+@pytest.fixture
+def fails(script):
+    """Let a skill fail with causes, then work."""
+    return lambda name, *causes, then=None: Script1(script, name, *causes, then=then)
+
+
+# ---- planning blocked
+
+
+@pytest.mark.parametrize("cause", [Cause.PLANNING, Cause.EXECUTION])
+def test_a_blocked_way_is_seen_anew_then_backed_off_from(compiled, run_tree, script, fails, cause):
+    fails("navigate", cause, cause)
+    assert run_tree(compiled(GO)).outcome is Outcome.SUCCESS
+    assert script.begun == ["navigate", "clear_costmap", "navigate", "back_off", "navigate"]
+
+
+@pytest.mark.parametrize("cause", [Cause.PRECONDITION, Cause.POSTCONDITION, Cause.TIMEOUT, Cause.ERROR])
+def test_other_failures_to_go_somewhere_need_no_other_costmap(compiled, run_tree, script, fails, cause):
+    fails("navigate", *[cause] * 9)
+    assert run_tree(compiled(GO)).worst.cause in (cause, Cause.POSTCONDITION)
+    assert {"clear_costmap", "back_off"}.isdisjoint(script.begun)
+
+
+def test_a_pose_nearby_will_do_when_there_is_no_way_to_the_goal(compiled, run_tree, fails):
+    navigate = fails("navigate", *[Cause.PLANNING] * 3)
+    assert run_tree(compiled(GO)).outcome is Outcome.SUCCESS
+    assert [inputs.goal for inputs in navigate.inputs[:3]] == [Pose2D(0.0, 0.0, 0.0)] * 3
+    assert navigate.inputs[3].goal == Pose2D(-0.5, 0.0, 0.0)
+
+
+def test_going_is_given_up_after_all_poses_nearby(compiled, run_tree, script, fails):
+    fails("navigate", *[Cause.PLANNING] * 99)
+    worst = run_tree(compiled(GO)).worst
+    assert (worst.outcome, worst.cause) == (Outcome.FAILURE, Cause.PLANNING)
+    assert script.begun.count("navigate") == 3 * 4
+    assert script.begun.count("clear_costmap") == script.begun.count("back_off") == 4
+
+
+# ---- not seen
+
+
+def test_what_is_not_seen_is_looked_for_from_aside_and_elsewhere(compiled, run_tree, fails, script):
+    script.seen_on = ("bedside table",)
+    tree = compiled(GRASP)
+    navigate = fails("navigate")
+    assert run_tree(tree).outcome is Outcome.SUCCESS
+    goals = [(inputs.goal.x_m, inputs.goal.y_m) for inputs in navigate.inputs]
+    assert goals == [(4.5, -1.0), (5.0, -0.5), (4.5, 1.0), (-4.5, 1.0)]
+
+
+def test_a_status_check_looks_only_where_it_was_asked_to(compiled, run_tree, script):
+    script.seen_on = ("bedside table",)
+    tree = compiled(FIND)
+    worst = run_tree(tree).worst
+    assert (worst.outcome, list(worst.answers.values())) == (Outcome.SUCCESS, [False])
+    assert script.begun[-1] == "stow"
+
+
+def test_places_elsewhere_are_few_and_the_usual_ones_first(knowledge):
+    assert surfaces_elsewhere(knowledge, "coke", "bedroom") == ("counter", "shelf")
+    assert surfaces_elsewhere(knowledge, "coke", "shelf") == ("counter", "bedside table")
+    assert surfaces_elsewhere(knowledge, "coke", None) == ()
+
+
+def test_in_a_good_run_no_node_fails(compiled, run_tree, make, published):
+    assert run_tree(compiled(*make.FETCH)).outcome is Outcome.SUCCESS
+    changes = [message for topic, message in published if topic == "transitions"]
+    assert not [change for change in changes if change["to"] == "FAILURE"]
+
+
+def test_after_a_failed_search_the_arm_is_stowed(compiled, run_tree, script):
+    script.seen_on = ()
+    assert run_tree(compiled(GRASP)).worst.cause is Cause.PRECONDITION
+    assert script.begun[-1] == "stow"
+
+
+# ---- standing before it, and grasping
+
+
+def test_a_grasp_that_slips_is_followed_by_another_grasp(compiled, run_tree, script, fails):
+    def slips(skill):
+        tried = (*skill.inputs.avoid, len(skill.inputs.avoid) + 1)
+        return Failed(Cause.POSTCONDITION, "slipped", {"tried": tried}) if len(tried) < 3 else held(skill)
+
+    grasp = fails("grasp", then=slips)
+    assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS
+    assert [inputs.avoid for inputs in grasp.inputs] == [(), (1,), (1, 2)]
+    assert script.begun.count("navigate") == 1
+
+
+def test_what_was_tried_is_forgotten_when_the_step_begins_anew(compiled, run_tree, fails):
+    def slips(skill):
+        skill.context.robot._robot.holding = False
+        return Failed(Cause.POSTCONDITION, "slipped", {"tried": (*skill.inputs.avoid, 1)})
+
+    grasp = fails("grasp", then=slips)
+    tree = compiled(GRASP, name="first")
+    run_tree(tree)
+    count = len(grasp.inputs)
+    run_tree(tree)
+    assert [inputs.avoid for inputs in grasp.inputs[count:]] == [inputs.avoid for inputs in grasp.inputs[:count]]
+    assert grasp.inputs[count].avoid == ()
+
+
+def test_no_way_to_grasp_looks_again_first_then_backs_off(compiled, run_tree, script, fails):
+    fails("grasp", Cause.PLANNING, Cause.PLANNING)
+    assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS
+    round_ = ["approach", "grasp"]
+    assert script.begun == ["navigate", "detect", *round_, "detect", *round_, "back_off", "detect", *round_, *STOWED]
+
+
+def test_no_place_to_stand_sees_anew_what_stands_around_then_backs_off(compiled, run_tree, script, fails, make):
+    fails("approach", Cause.PLANNING, Cause.PLANNING, then=lambda skill: Succeeded("near", {"observation": make.COKE}))
+    assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS
+    again = ["detect", "approach"]
+    assert script.begun[2:] == ["approach", "clear_costmap", *again, "back_off", *again, "grasp", *STOWED]
+
+
+@pytest.mark.parametrize("cause", [Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION])
+def test_grasping_is_bounded(compiled, run_tree, script, fails, cause):
+    fails("grasp", *[cause] * 99)
+    worst = run_tree(compiled(GRASP)).worst
+    assert (worst.outcome, worst.cause) == (Outcome.FAILURE, cause)
+    assert script.begun.count("grasp") == 3
+    assert script.begun[-1] == "stow"
+
+
+def test_all_remedies_together_are_bounded(compiled, run_tree, script, fails):
+    causes = [Cause.POSTCONDITION, Cause.PLANNING] * 20
+    fails("grasp", *causes)
+    assert run_tree(compiled(GRASP)).outcome is Outcome.FAILURE
+    assert script.begun.count("grasp") == 4
+
+
+def test_a_failed_stow_after_a_good_grasp_is_tried_once_more(compiled, run_tree, script, fails):
+    fails("stow", Cause.PLANNING)
+    assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS
+    assert script.begun[-3:] == ["grasp", "stow", "stow"]
+
+
+def test_an_arm_that_cannot_be_drawn_in_does_not_lose_what_is_held(compiled, run_tree, script, fails, robot):
+    fails("stow", *[Cause.PLANNING] * 9)
+    assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS
+    assert (script.begun.count("stow"), script.begun.count("grasp"), robot.holding) == (2, 1, True)
+
+
+# ---- dropped while carrying
+
+
+class Loses:
+    """Loses the thing at a time, and puts the robot beside a surface or nowhere."""
+
+    def __init__(self, robot, at_s):
+        self.robot, self.at_s = robot, at_s
+
+    def __call__(self, progress):
+        if self.at_s is not None and progress.now_s > self.at_s:
+            self.robot.holding, self.at_s = False, None
+
+
+def test_a_thing_lost_near_a_surface_is_picked_up_again(compiled, run_tree, script, robot, knowledge):
+    script.steps, robot.holding = 40, True
+    script.seen_on = ("bedside table",)
+    robot.standing = Pose2D(-4.5, 0.5, 0.0)
+    worst = run_tree(compiled(PUT), observer=Loses(robot, 0.5)).worst
+    assert worst.outcome is Outcome.SUCCESS, worst.message
+    again = ["stow", "detect", "approach", "grasp", "stow"]
+    assert script.begun == ["navigate", *again, "navigate", "place"]
+
+
+def test_a_thing_lost_near_a_surface_but_not_on_it_is_a_failure_that_says_so(compiled, run_tree, script, robot):
+    script.steps, robot.holding, script.seen_on = 40, True, ()
+    robot.standing = Pose2D(-4.5, 0.5, 0.0)
+    worst = run_tree(compiled(PUT), observer=Loses(robot, 0.5)).worst
+    assert (worst.outcome, worst.cause) == (Outcome.FAILURE, Cause.EXECUTION)
+    assert "lost on the way" in worst.message
+    assert "floor" in worst.message
+    assert script.begun.count("detect") == 1
+
+
+def test_failing_to_get_there_with_the_thing_still_held_is_not_a_drop(compiled, run_tree, script, robot, fails):
+    robot.holding = True
+    fails("navigate", *[Cause.EXECUTION] * 99)
+    assert run_tree(compiled(PUT)).worst.cause is Cause.EXECUTION
+    assert "detect" not in script.begun
+
+
+# ---- interrupts
+
+
+def test_a_low_battery_sends_it_to_the_dock_and_back_and_the_mission_goes_on(compiled, run_tree, script, robot, fails):
+    def charged(skill):
+        robot.charge = skill.inputs.level
+        return Succeeded("charged")
+
+    script.ends["charge"] = charged
+    navigate = fails("navigate")
+    robot.charge, robot.standing = 0.1, Pose2D(1.0, 0.5, 0.0)
+    assert run_tree(compiled(GO)).outcome is Outcome.SUCCESS
+    assert script.begun == ["stow", "navigate", "charge", "navigate", "navigate"]
+    goals = [inputs.goal for inputs in navigate.inputs]
+    assert goals == [Pose2D(0.0, -1.0, 0.0), Pose2D(1.0, 0.5, 0.0), Pose2D(0.0, 0.0, 0.0)]
+
+
+def test_the_mission_is_taken_up_where_it_was(compiled, run_tree, script, robot, make):
+    script.ends["charge"] = lambda skill: (setattr(robot, "charge", 0.9), Succeeded("charged"))[1]
+
+    def runs_down(progress):
+        if progress.states["Alice"]["alice/fetch-drink/1-kitchen/approach"].status.value == "RUNNING":
+            robot.charge = min(robot.charge, 0.1) if "charge" not in script.begun else robot.charge
+
+    assert run_tree(compiled(*make.FETCH), observer=runs_down).outcome is Outcome.SUCCESS
+    before, interrupt = ["navigate", "detect", "approach"], ["stow", "navigate", "charge", "navigate"]
+    assert script.begun == [*before, *interrupt, "approach", "grasp", "stow", "navigate", "hand_over"]
+
+
+def test_where_it_does_not_charge_it_backs_off_and_docks_again_three_times_at_most(compiled, run_tree, script, robot):
+    script.ends["charge"] = lambda skill: Failed(Cause.POSTCONDITION, "it does not charge here")
+    robot.charge = 0.1
+    worst = run_tree(compiled(GO)).worst
+    assert (worst.outcome, worst.cause) == (Outcome.FAILURE, Cause.POSTCONDITION)
+    assert (script.begun.count("charge"), script.begun.count("back_off")) == (3, 2)
+    assert worst.message.startswith("the battery is at 10%, less than 15%: it does not charge here")
+
+
+def test_a_lost_place_is_found_again_and_the_mission_goes_on(compiled, run_tree, script, lost_runs):
+    script.steps = 120
+    worst, localiser = lost_runs(compiled(GO))
+    assert worst.outcome is Outcome.SUCCESS, worst.message
+    assert script.begun == ["navigate", "relocalise", "navigate"]
+    assert localiser.localised
+
+
+def test_a_place_that_is_not_found_again_ends_the_mission_and_says_why(compiled, script, lost_runs):
+    script.steps = 120
+    script.ends["relocalise"] = lambda skill: Failed(Cause.POSTCONDITION, "no place on the map fits")
+    worst, _ = lost_runs(compiled(GO))
+    assert (worst.outcome, worst.cause) == (Outcome.FAILURE, Cause.POSTCONDITION)
+    assert worst.message == "the robot does not know where it is: no place on the map fits"
+
+
+@pytest.fixture
+def lost_runs(clock, robot, script, make, run_tree):
+    """Run a tree whose localiser gets lost after a second, until `relocalise` has worked."""
+
+    def go(tree):
+        localiser = make.StillLocaliser()
+        script.ends.setdefault(
+            "relocalise", lambda skill: (setattr(localiser, "localised", True), Succeeded("found"))[1]
+        )
+
+        def loses(progress):
+            if progress.now_s > 1.0 and "relocalise" not in script.begun:
+                localiser.localised = False
+
+        return run_tree(tree, observer=loses, localiser=localiser).worst, localiser
+
+    return go
+
+
+def test_thresholds_come_from_the_knowledge(compiled, knowledge, registry):
+    (battery,) = [node for node in compiled(GO).root.walk() if isinstance(node, BatteryPlan)]
+    (lost,) = [node for node in compiled(GO).root.walk() if isinstance(node, LostPlan)]
+    assert (battery.low, battery.dock) == (0.15, Pose2D(0.0, -1.0, 0.0))
+    assert lost.patience_s < RunSettings().time_limit_s

@@ -1,0 +1,72 @@
+"""Several things by count: one trip for each."""
+
+import pytest
+
+from executive.cli.promises import promises_of
+from executive.mission.errors import InputError
+from executive.run.outcome import Outcome
+from executive.tree.behaviours.board import Constant
+from executive.tree.compiling.plans import SkillPlan
+from plant.referee import PromiseKind
+from skills.api import Succeeded
+
+TWO = (
+    "Take [Nothing] to [kitchen] and do [grasp] to [2 drink]",
+    "Take [2 drink] to [bedside table] and do [Nothing] to [Nothing]",
+)
+BASE = "alice/fetch-drink/1-kitchen"
+
+
+def test_two_things_are_two_trips(compiled):
+    ids = compiled(*TWO).path_ids
+    assert {f"{BASE}/trip-1/get", f"{BASE}/trip-1/bring", f"{BASE}/trip-2/get", f"{BASE}/trip-2/bring"} <= set(ids)
+    assert not any("/trip-3" in path_id for path_id in ids)
+
+
+def test_what_was_brought_is_not_looked_for_again(compiled):
+    finds = [
+        node for node in compiled(*TWO).root.walk() if isinstance(node, SkillPlan) and "/get/find/" in node.path_id
+    ]
+    bound = [dict(node.inputs)["surfaces"] for node in finds if node.name == "detect"]
+    named = {surface.name for binding in bound if isinstance(binding, Constant) for surface in binding.value}
+    assert named == {"counter", "shelf"}
+
+
+def test_each_trip_grasps_and_puts_down(compiled, run_tree, script, robot):
+    def place(skill):
+        skill.context.robot._robot.holding = False
+        return Succeeded("put down")
+
+    script.ends["place"] = place
+    result = run_tree(compiled(*TWO)).robots[0]
+    assert result.outcome is Outcome.SUCCESS
+    assert (script.begun.count("grasp"), script.begun.count("place")) == (2, 2)
+
+
+def test_the_promise_is_one_of_two_things(compiled, run_tree, knowledge, script):
+    tree = compiled(*TWO)
+    grasped, placed = promises_of(tree, knowledge=knowledge, result=run_tree(tree).robots[0])
+    assert (grasped.kind, grasped.count, placed.kind, placed.count) == (PromiseKind.GRASPED, 2, PromiseKind.PLACED, 2)
+
+
+@pytest.mark.parametrize(
+    ("get", "bring", "says"),
+    [
+        ("Take [Nothing] to [kitchen] and do [grasp] to [2 drink]", "Take [2 drink] to [Sam]", "cannot be handed over"),
+        (
+            "Take [Nothing] to [kitchen] and do [grasp] to [2 drink]",
+            "Take [2 drink] to [start]",
+            "cannot be handed over",
+        ),
+        ("Take [Nothing] to [Nothing] and do [grasp] to [2 drink]", "Take [2 drink] to [bedroom]", "where to take"),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [2 drink]", "Take [2 drink] to [shelf]", "cannot be told from"),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [99 drink]", "Take [99 drink] to [bedroom]", "too many trips"),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [2 drink]", "Take [3 drink] to [bedroom]", "in one go"),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [2 drink]", "Take [2 coke] to [bedroom]", "in one go"),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [some drink]", "Take [some drink] to [bedroom]", "open number"),
+    ],
+)
+def test_what_no_trips_can_be_made_of_is_refused(compiled, get, bring, says):
+    with pytest.raises(InputError, match=says) as error:
+        compiled(get, f"{bring} and do [Nothing] to [Nothing]")
+    assert error.value.mend

@@ -1,0 +1,73 @@
+"""Ports are checked before any tick."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import pytest
+
+from executive.mission.errors import InputError
+from executive.tree.behaviours.board import Constant, FromBoard
+from executive.tree.compiling.plans import SequencePlan, SkillPlan
+from executive.tree.compiling.wiring import check_wiring
+from skills.api import Skill, Succeeded
+
+
+@dataclass(frozen=True)
+class Inputs:
+    speed: float
+    names: tuple[str, ...] = ()
+    note: str | None = None
+
+
+class Wired(Skill[Inputs]):
+    name = "wired"
+    Inputs: ClassVar[type] = Inputs
+    outputs: ClassVar[dict[str, type]] = {"count": int, "word": str}
+
+    def begin(self, inputs: Inputs) -> None:
+        pass
+
+    def step(self) -> Succeeded:
+        return Succeeded("done")
+
+
+def plan(inputs: dict[str, Any], outputs: dict[str, str] | None = None, path_id: str = "a/wired") -> SkillPlan:
+    bound = tuple((k, v if isinstance(v, FromBoard) else Constant(v)) for k, v in inputs.items())
+    outs = tuple((outputs or {}).items())
+    return SkillPlan(path_id=path_id, name="wired", skill=Wired, inputs=bound, outputs=outs, limit_s=1.0)
+
+
+def check(*nodes: SkillPlan) -> None:
+    check_wiring(SequencePlan(path_id="a", name="a", steps=nodes))
+
+
+def test_good_wiring_passes():
+    writer = plan({"speed": 1}, {"count": "a/count"}, "a/1")
+    check(writer, plan({"speed": FromBoard("a/count"), "names": ("x",), "note": None}, path_id="a/2"))
+
+
+@pytest.mark.parametrize(
+    ("inputs", "words"),
+    [
+        ({}, "input port 'speed' has no value; give it a float"),
+        ({"speed": "fast"}, "input port 'speed' got 'fast'"),
+        ({"speed": True}, "input port 'speed' got True"),
+        ({"speed": 1.0, "names": ("x", 3)}, "input port 'names'"),
+        ({"speed": 1.0, "name": "x"}, "no input port 'name'; did you mean 'names'?"),
+        ({"speed": FromBoard("a/later")}, "reads 'a/later', which nothing before it writes"),
+        ({"speed": FromBoard("a/word")}, "reads 'a/word', a str"),
+    ],
+)
+def test_bad_inputs_are_refused_with_the_node(inputs, words):
+    writer = plan({"speed": 1.0}, {"word": "a/word"}, "a/0")
+    with pytest.raises(InputError) as refusal:
+        check(writer, plan(inputs), plan({"speed": 1.0}, {"count": "a/later"}, "a/9"))
+    assert words in str(refusal.value)
+    assert "a/wired" in str(refusal.value)
+
+
+def test_unknown_outputs_and_doubled_path_ids_are_refused():
+    with pytest.raises(InputError, match="no output port 'sum'; known: count, word"):
+        check(plan({"speed": 1.0}, {"sum": "a/sum"}))
+    with pytest.raises(InputError, match="two nodes have this path id"):
+        check(plan({"speed": 1.0}), plan({"speed": 1.0}))

@@ -1,0 +1,173 @@
+"""What speaks against a mission before it runs, and what it will take."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from executive.mission.command import parse_command
+from executive.mission.mission import Mission, MissionStep, SkillCall
+from executive.tree.check import Abilities, PlannedWays, check_tree
+from executive.tree.compiler import compile_mission
+from executive.tree.compiling.plans import Source
+from executive.tree.estimate import Way, load_estimates
+from skills.estimate.costmap import LayeredCostmap
+from skills.estimate.grid_map import GridMap
+from skills.navigate.footprint import Footprint
+from skills.robot import Pose2D
+
+START = Pose2D(0.0, 0.0, 0.0)
+MASSES = {"coke": 0.35, "beer": 0.55, "hammer": 0.5}
+ABLE = Abilities(MASSES, 5.0, frozenset(MASSES), frozenset({"red"}))
+GET = "Take [Nothing] to [kitchen] and do [grasp] to [{}]"
+GO = "Take [Nothing] to [{}] and do [Nothing] to [Nothing]"
+ONLY_COKE = {"classes": frozenset({"coke"})}
+
+
+class StraightWays:
+    """Ways as the crow flies; there is none to what lies beyond `far_m` in x."""
+
+    def __init__(self, far_m=99.0):
+        self.far_m, self.asked = far_m, []
+
+    def way(self, start, goal):
+        self.asked.append((start, goal))
+        if goal.x_m > self.far_m:
+            raise ValueError(f"There is no way to ({goal.x_m:.2f}, {goal.y_m:.2f}).")
+        length_m = ((goal.x_m - start.x_m) ** 2 + (goal.y_m - start.y_m) ** 2) ** 0.5
+        return Way(length_m, length_m)
+
+
+@pytest.fixture
+def check(knowledge, registry, tmp_path):
+    """Check commands given as texts, or skill calls, each on a line of its own."""
+
+    def check_it(*steps, ways=None, abilities=ABLE):
+        made = []
+        for line, one in enumerate(steps, start=1):
+            source = Source(tmp_path / "m.yaml", line)
+            command = (parse_command(one),) if isinstance(one, str) else ()
+            made.append(MissionStep(command, source, skill=None if command else one))
+        mission = Mission("m", "flat", "Alice", tuple(made))
+        tree = compile_mission(mission, knowledge=knowledge, registry=registry)
+        return check_tree(
+            tree,
+            knowledge=knowledge,
+            start=START,
+            abilities=abilities,
+            itinerary=ways or StraightWays(),
+            estimates=load_estimates(),
+        )
+
+    return check_it
+
+
+def told(checked):
+    return [(error.line, error.message) for error in checked.errors]
+
+
+def test_a_good_mission_has_no_errors_and_an_estimate(check, make):
+    checked = check(*make.FETCH)
+    assert checked.errors == ()
+    assert 50 < checked.estimate.duration_s < 120
+    assert checked.estimate.distance_m == pytest.approx(2 * 4.6, abs=0.5)
+    assert 0.001 < checked.estimate.charge < 0.02
+
+
+def test_time_and_charge_follow_from_the_way(check):
+    near = check("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]").estimate
+    drive, use = load_estimates().drive, load_estimates().battery
+    assert near.distance_m == 4.0
+    assert near.duration_s == pytest.approx(drive.overhead_s + 4.0 * drive.per_metre_s)
+    assert near.charge == pytest.approx(near.duration_s * use.driving_per_s)
+
+
+def test_each_way_begins_where_the_last_one_ended(check):
+    ways = StraightWays()
+    check(
+        *(f"Take [Nothing] to [{room}] and do [Nothing] to [Nothing]" for room in ("kitchen", "bedroom", "start")),
+        ways=ways,
+    )
+    assert [(round(a.x_m), round(b.x_m)) for a, b in ways.asked] == [(0, 4), (4, -4), (-4, 0)]
+
+
+def test_a_place_out_of_reach_is_refused_at_its_line(check):
+    checked = check(GO.format("bedroom"), GO.format("kitchen"), ways=StraightWays(far_m=1.0))
+    ((line, message),) = told(checked)
+    assert (line, "no way to" in message) == (2, True)
+    assert checked.errors[0].mend
+
+
+def test_a_search_goes_on_when_one_surface_is_out_of_reach(check):
+    checked = check(GET.format("coke"), ways=StraightWays(far_m=4.6))
+    assert checked.errors == ()
+
+
+def test_a_count_goes_to_all_surfaces_that_can_be_reached(check):
+    asked = "Take [Nothing] to [kitchen] and do [find] to [{}coke]"
+    near, every = StraightWays(far_m=4.6), StraightWays()
+    assert check(asked.format("some "), ways=near).errors == ()
+    assert check(asked.format("some "), ways=every).errors == check(asked.format(""), ways=StraightWays()).errors
+    assert len(every.asked) == 3
+
+
+def test_a_raw_pose_out_of_reach_is_refused(check):
+    call = SkillCall("navigate", {"x": 50.0, "y": 0.0})
+    ((line, message),) = told(check(call, ways=StraightWays(far_m=9.0)))
+    assert (line, "50.00" in message) == (1, True)
+
+
+@pytest.mark.parametrize(
+    ("text", "abilities", "says"),
+    [
+        (
+            GET.format("hammer"),
+            {"masses_kg": {"coke": 0.3}},
+            "no 'hammer' that could",
+        ),
+        (GET.format("hammer"), {"lift_kg": 0.4}, "'hammer' is too heavy: 0.5 kg"),
+        (
+            GET.format("drink"),
+            ONLY_COKE,
+            "what beer looks like",
+        ),
+        (
+            "Take [Nothing] to [kitchen] and do [find] to [drink]",
+            ONLY_COKE,
+            "what beer looks like",
+        ),
+        (GET.format("blue coke"), {}, "what blue looks like"),
+    ],
+)
+def test_what_cannot_be_seen_or_lifted_is_refused(check, text, abilities, says):
+    ((line, message),) = told(check(text, abilities=replace(ABLE, **abilities)))
+    assert (line, says in message) == (1, True), message
+
+
+@pytest.mark.parametrize(
+    ("text", "abilities"),
+    [
+        (GET.format("drink"), {"lift_kg": 0.4}),
+        ("Take [Nothing] to [kitchen] and do [find] to [hammer]", {"masses_kg": {}}),
+    ],
+)
+def test_one_light_enough_will_do_and_a_look_needs_no_lifting(check, text, abilities):
+    assert check(text, abilities=replace(ABLE, **abilities)).errors == ()
+
+
+@pytest.fixture
+def walled():
+    """A room of 4 m by 4 m with a wall in the middle that has no door."""
+    occupied = [[x in (0, 79, 40) or y in (0, 79) for x in range(80)] for y in range(80)]
+    return LayeredCostmap(GridMap(np.array(occupied), 0.05, (-2.0, -2.0)))
+
+
+def test_ways_are_planned_on_the_map_for_the_whole_body(walled):
+    ways = PlannedWays(walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]))
+    here = Pose2D(-1.0, -1.0, 0.0)
+    assert ways.way(here, Pose2D(-1.0, 1.0, 0.0)).length_m == pytest.approx(2.0, abs=0.3)
+    for _ in range(2):
+        with pytest.raises(ValueError, match="no way"):
+            ways.way(here, Pose2D(1.0, 1.0, 0.0))
+    with pytest.raises(ValueError, match="blocked"):
+        ways.way(here, Pose2D(-1.9, 1.0, 0.0))

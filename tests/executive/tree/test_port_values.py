@@ -1,0 +1,139 @@
+"""YAML values become what the ports of skills take."""
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from executive.tree.port_values import PortValueError, gathered, port_value
+from skills.api import ObjectObservation, Surface, Thing
+from skills.robot import Pose2D
+
+
+class Side(enum.Enum):
+    LEFT = "left"
+    RIGHT = "right"
+
+
+@dataclass(frozen=True)
+class Drive:
+    goal: Pose2D
+    max_speed_m_s: float = 0.8
+
+
+@dataclass(frozen=True)
+class Two:
+    first: Pose2D
+    second: Pose2D
+
+
+@dataclass(frozen=True)
+class Positive:
+    size_m: float
+
+    def __post_init__(self):
+        if self.size_m <= 0:
+            raise ValueError("size_m must be above 0")
+
+
+@pytest.mark.parametrize(
+    ("value", "hint", "made"),
+    [
+        (3, int, 3),
+        (3, float, 3.0),
+        (True, bool, True),
+        ("x", str, "x"),
+        (None, str | None, None),
+        ("x", str | None, "x"),
+        ([1, 2], tuple[int, ...], (1, 2)),
+        ([1, "a"], tuple[int, str], (1, "a")),
+        ([], tuple[str, ...], ()),
+        ("left", Side, Side.LEFT),
+        ({"a": 1}, Mapping[str, int], {"a": 1}),
+        ({"x": 1, "y": 2, "yaw": 0.5}, Pose2D, Pose2D(1.0, 2.0, 0.5)),
+        ({"x_m": 1, "y_m": 2}, Pose2D, Pose2D(1.0, 2.0, 0.0)),
+        ("bedroom", Pose2D, Pose2D(-4.0, 0.0, 0.0)),
+        ("red hammer", Thing, Thing("hammer", ("red",))),
+        ({"name": "hammer", "attributes": ["red"]}, Thing, Thing("hammer", ("red",))),
+        (7, Any, 7),
+        ({"size": 2}, Positive, Positive(2.0)),
+    ],
+)
+def test_a_value_becomes_the_type_of_its_port(knowledge, value, hint, made):
+    assert port_value(value, hint, knowledge) == made
+
+
+def test_a_surface_is_named(knowledge):
+    shelf = port_value("Shelf", Surface, knowledge)
+    assert (shelf.name, shelf.height_m) == ("shelf", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "names"), [("kitchen", ["shelf", "counter"]), ("counter", ["counter"]), (["counter", "shelf"], None)]
+)
+def test_several_surfaces_are_named_by_their_room_or_in_a_list(knowledge, value, names):
+    surfaces = port_value(value, tuple[Surface, ...], knowledge)
+    assert [surface.name for surface in surfaces] == (names or value)
+
+
+def test_a_record_of_records(knowledge):
+    values = {
+        "stamp": 0.0, "thing": "coke", "position_W": [1, 2, 0.9], "size": [0.1, 0.1, 0.1], "yaw": 0, "score": 1,
+    }  # fmt: skip
+    seen = port_value(values, ObjectObservation, knowledge)
+    assert (seen.thing, seen.position_W, seen.surface) == (Thing("coke"), (1.0, 2.0, 0.9), None)
+
+
+@pytest.mark.parametrize(
+    ("value", "hint", "path", "says"),
+    [
+        ("3", int, (), "a whole number"),
+        (True, int, (), "a whole number"),
+        (1, bool, (), "true or false"),
+        (float("nan"), float, (), "a number"),
+        ("1.0", float, (), "a number"),
+        (3, str, (), "a text"),
+        ("abc", tuple[str, ...], (), "a list"),
+        ([1, "x"], tuple[int, ...], (1,), "a whole number"),
+        ([1], tuple[int, str], (), "a list of 2"),
+        ("lef", Side, (), "did you mean 'left'?"),
+        ({"x": 1, "z": 2}, Pose2D, ("z",), "known are x, y and yaw"),
+        ({"x": 1}, Pose2D, (), "give x, y and yaw"),
+        ({"x": 1, "y": "a"}, Pose2D, ("y",), "a number"),
+        ("bedrom", Pose2D, (), "did you mean 'bedroom'?"),
+        ("kitchen", Surface, (), "known are shelf, counter"),
+        ("bathroom", tuple[Surface, ...], (), "known are kitchen"),
+        ("unicorn", Thing, (), "known are coke"),
+        ({"size": -1}, Positive, (), "size"),
+        ([1], Mapping[str, int], (), "a mapping"),
+        (1, object, (), "let an earlier step give it"),
+        (None, int, (), "a whole number"),
+    ],
+)
+def test_a_wrong_value_is_refused_with_its_place_and_the_mend(knowledge, value, hint, path, says):
+    with pytest.raises(PortValueError) as error:
+        port_value(value, hint, knowledge)
+    assert error.value.path == path
+    assert says in error.value.mend
+
+
+def test_fields_of_the_one_port_that_has_them_go_there():
+    found = gathered({"x": 1, "y": 2, "max_speed": 0.4}, Drive)
+    assert found == {"goal": ((), {"x": 1, "y": 2}), "max_speed_m_s": (("max_speed",), 0.4)}
+
+
+@pytest.mark.parametrize(
+    ("values", "inputs", "says"),
+    [
+        ({"gaol": 1}, Drive, "did you mean 'goal'?"),
+        ({"x": 1, "speed": 2}, Drive, "did you mean 'max_speed'?"),
+        ({"x": 1}, Two, "its ports are first and second"),
+        ({"max_speed": 1, "max_speed_m_s": 2}, Drive, "remove one of them"),
+    ],
+)
+def test_what_belongs_to_no_port_is_refused(values, inputs, says):
+    with pytest.raises(PortValueError) as error:
+        gathered(values, inputs)
+    assert says in error.value.mend

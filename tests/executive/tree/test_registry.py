@@ -1,0 +1,130 @@
+"""Skills found by entry points: ours, and what is refused of others'."""
+
+import dataclasses
+import importlib
+import inspect
+import pkgutil
+import sys
+import textwrap
+import tomllib
+from importlib.metadata import distributions
+from pathlib import Path
+
+import pytest
+
+import skills
+from executive.mission.errors import InputError
+from executive.tree.registry import GROUP, built_in_skills, installed_skills, skills_of
+from skills.api import Skill
+
+ROOT = Path(__file__).resolve().parents[3]
+GOOD = '''
+from dataclasses import dataclass
+from skills.api import Cause, Skill, Succeeded
+
+@dataclass(frozen=True)
+class WaveInputs:
+    """How often."""
+    times: int = 1
+
+class Wave(Skill[WaveInputs]):
+    """Waves with the arm."""
+    name = "wave"
+    Inputs = WaveInputs
+    outputs = {"waved": int}
+    causes = {Cause.EXECUTION: "the arm did not move"}
+    def begin(self, inputs): pass
+    def step(self): return Succeeded("waved", {"waved": 1})
+'''
+
+
+@pytest.fixture
+def others(tmp_path, monkeypatch):
+    """Make a distribution `name` that registers `entry` from a module with `source`; gives its entry points."""
+
+    def make(source=GOOD, *, name="wavers", entry="wave = {module}:Wave", module="wavers_skill"):
+        folder = tmp_path / name
+        info = folder / f"{name}-1.0.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[{GROUP}]\n{entry.format(module=module)}\n")
+        (folder / f"{module}.py").write_text(textwrap.dedent(source))
+        monkeypatch.syspath_prepend(str(folder))
+        monkeypatch.delitem(sys.modules, module, raising=False)
+        importlib.invalidate_caches()
+        (made,) = distributions(path=[str(folder)])
+        return list(made.entry_points)
+
+    return make
+
+
+def test_our_skills_are_found_by_name_with_typed_ports():
+    found = built_in_skills()
+    assert {"navigate", "detect", "approach", "grasp", "place", "hand_over", "stow"} <= set(found)
+    assert all(name == skill.name and dataclasses.is_dataclass(skill.Inputs) for name, skill in found.items())
+
+
+def test_every_skill_in_the_skills_folder_is_registered_in_pyproject_and_installed():
+    """After a new entry in pyproject.toml, `make env` registers it."""
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][GROUP]
+    written = {}
+    for folder in pkgutil.iter_modules(skills.__path__):
+        if folder.ispkg and importlib.util.find_spec(f"skills.{folder.name}.skill"):
+            module = importlib.import_module(f"skills.{folder.name}.skill")
+            for kind in vars(module).values():
+                ours = inspect.isclass(kind) and issubclass(kind, Skill) and kind.__module__ == module.__name__
+                if ours and not inspect.isabstract(kind):
+                    written[kind.name] = f"{module.__name__}:{kind.__name__}"
+    assert declared == written
+    assert set(built_in_skills()) == set(written)
+
+
+def test_a_skill_of_another_distribution_is_found_beside_ours(others):
+    others()
+    assert {"wave", "navigate"} <= set(installed_skills())
+    assert "wave" not in built_in_skills()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('    """Waves with the arm."""\n', "", "it has no docstring"),
+        ('    causes = {Cause.EXECUTION: "the arm did not move"}\n', "", "it documents no causes of failure"),
+        ('"the arm did not move"', '""', "its cause EXECUTION is not explained"),
+        ("Cause.EXECUTION:", "'EXECUTION':", "its causes hold 'EXECUTION'"),
+        ("@dataclass(frozen=True)", "@dataclass", "its Inputs is no frozen dataclass"),
+        ("    Inputs = WaveInputs\n", "", "its Inputs is no frozen dataclass"),
+        ("times: int", "times: 'Oftenness'", "the types of its Inputs cannot be found"),
+        ('{"waved": int}', '["waved"]', "its outputs is"),
+        ('{"waved": int}', '{"waved": 3}', "its output port 'waved' has 3 for a type"),
+        ('name = "wave"', 'name = "wink"', "it calls itself 'wink'"),
+        ("    def step(self): return", "    def leap(self): return", "it does not define step"),
+        ("class Wave(Skill[WaveInputs])", "class Wave", "it is no subclass of skills.api.Skill"),
+        (
+            "    Inputs = WaveInputs\n",
+            "    Inputs = WaveInputs\n    default_timeout_s = -1\n",
+            "default_timeout_s is -1",
+        ),
+        ("import Cause, Skill", "import Cause, Skull", "cannot load wavers_skill:Wave (ImportError"),
+    ],
+)
+def test_a_skill_that_breaks_a_rule_is_refused_with_its_distribution_and_the_mend(others, old, new, message):
+    assert old in GOOD
+    entries = others(GOOD.replace(old, new))
+    with pytest.raises(InputError) as refused:
+        skills_of(entries)
+    assert refused.value.message.startswith("skill 'wave' of distribution wavers: ")
+    assert message in refused.value.message
+    assert refused.value.mend
+
+
+def test_two_distributions_with_one_name_are_refused_naming_both(others):
+    entries = others() + others(name="others", module="others_skill")
+    with pytest.raises(InputError, match="others and wavers both register a skill 'wave'"):
+        skills_of(entries)
+
+
+def test_another_distribution_cannot_take_the_name_of_one_of_ours(others):
+    others(GOOD.replace('"wave"', '"navigate"'), entry="navigate = {module}:Wave")
+    with pytest.raises(InputError, match="both register a skill 'navigate'"):
+        installed_skills()

@@ -17,10 +17,8 @@ from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform, RotationMatrix
 
 from plant.sensors.camera_spec import FAR_M, NEAR_M, colour_render_camera, depth_render_camera
-from skills.robot import Intrinsics
+from skills.robot import FloatArray, Intrinsics, Picture
 
-Picture = NDArray[np.uint8]
-FloatArray = NDArray[np.float64]
 Colour = tuple[int, int, int]
 Bounds = tuple[float, float, float, float]
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 FRAMES_PER_SECOND = 16.0
 
 

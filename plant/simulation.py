@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
@@ -25,9 +24,8 @@ from plant.spot.sensing import HAND_LINK, SpotSensors
 from plant.worlds.lights import render_parameters
 from plant.worlds.placement import Placement, place_objects, place_people
 from plant.worlds.world import World
-from skills.robot import Pose2D, Robot
+from skills.robot import FloatArray, Pose2D, Robot
 
-FloatArray = NDArray[np.float64]
 CONTROL_PERIOD_S = 0.01
 REFEREE_PERIOD_STEPS = 2
 SETTLING_S = 1.5

@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
 FloatArray = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+"""A picture, (H, W) grey or (H, W, 3) RGB."""
 CommandId = NewType("CommandId", int)
 
 

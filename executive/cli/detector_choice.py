@@ -7,18 +7,16 @@ from pathlib import Path
 from typing import Final
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
 from executive.mission.errors import InputError
 from skills.detect.detector_file import MODEL_FILE
 from skills.detect.network_file import ModelFileError
 from skills.detect.onnx_detector import DetectorOptions, OnnxDetector, load_detector
 from skills.detection import Detection
+from skills.robot import Picture
 
 __all__ = ["FOUND_COLOUR", "detector_of", "draw_box", "drawn"]
 
-Picture = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
 FOUND_COLOUR: Final = (40, 200, 60)

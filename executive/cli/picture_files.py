@@ -10,16 +10,15 @@ from typing import Final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from executive.mission.errors import InputError
+from skills.robot import Picture
 
 __all__ = ["MOST_PIXELS", "read_picture", "write_picture"]
 
 MOST_PIXELS: Final = 64_000_000
 """What is larger is refused before it fills the memory; `executive.cli` tells OpenCV the same limit."""
 
-Picture = NDArray[np.uint8]
 
 _PNG_HEAD: Final = b"\x89PNG\r\n\x1a\n"
 _LIMIT_NAME: Final = "MAX_IMAGE_PIXELS"

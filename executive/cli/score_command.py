@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from executive.cli.detector_choice import detector_of
 from executive.cli.output import console_for, print_json, refusals
-from executive.cli.picture_files import Picture, read_picture, write_picture
+from executive.cli.picture_files import read_picture, write_picture
 from executive.cli.score_report import score_json, show_score
 from executive.cli.worst_sheet import Shown, contact_sheet
 from executive.mission.errors import InputError
@@ -26,6 +26,7 @@ from skills.detect.scoring import judged, picture_errors, score
 from skills.detect.scoring_labels import LabelledPicture, pictures_of_coco
 from skills.detect.upside_down import turned, turned_back
 from skills.detection import Detection
+from skills.robot import Picture
 
 __all__ = ["score_command"]
 

@@ -15,9 +15,10 @@ from executive.record.messages import DESTINATION_TOPIC
 from executive.record.schemas import TRANSITIONS
 from executive.store.resuming import told_before
 from executive.tree.behaviours.answer import ANSWER_TOPIC
-from plant.pictures import Bounds, Picture, best_view, draw_detection, draw_map, render_view, save_png, top_view
+from plant.pictures import Bounds, best_view, draw_detection, draw_map, render_view, save_png, top_view
 from plant.simulation import Simulation
 from skills.api import Publish
+from skills.robot import Picture
 
 DETECTIONS: Final = "detections"
 _MARGIN_M: Final = 0.3

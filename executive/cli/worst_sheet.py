@@ -9,14 +9,13 @@ from typing import Final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from executive.cli.detector_choice import FOUND_COLOUR, draw_box
 from skills.detect.scoring import Judged
+from skills.robot import Picture
 
 __all__ = ["Shown", "contact_sheet"]
 
-Picture = NDArray[np.uint8]
 
 TILE_PX: Final = (400, 300)
 CAPTION_PX: Final = 18

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.spatial import ConvexHull
 
@@ -14,8 +13,7 @@ from plant.dataset.resting import choose, resting_poses
 from plant.dataset.room import Room, Support, random_room
 from plant.models.families import CLASSES, DISTRACTORS, ODDMENT, ObjectModel, instance, numbers
 from plant.worlds.placement import polygon_distance
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 SELDOM_BY_CHANCE = ("person", "extinguisher")
 """What stands apart from the clutter, and so is seldom in the views of other things."""

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Picture = NDArray[np.uint8]
+from skills.robot import Picture
+
 FloatPicture = NDArray[np.float32]
 
 

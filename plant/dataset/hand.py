@@ -9,13 +9,10 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 from pydrake.math import RollPitchYaw
 
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.surfaces import add_rounded_box
-
-FloatArray = NDArray[np.float64]
 
 _FACTS = Path(__file__).resolve().parents[1] / "models" / "spot" / "spot.yaml"
 _PALM, _FINGER = "arm_wr1", "arm_f1x"

@@ -8,9 +8,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Picture = NDArray[np.uint8]
+from skills.robot import Picture
 
 COLUMNS, ROWS = 8, 6
 CELL_PX = (240, 180)

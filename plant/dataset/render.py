@@ -43,8 +43,7 @@ from plant.models.builder.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture
 from plant.models.families import ObjectModel
 from plant.sensors.camera_spec import NEAR_M, colour_render_camera
-
-Picture = NDArray[np.uint8]
+from skills.robot import Picture
 
 TRAINING_VIEWS: Final = 24
 VALIDATION_VIEWS: Final = 8

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from plant.models.families import ObjectModel
 from plant.models.families.model import read_model
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 LEAST_MARGIN = 0.05
 _UPRIGHT = {"person": 1.0, "extinguisher": 0.9, "beer": 0.7, "coke": 0.72, "cylinder": 0.6}

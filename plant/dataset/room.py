@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.dataset.furnish import BY_THE_WALL, IN_THE_MIDDLE, Furnished, random_materials
 from plant.dataset.textures import ROLES, numbers
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.shapes import Box, Cylinder, Shape
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 WALL_CLEAR_M = 0.02
 FILES_PER_ROLE = 4

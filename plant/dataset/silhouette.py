@@ -10,9 +10,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.robot import Intrinsics
+from skills.robot import FloatArray, Intrinsics
 
-FloatArray = NDArray[np.float64]
 FunctionT = TypeVar("FunctionT", bound=Callable[..., object])
 NEAR_M = 0.05
 

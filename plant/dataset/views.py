@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from plant.dataset.compose import Placed
@@ -16,9 +15,7 @@ from plant.dataset.silhouette import project
 from plant.pictures import look_at
 from plant.sensors.camera_spec import CameraSpec, load_cameras
 from plant.spot.sensing import CAMERAS
-from skills.robot import Intrinsics
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Intrinsics
 
 BODY_SHARE = 0.4
 FULL_SIZE_SHARE = 0.35

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -28,9 +27,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from plant.snapshot.values import State, array_of
-from skills.robot import Pose2D
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Pose2D
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.spot.description import spot_facts
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 _SIDES = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -1.0)}
 
 

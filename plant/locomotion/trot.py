@@ -10,12 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.spot.description import LEGS
 from plant.snapshot.values import State, array_of
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 _PAIRS = ((0, 3), (1, 2))  # indices into LEGS: fl with hr, fr with hl
 
 

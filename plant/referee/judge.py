@@ -6,12 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.referee.promise import Promise, PromiseKind, Region, Verdict
 from plant.referee.story import ObjectStory
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 REACH_OF_PERSON_M = 1.0
 OFFER_HEIGHT_M = 0.4

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
@@ -16,8 +15,7 @@ from plant.referee.judge import Truth, judge, offered
 from plant.referee.promise import Promise, Verdict
 from plant.referee.story import Lift, Look, ObjectStory
 from plant.snapshot.values import State, array_of
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 PATH_STEP_M = 0.02
 

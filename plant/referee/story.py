@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from plant.snapshot.values import State, array_of, transform_of, transform_state
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 LIFT_M = 0.03
 AWAY_M = 0.3

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from plant.snapshot.values import State, array_of, restore_rng, rng_state
-from skills.robot import Imu
+from skills.robot import FloatArray, Imu
 
-FloatArray = NDArray[np.float64]
 GRAVITY_W = np.array([0.0, 0.0, -9.81])
 
 

@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.snapshot.values import State, restore_rng, rng_state
-from skills.robot import Joints
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Joints
 
 
 @dataclass(frozen=True)

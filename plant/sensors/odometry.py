@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.snapshot.values import State, restore_rng, rng_state
-from skills.robot import Odometry, Pose2D
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Odometry, Pose2D
 
 
 @dataclass(frozen=True)

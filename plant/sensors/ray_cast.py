@@ -14,7 +14,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
+
 FunctionT = TypeVar("FunctionT", bound=Callable[..., object])
 
 NO_RETURN_M = 1.0e6

@@ -30,7 +30,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
 
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
+
 Row = tuple["ShapeKind", FloatArray, RigidTransform]
 
 HALF_SPACE_HALF_WIDTH_M = 500.0

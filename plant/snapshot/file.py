@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
+
 MAGIC: Final = b"errand plant 1\n"
 _SLOTS: Final = (".a", ".b")
 

@@ -6,13 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from plant.snapshot.file import Snapshot, SnapshotError, SnapshotFile, encoded
 from plant.snapshot.values import State
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 _WORLD: Final = "world: "
 _PATH: Final = "path: "
 

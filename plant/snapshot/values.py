@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
+from skills.robot import FloatArray
+
 State = dict[str, Any]
-FloatArray = NDArray[np.float64]
 
 
 def rng_state(rng: np.random.Generator) -> State:

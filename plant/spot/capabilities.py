@@ -5,13 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.spot.description import LEGS, spot_facts, spot_urdf
 from plant.spot.model import JAW
-from skills.robot import ArmCapabilities, Capabilities, GripperCapabilities
-
-FloatArray = NDArray[np.float64]
+from skills.robot import ArmCapabilities, Capabilities, FloatArray, GripperCapabilities
 
 
 def nominal_footholds() -> FloatArray:

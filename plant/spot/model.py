@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import CollisionFilterDeclaration, CollisionFilterManager, GeometryId, GeometrySet
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -24,7 +23,6 @@ from plant.models.spot.description import (
 from plant.models.spot.looks import looks_folder
 from skills.robot import Pose2D
 
-FloatArray = NDArray[np.float64]
 JAW = "arm_f1x"
 _LEG_GAINS = (600.0, 12.0)
 _ARM_GAINS = {

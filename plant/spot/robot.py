@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
@@ -26,6 +25,7 @@ from skills.robot import (
     CommandId,
     CommandState,
     CommandStatus,
+    FloatArray,
     Gripper,
     Image,
     Imu,
@@ -35,7 +35,6 @@ from skills.robot import (
     Scan,
 )
 
-FloatArray = NDArray[np.float64]
 _ARM_ARRIVED_RAD = 0.03
 _ARM_STILL_RAD_S = 0.06
 _MAX_ARM_RATE_RAD_S = 4.0

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import FrameId, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
@@ -26,9 +25,8 @@ from plant.sensors.lidar import Lidar
 from plant.sensors.odometry import OdometryModel
 from plant.snapshot.values import State
 from plant.spot.model import SpotModel
-from skills.robot import Battery, FrameTree, Gripper, Image, Imu, Joints, Odometry, Pose2D, Scan
+from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Pose2D, Scan
 
-FloatArray = NDArray[np.float64]
 CAMERAS = Path(__file__).parents[1] / "models" / "spot" / "cameras.yaml"
 HAND_LINK = "arm_wr1"
 _FRAME_OF_LINK = {"body": "body", HAND_LINK: "hand"}

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from plant.locomotion.leg_kinematics import LegKinematics, UnreachableFootError
 from plant.models.spot.description import LEGS
 from plant.snapshot.values import State, array_of
 from plant.spot.model import JointIndex
-from skills.robot import ArmTrajectory
-
-FloatArray = NDArray[np.float64]
+from skills.robot import ArmTrajectory, FloatArray
 
 
 @dataclass(frozen=True)

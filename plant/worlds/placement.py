@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.models.catalogue import ModelClass, load_catalogue
 from plant.worlds.world import ObjectRule, PersonRule, Point, Polygon, SurfaceTop, World, WorldError
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 ATTEMPTS = 500
 ROUND_SIDES = 16
 _OBJECT_STREAM, _PEOPLE_STREAM = 1, 2

@@ -20,10 +20,10 @@ from skills.detect.letterbox import PADDING, Letterbox, check_picture
 from skills.detect.onnx_detector import OnnxDetector
 from skills.detect.suppression import Candidates, told
 from skills.detection import Detection, box_overlap
+from skills.robot import Picture
 
 __all__ = ["AS_IT_IS_AND_OTHERWISE", "CarefulDetector", "LooksCarefully", "Variant"]
 
-Picture = NDArray[np.uint8]
 Box = tuple[float, float, float, float]
 _SAME_THING = 0.55
 _LEAST_SCORE = 0.05

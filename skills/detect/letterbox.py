@@ -9,13 +9,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from skills.robot import Picture
+
 __all__ = ["HEIGHT_PX", "PADDING", "WIDTH_PX", "Letterbox", "check_picture", "fill_letterbox", "letterbox"]
 
 WIDTH_PX: Final = 640
 HEIGHT_PX: Final = 480
 PADDING: Final = 114
 
-Picture = NDArray[np.uint8]
 Boxes = NDArray[np.float32]
 
 

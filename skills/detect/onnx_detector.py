@@ -20,10 +20,10 @@ from skills.detect.regions import JUDGED, RegionOptions
 from skills.detect.scales import Scales, halved
 from skills.detect.suppression import SuppressionOptions, candidates_of, told
 from skills.detection import Detection
+from skills.robot import Picture
 
 __all__ = ["DetectorOptions", "OnnxDetector", "load_detector"]
 
-Picture = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 
 

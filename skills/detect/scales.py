@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detect.letterbox import PADDING
+from skills.robot import Picture
 
 __all__ = ["Scales", "cut_out", "halved"]
 
-Picture = NDArray[np.uint8]
 _HALF_BELOW: Final = 0.7
 
 

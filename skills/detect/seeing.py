@@ -11,12 +11,11 @@ from typing import Final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from skills.api import Detection, Detector
 from skills.detect.careful_detector import LooksCarefully
 from skills.detect.upside_down import LEAST_ROLL_DEG, turned, turned_back
-from skills.robot import Image
+from skills.robot import Image, Picture
 
 __all__ = ["DETECTION_LATENCY_S", "brightened", "detections_in", "is_dark", "on_its_head", "seen_in_grey"]
 
@@ -26,7 +25,6 @@ _DARK_MEAN, _DARK_SPREAD = 6.0, 4.0
 _DIM_MEAN, _BRIGHT_MEAN, _MOST_GAIN = 70.0, 100.0, 8.0
 _DOWN_IS_UP = -float(np.cos(np.radians(LEAST_ROLL_DEG)))
 
-Picture = NDArray[np.uint8]
 Found = tuple[Detection, ...]
 
 

@@ -7,16 +7,14 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skills.detection import Detection
+from skills.robot import Picture
 
 __all__ = ["LEAST_ROLL_DEG", "turned", "turned_back"]
 
 LEAST_ROLL_DEG: Final = 120.0
 """A picture that is turned by more than this from upright, either way, stands on its head."""
-
-Picture = NDArray[np.uint8]
 
 
 def turned(picture: Picture) -> Picture:

@@ -18,9 +18,7 @@ from skills.estimate.planar import compose
 from skills.estimate.scan_points import scan_points, sensor_pose
 from skills.estimate.seen_layer import Beams, clear_cells, mark_cells
 from skills.estimate.self_filter import SelfFilter, in_body_axes
-from skills.robot import Pose2D, Robot, Scan
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 
 @dataclass(frozen=True)

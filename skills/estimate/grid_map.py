@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from skills.estimate.compiled import distances
+from skills.robot import FloatArray
 
 BoolGrid = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
 
 REQUIRED_KEYS = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
 KNOWN_KEYS = (*REQUIRED_KEYS, "negate", "mode", "height_band_m")

@@ -6,16 +6,13 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
 from skills.estimate.matching import Match, MatchOptions, match, score_poses
 from skills.estimate.planar import compose, inverse, relative
 from skills.estimate.scan_points import scan_points
-from skills.robot import Pose2D, Robot, Scan
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 
 @dataclass(frozen=True)

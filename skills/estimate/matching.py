@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from skills.estimate.compiled import bilinear, compiled
 from skills.estimate.grid_map import GridMap
 from skills.estimate.planar import wrap
-from skills.robot import Pose2D
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Pose2D
 
 INLIER_M = 0.15
 """A point nearer than this to the surveyed surface (m) is explained by the map."""

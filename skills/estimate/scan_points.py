@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from pydrake.math import RotationMatrix
 
 from skills.estimate.compiled import compiled
-from skills.robot import Pose2D, Scan
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Pose2D, Scan
 
 
 def scan_points(scan: Scan, *, azimuths: int, heights_m: tuple[float, float], max_range_m: float) -> FloatArray:

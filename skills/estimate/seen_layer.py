@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 
 class Beams(NamedTuple):

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from skills.robot import Capabilities, Joints, Pose2D
-
-FloatArray = NDArray[np.float64]
+from skills.robot import Capabilities, FloatArray, Joints, Pose2D
 
 
 class ArmShape:

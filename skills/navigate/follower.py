@@ -6,15 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skills.api import Costmap
 from skills.estimate.planar import wrap
 from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m
 from skills.navigate.path import TURN_M_PER_RAD, Path
-from skills.robot import Pose2D
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Pose2D
 
 
 @dataclass(frozen=True)

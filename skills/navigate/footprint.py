@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from skills.api import Costmap
 from skills.estimate.compiled import bilinear, compiled
-from skills.robot import Capabilities, Pose2D
-
-FloatArray = NDArray[np.float64]
+from skills.robot import Capabilities, FloatArray, Pose2D
 
 SAFE_MARGIN_M = 0.06
 """The clearance (m) that a standing or driven pose should keep: map and tracking errors fit into it."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from skills.estimate.compiled import compiled
 from skills.navigate.footprint import clearance_at
 from skills.navigate.motion_cost import Weights, motion_seconds, nearness
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Frame = tuple[float, float, float]
 

@@ -6,13 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Job, SkillContext
-from skills.robot import Image
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Image
 
 
 @dataclass(frozen=True)

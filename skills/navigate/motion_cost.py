@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
 from skills.navigate.footprint import SAFE_MARGIN_M, clearance_at
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 Weights = tuple[float, float, float, float, float, float]
 
 

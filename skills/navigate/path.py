@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skills.robot import Pose2D
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Pose2D
 
 TURN_M_PER_RAD = 0.4
 """A turn of one radian counts as so many metres of progress along a path."""

@@ -7,16 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skills.api import Costmap, LocalisationEstimate
 from skills.navigate.footprint import Footprint, disc_centres, pose_array
 from skills.navigate.people_watch import SeenPerson
-from skills.robot import Pose2D, Robot
+from skills.robot import FloatArray, Pose2D, Robot
 
 __all__ = ["Pace", "PaceKeeper", "SpaceOptions", "WithPeople", "outline_distance_m", "spaced"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,16 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Detection, Job, SkillContext
 from skills.detect.position import position_of
 from skills.detect.seeing import seen_in_grey
 from skills.estimate.planar import relative
-from skills.robot import Image, Pose2D
+from skills.robot import FloatArray, Image, Pose2D
 
 __all__ = ["PEOPLE_TOPIC", "PeopleOptions", "PeopleWatch", "SeenPerson", "cameras_towards"]
 
-FloatArray = NDArray[np.float64]
 
 PEOPLE_TOPIC: Final = "people"
 PERSON: Final = "person"

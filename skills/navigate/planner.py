@@ -16,9 +16,7 @@ from skills.navigate.lattice import Lattice, Needs, Space, cost_to_go, lattice_m
 from skills.navigate.motion_cost import PlannerOptions, segment_cost
 from skills.navigate.path import Path
 from skills.navigate.smoothing import clearances, densify, relax, shortcut
-from skills.robot import Pose2D
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Pose2D
 
 FIELD_CELL_M = 0.05
 

@@ -6,14 +6,12 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
 from skills.navigate.footprint import clearance_at
 from skills.navigate.lattice import Needs, Space
 from skills.navigate.motion_cost import segment_cost
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 
 @compiled

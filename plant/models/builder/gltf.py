@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Material, Mesh
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 _FLOAT, _UINT = 5126, 5125
 _ARRAY_BUFFER, _ELEMENT_BUFFER = 34962, 34963

@@ -10,7 +10,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
+
 Field = Callable[[FloatArray], FloatArray]
 """Points (..., 3) to distances (...), in metres."""
 

@@ -8,12 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.shapes import MassProperties
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 
 def solid_mass(mesh: Mesh, density_kg_m3: float) -> MassProperties:

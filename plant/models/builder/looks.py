@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from plant.models.builder import objects as o
 from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.pictures import FloatArray, Picture, noise, to_picture, wood
+from plant.models.builder.pictures import noise, to_picture, wood
+from skills.robot import FloatArray, Picture
 
 LABEL_SHAPE = (192, 384)
 

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
+
 Colour = tuple[float, float, float]
 UV = tuple[tuple[float, float], tuple[float, float]]
 WHOLE: UV = ((0.0, 0.0), (1.0, 1.0))

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Picture = NDArray[np.uint8]
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Picture
+
 Colour = tuple[float, float, float]
 
 

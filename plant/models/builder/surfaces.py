@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import area, inset, triangles_of
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 Radii = ArrayLike
 
 

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.pictures import cloth, noise, speckle, wood
 from plant.models.builder.surfaces import add_rounded_box
 from plant.models.families.draft import Draft, Finished, shade
 from plant.models.families.lettering import write_word
 from plant.models.families.wear import brushed, plain, used
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 COLOURS = {
     "red": (0.80, 0.08, 0.07),

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Colour
 from plant.models.builder.pictures import noise
 from plant.models.families.draft import ALUMINIUM, GLASS, WATER, Draft, Finished, pick, shade
 from plant.models.families.wear import plain, scratched, uneven
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 Profile = list[tuple[float, float]]
 
 

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from plant.models.builder.inertia import scaled_to, shell_mass, solid_mass, together
 from plant.models.builder.mesh import IDENTITY, Colour, Material, Mesh
-from plant.models.builder.pictures import Picture, to_picture
+from plant.models.builder.pictures import to_picture
 from plant.models.builder.shapes import Box, Capsule, Cylinder, MassProperties, Shape, Sphere
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray, Picture
 
 PROUD_M = 0.0003
 

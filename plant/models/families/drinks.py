@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Colour
 from plant.models.builder.outlines import curve
@@ -20,9 +19,7 @@ from plant.models.families.lettering import (
     write_word,
 )
 from plant.models.families.wear import plain
-
-FloatArray = NDArray[np.float64]
-
+from skills.robot import FloatArray
 
 LABEL_SHAPE = (256, 512)
 WHITE: Colour = (0.96, 0.96, 0.95)

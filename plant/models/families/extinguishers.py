@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import curve
@@ -14,8 +13,7 @@ from plant.models.builder.surfaces import add_rounded_box, add_tube
 from plant.models.families.draft import RUBBER, STEEL, Draft, Finished, pick, shade, turned
 from plant.models.families.lettering import bar_code, blend, brand, emblem, small_print, write_tall, write_word
 from plant.models.families.wear import dirty, plain, used
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import curve
@@ -19,8 +18,6 @@ from plant.models.builder.pictures import wood
 from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_grid, add_rounded_box, add_tube
 from plant.models.families.draft import RUBBER, STEEL, WOOD, Draft, Finished, pick, shade, turned
 from plant.models.families.wear import brushed, plain, rusty, used
-
-FloatArray = NDArray[np.float64]
 
 ALONG_Y = turned("x", -np.pi / 2)
 """Turns a part made along z so that it lies along y."""

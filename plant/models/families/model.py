@@ -16,8 +16,7 @@ from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture,
 from plant.models.builder.pictures import write_png
 from plant.models.builder.sdf import Model, model_sdf
 from plant.models.families.draft import Finished
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 HELD_OUT_EVERY = 4
 _QUICK: Final = 1

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Colour, Mesh
 from plant.models.builder.outlines import arc, curve
@@ -23,7 +22,6 @@ from plant.models.families.solids import add_drum, add_rod, paint_grey, paint_pl
 
 __all__ = ["ODDMENT", "oddment"]
 
-FloatArray = NDArray[np.float64]
 Made = tuple[Finished, str]
 
 ODDMENT = "oddment"

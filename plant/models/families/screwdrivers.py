@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import curve
@@ -14,8 +13,6 @@ from plant.models.builder.pictures import wood
 from plant.models.builder.surfaces import add_fan, add_grid
 from plant.models.families.draft import PLASTIC, STEEL, UP_TO_X, WOOD, Draft, Finished, shade
 from plant.models.families.wear import plain, used
-
-FloatArray = NDArray[np.float64]
 
 _COLOURS = (
     ("red", (0.80, 0.07, 0.06)),

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import (
     GeometryInstance,
     MakeRenderEngineVtk,
@@ -26,8 +25,7 @@ from plant.models.families import CLASSES, DISTRACTORS, ODDMENT, instance
 from plant.models.families.model import ObjectModel
 from plant.pictures import look_at, render_view
 from plant.worlds.lights import lights
-
-Picture = NDArray[np.uint8]
+from skills.robot import Picture
 
 
 def sheet(models: Sequence[ObjectModel], columns: int, cell: tuple[int, int] = (160, 160)) -> Picture:

@@ -10,7 +10,7 @@ import colorsys
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import arc
@@ -31,10 +31,10 @@ from plant.models.families.draft import (
     varied,
 )
 from plant.models.families.solids import COLOURS, add_drum, add_rod, paint_grey, paint_plain, some_shine
+from skills.robot import FloatArray
 
 __all__ = ["SKETCH_MAKERS"]
 
-FloatArray = NDArray[np.float64]
 Maker = Callable[[Draft], tuple[Finished, str, str]]
 
 KIND = "sketch"

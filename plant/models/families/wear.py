@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from plant.models.builder.pictures import noise
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 
 def plain(colour: ArrayLike, shape: tuple[int, int] = (128, 128)) -> FloatArray:

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import arc
 from plant.models.builder.surfaces import add_extruded, add_ring, add_tube
 from plant.models.families.draft import RUBBER, STEEL, Draft, Finished, pick, shade, turned
 from plant.models.families.wear import brushed, plain, rusty, used
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.models.builder.shapes import Box, Cylinder, Shape
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from plant.models.builder.mesh import Material
-from plant.models.builder.pictures import FloatArray, Picture, cloth, noise, speckle, to_picture, wood
+from plant.models.builder.pictures import cloth, noise, speckle, to_picture, wood
+from skills.robot import FloatArray, Picture
 
 TEXTURE_PX = 384
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.shapes import Box, Shape
@@ -26,8 +25,8 @@ from plant.worlds.builder.plan import (
     openings,
     room,
 )
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 FRAME_M, FRAME_DEPTH_M, SKIRTING_M = 0.07, 0.012, 0.07
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from plant.models.builder.mesh import Colour
 from plant.models.builder.outlines import curve
@@ -11,8 +11,8 @@ from plant.models.builder.surfaces import add_rounded_box
 from plant.models.families.draft import Draft, Finished, Profile, pick, shade
 from plant.models.families.lettering import bar_code, blend, brand, emblem, small_print, write_word
 from plant.models.families.wear import brushed, plain, rusty, used
+from skills.robot import FloatArray
 
-FloatArray = NDArray[np.float64]
 Made = tuple[Finished, str, str]
 
 COLOURS: dict[str, Colour] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from plant.models.builder.implicit import Field, ball, both, cut, grown, half_space, join, limb, surface
 from plant.models.builder.mesh import Colour, Mesh
@@ -15,10 +15,10 @@ from plant.models.families.people.body import hand, hand_tip, head, lower_limbs,
 from plant.models.families.people.clothes import Outfit, bottom_field, bottom_picture, top_field, top_picture
 from plant.models.families.people.form import SEAT_HEIGHT_M, Build, Limb, Skeleton, skeleton
 from plant.models.families.wear import plain
+from skills.robot import FloatArray
 
 __all__ = ["SEAT_HEIGHT_M", "person"]
 
-FloatArray = NDArray[np.float64]
 
 SKINS: tuple[Colour, ...] = (
     (0.93, 0.76, 0.66),

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant.models.builder.implicit import Field, ball, cut, join, limb
 from plant.models.families.people.form import Build, Limb, Skeleton
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 
 def trunk(build: Build, s: Skeleton) -> Field:

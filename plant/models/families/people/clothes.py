@@ -15,8 +15,7 @@ from plant.models.families.draft import shade
 from plant.models.families.lettering import blend, brand, emblem, write_word
 from plant.models.families.people.body import lower_limbs, trunk, upper_limbs
 from plant.models.families.people.form import Build, Skeleton
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 CLOTH_COLOURS: tuple[Colour, ...] = (
     (0.14, 0.16, 0.24),

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 SEAT_HEIGHT_M = 0.45
 STANCES = ("standing", "arms out", "walking", "sitting", "hands on hips", "reaching", "relaxed")

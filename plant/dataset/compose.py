@@ -9,9 +9,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.spatial import ConvexHull
 
+from plant.dataset.objects import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
 from plant.dataset.resting import choose, resting_poses
 from plant.dataset.room import Room, Support, random_room
-from plant.models.families import CLASSES, DISTRACTORS, ODDMENT, ObjectModel, instance, numbers
 from plant.worlds.placement import polygon_distance
 from skills.robot import FloatArray
 
@@ -20,8 +20,6 @@ SELDOM_BY_CHANCE = ("person", "extinguisher")
 CLASSES_PER_SCENE = 7
 CROWDED_SHARE, MOST_ROUNDS = 0.65, 4
 ONLY_DISTRACTORS_EVERY = 10
-ODDMENT_SHARE = 0.35
-"""How many of the things of no class are oddments, where training sees them."""
 ATTEMPTS = 30
 CLEAR_M = 0.004
 LARGE_M = 0.45
@@ -69,8 +67,6 @@ def compose(rng: np.random.Generator, index: int, *, for_training: bool) -> Scen
     rounds = int(rng.integers(2, MOST_ROUNDS + 1)) if for_training and rng.random() < CROWDED_SHARE else 1
     wanted = [] if bare else _class_models(rng, rounds, for_training=for_training)
     names = [str(name) for name in rng.choice(DISTRACTORS, int(rng.integers(6, 16)) * rounds)]
-    if for_training:
-        names = [ODDMENT if rng.random() < ODDMENT_SHARE else name for name in names]
     others = [_any_instance(rng, name, for_training) for name in names]
     table = _Table(room, rng, toppled=for_training)
     crowded = list(rng.permutation(len(room.supports)))[: int(rng.integers(2, 5))] if room.supports else []
@@ -88,17 +84,17 @@ def _class_models(rng: np.random.Generator, rounds: int, *, for_training: bool) 
     doubled = [name for name in chosen if name not in SELDOM_BY_CHANCE and rng.random() < 0.35]
     again = [name for name in CLASSES if name not in SELDOM_BY_CHANCE] * (rounds - 1)
     models = [_any_instance(rng, name, for_training) for name in [*chosen, *doubled, *again]]
-    return sorted(models, key=lambda model: model.family != "person")
+    return sorted(models, key=lambda model: model.category != "person")
 
 
-def _any_instance(rng: np.random.Generator, family: str, for_training: bool) -> ObjectModel:
-    return instance(family, int(rng.choice(numbers(family, for_training=for_training))))
+def _any_instance(rng: np.random.Generator, category: str, for_training: bool) -> ObjectModel:
+    return instance(category, int(rng.choice(numbers(category, for_training=for_training))))
 
 
 def _hold(rng: np.random.Generator, other: ObjectModel | None, *, for_training: bool) -> Held | None:
     """A thing that fits between the jaws, its long side across them."""
-    families = [name for name in CLASSES if name not in SELDOM_BY_CHANCE]
-    model = other or _any_instance(rng, str(rng.choice(families)), for_training)
+    categories = [name for name in CLASSES if name not in SELDOM_BY_CHANCE]
+    model = other or _any_instance(rng, str(rng.choice(categories)), for_training)
     size = np.array(model.size_m)
     if size.max() > HELD_LONGEST_M or np.sort(size)[0] > 0.09:
         return None
@@ -126,7 +122,7 @@ class _Table:
         points = model.surface.points @ pose.R.T
         outline = points[ConvexHull(points[:, :2]).vertices, :2]
         tall = float(np.ptp(points[:, 2]))
-        for _ in range(4 * ATTEMPTS if model.family == "person" else ATTEMPTS):
+        for _ in range(4 * ATTEMPTS if model.category == "person" else ATTEMPTS):
             spot = self._spot(model, supports, outline, tall)
             if spot is None:
                 continue
@@ -142,8 +138,8 @@ class _Table:
     ) -> tuple[float, float, float, float] | None:
         """A place (x, y, z, yaw) on a support or the floor, or None when this try was in vain."""
         rng, yaw = self._rng, float(self._rng.uniform(0, 2 * np.pi))
-        on_floor = 1.0 if model.family == "person" else 0.75 if max(model.size_m) > LARGE_M else 0.2
-        if model.family == "extinguisher":
+        on_floor = 1.0 if model.category == "person" else 0.75 if max(model.size_m) > LARGE_M else 0.2
+        if model.category == "extinguisher":
             on_floor = 0.7
         if not supports or rng.random() < on_floor:
             return self._floor_spot(outline, tall, yaw)

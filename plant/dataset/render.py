@@ -35,13 +35,13 @@ from plant.dataset.compose import SELDOM_BY_CHANCE, Held, Placed, Scene, compose
 from plant.dataset.degrade import Degradation, degraded
 from plant.dataset.hand import hand_mesh
 from plant.dataset.lighting import Lighting, random_lighting
+from plant.dataset.objects import ObjectModel
 from plant.dataset.room import Room, texture_file
 from plant.dataset.silhouette import silhouette
 from plant.dataset.textures import texture
 from plant.dataset.views import View, any_view, camera_specs, hand_view, roll_deg, view_of
 from plant.models.builder.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture
-from plant.models.families import ObjectModel
 from plant.sensors.camera_spec import NEAR_M, colour_render_camera
 from skills.robot import Picture
 
@@ -88,7 +88,7 @@ def _views(rng: np.random.Generator, scene: Scene, count: int) -> list[View]:
     """So many views: the things of the classes take turns; where there is none, others do."""
     specs = camera_specs()
     things = [thing for thing in scene.things if thing.model.class_id] or list(scene.things)
-    turns = [thing for thing in things for _ in range(2 if thing.model.family in SELDOM_BY_CHANCE else 1)]
+    turns = [thing for thing in things for _ in range(2 if thing.model.category in SELDOM_BY_CHANCE else 1)]
     order = [turns[k] for k in rng.permutation(len(turns))]
     views: list[View] = []
     for attempt in range(3 * count):

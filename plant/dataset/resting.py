@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from plant.models.families import ObjectModel
-from plant.models.families.model import read_model
+from plant.dataset.objects import ObjectModel
+from plant.dataset.objects.model import read_model
 from skills.robot import FloatArray
 
 LEAST_MARGIN = 0.05
@@ -44,7 +44,7 @@ def _poses_of(folder: Path) -> tuple[Resting, ...]:
     """Kept by the folder, so that no model's triangles stay in memory for it."""
     model = read_model(folder)
     points, com = model.surface.points, np.array(model.com_m)
-    if model.family == "person":
+    if model.category == "person":
         return (Resting(np.eye(3), -float(points[:, 2].min()), 1.0, True),)
     hull = ConvexHull(points)
     poses = []
@@ -102,8 +102,8 @@ def choose(rng: np.random.Generator, model: ObjectModel, poses: Sequence[Resting
     """
     standing = [pose for pose in poses if pose.upright]
     lying = [pose for pose in poses if not pose.upright]
-    share = _UPRIGHT.get(model.family, 0.75 if model.class_id == 0 else 0.5)
-    share *= TOPPLED_SHARE if toppled and model.family != "person" else 1.0
+    share = _UPRIGHT.get(model.category, 0.75 if model.class_id == 0 else 0.5)
+    share *= TOPPLED_SHARE if toppled and model.category != "person" else 1.0
     group = standing if standing and (not lying or rng.random() < share) else lying or standing
     weights = np.array([pose.margin + 1e-3 for pose in group])
     return group[int(rng.choice(len(group), p=weights / weights.sum()))]

@@ -29,9 +29,9 @@ import cv2
 
 from plant.dataset.coco import counts, document
 from plant.dataset.errors import DatasetError
+from plant.dataset.objects import sources_digest
 from plant.dataset.overview import contact_sheet
 from plant.dataset.render import Shot, render_scene, views_in
-from plant.models.families import sources_digest
 
 FORMAT: Final = 1
 MANIFEST: Final = "dataset.json"

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.dataset.objects.model import held_out
 from plant.models.builder.pictures import cloth, noise, speckle, to_picture, wood
-from plant.models.families.model import held_out
 from skills.robot import FloatArray, Picture
 
 TEXTURES = 1024

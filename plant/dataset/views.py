@@ -80,7 +80,7 @@ def _aim(thing: Placed) -> FloatArray:
     """The middle of a thing; of a person a point of the upper body."""
     points = thing.model.surface.points
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    if thing.model.family == "person":
+    if thing.model.category == "person":
         middle = middle + np.array([0, 0, 0.2 * float(np.ptp(points[:, 2]))])
     return np.asarray(thing.X_WO @ middle)
 
@@ -102,7 +102,7 @@ def _varied(rng: np.random.Generator, camera: Intrinsics) -> Intrinsics:
 def eye_about(rng: np.random.Generator, thing: Placed, aim: FloatArray, focal: float) -> FloatArray:
     """A place (3,) of the hand camera to see a thing at `aim` from: mostly from above, people from about level."""
     distance, around = distance_to(rng, thing, focal), float(rng.uniform(0, 2 * np.pi))
-    above = float(np.radians(rng.uniform(-5, 75) if thing.model.family != "person" else rng.uniform(-25, 25)))
+    above = float(np.radians(rng.uniform(-5, 75) if thing.model.category != "person" else rng.uniform(-25, 25)))
     direction = np.array([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)])
     return np.asarray(aim + distance * direction)
 

@@ -27,12 +27,12 @@ from executive.cli.assembly import knowledge_of, open_world, shared_detector
 from executive.testing.bench import SkillBench
 from plant.dataset.compose import Placed, Scene, compose
 from plant.dataset.lighting import random_lighting
+from plant.dataset.objects import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
 from plant.dataset.render import is_validation
 from plant.dataset.resting import choose, resting_poses
 from plant.dataset.room import Support
 from plant.dataset.views import View, camera_specs
 from plant.diagram import LooseModel, build_diagram
-from plant.models.families import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
 from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from plant.simulation import Engine
 from plant.spot.capabilities import spot_capabilities
@@ -133,14 +133,14 @@ def in_flat(seed: int, number: int) -> Iterator[Asked]:
         seed=number,
     )
     for each in there:
-        places = [middle(thing) for thing in things if thing.model.family == each]
+        places = [middle(thing) for thing in things if thing.model.category == each]
         if places:
             yield asked("flat", number, bench, surface, each, places)
     yield asked("flat", number, bench, surface, absent, [])
 
 
-def held_out_instance(rng: np.random.Generator, family: str) -> ObjectModel:
-    return instance(str(family), int(rng.choice(numbers(str(family), for_training=False))))
+def held_out_instance(rng: np.random.Generator, category: str) -> ObjectModel:
+    return instance(str(category), int(rng.choice(numbers(str(category), for_training=False))))
 
 
 def scattered(
@@ -219,10 +219,10 @@ def in_room(seed: int, index: int, number: int, detector: Detector) -> Iterator[
         bench = SkillBench(
             robot, clock, localiser=KnownPlace(pose), costmap=BlockCostmap(), detector=detector, seed=number
         )
-        families = list(dict.fromkeys(thing.model.family for thing in things))
-        absent = [name for name in LYING_ABOUT if name not in {thing.model.family for thing in scene.things}]
-        for name in families[:2]:
-            alike = [thing for thing in scene.things if thing.model.family == name and _lies_on(thing, surface)]
+        categories = list(dict.fromkeys(thing.model.category for thing in things))
+        absent = [name for name in LYING_ABOUT if name not in {thing.model.category for thing in scene.things}]
+        for name in categories[:2]:
+            alike = [thing for thing in scene.things if thing.model.category == name and _lies_on(thing, surface)]
             yield asked("room", number, bench, surface, name, [middle(thing) for thing in alike])
         if absent:
             yield asked("room", number, bench, surface, str(rng.choice(absent)), [])
@@ -236,7 +236,7 @@ def _choices(rng: np.random.Generator, scene: Scene) -> Iterator[tuple[Surface, 
             continue
         surface = Surface("support", tuple(_corners(support)), support.height_m)
         for pose in _stands(scene, support):
-            things = [t for t in scene.things if t.model.family in LYING_ABOUT and _lies_on(t, surface)]
+            things = [t for t in scene.things if t.model.category in LYING_ABOUT and _lies_on(t, surface)]
             near = [t for t in things if math.hypot(*(middle(t)[:2] - [pose.x_m, pose.y_m])) < STAND_OFF_M + FRONT_M]
             if near:
                 yield surface, pose, near

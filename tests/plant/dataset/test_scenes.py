@@ -17,12 +17,12 @@ from scipy.spatial import ConvexHull
 
 from plant.dataset.compose import Placed, compose
 from plant.dataset.degrade import Degradation, degraded
+from plant.dataset.objects import instance
 from plant.dataset.render import is_validation
 from plant.dataset.resting import choose, resting_poses
 from plant.dataset.room import random_room
 from plant.dataset.textures import ROLES, numbers, texture
 from plant.dataset.views import any_view, camera_specs
-from plant.models.families import ODDMENT, instance
 from plant.worlds.placement import polygon_distance
 
 
@@ -33,9 +33,9 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> None:
         yield
 
 
-@pytest.mark.parametrize("family", ["hammer", "screwdriver", "wrench", "beer", "cube", "extinguisher", "kettle"])
-def test_a_thing_rests_on_three_points_under_its_centre_of_mass(family: str) -> None:
-    model = instance(family, 1)
+@pytest.mark.parametrize("category", ["hammer", "screwdriver", "wrench", "beer", "cube", "extinguisher", "kettle"])
+def test_a_thing_rests_on_three_points_under_its_centre_of_mass(category: str) -> None:
+    model = instance(category, 1)
     for pose in resting_poses(model):
         points = model.surface.points @ pose.R.T
         np.testing.assert_allclose(pose.R @ pose.R.T, np.eye(3), atol=1e-9)
@@ -61,9 +61,9 @@ def test_things_to_learn_from_lie_more_often_than_is_usual_and_people_do_not() -
     assert all(choose(rng, person, resting_poses(person), toppled=True).upright for _ in range(60))
 
 
-@pytest.mark.parametrize("family", ["cube", "cylinder", "coke"])
-def test_drake_leaves_a_standing_thing_where_it_was_put(family: str) -> None:
-    model = instance(family, 1)
+@pytest.mark.parametrize("category", ["cube", "cylinder", "coke"])
+def test_drake_leaves_a_standing_thing_where_it_was_put(category: str) -> None:
+    model = instance(category, 1)
     pose = resting_poses(model)[0]
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(time_step=0.004, discrete_contact_approximation="sap")
@@ -72,7 +72,7 @@ def test_drake_leaves_a_standing_thing_where_it_was_put(family: str) -> None:
         plant.world_body(), RigidTransform([0, 0, -0.5]), Box(4, 4, 1), "floor", CoulombFriction(0.8, 0.8)
     )
     Parser(plant).AddModels(str(model.path))
-    body = plant.GetBodyByName(family)
+    body = plant.GetBodyByName(category)
     X_WO = RigidTransform([0, 0, pose.height_m + 0.0005])
     plant.SetDefaultFloatingBaseBodyPose(body, X_WO)
     plant.Finalize()
@@ -152,13 +152,6 @@ def thing_outline(thing: Placed) -> tuple[float, np.ndarray]:
     return float(points[:, 2].min()), points[ConvexHull(points[:, :2]).vertices, :2]
 
 
-def test_oddments_lie_about_in_scenes_to_learn_from_and_in_no_others() -> None:
-    seen = compose(np.random.default_rng(4), 1, for_training=True)
-    kept = compose(np.random.default_rng(4), 1, for_training=False)
-    assert ODDMENT in {thing.model.family for thing in seen.things}
-    assert ODDMENT not in {thing.model.family for thing in kept.things}
-
-
 def test_every_tenth_scene_holds_distractors_only() -> None:
     scene = compose(np.random.default_rng(3), 9, for_training=True)
     assert scene.things
@@ -168,12 +161,12 @@ def test_every_tenth_scene_holds_distractors_only() -> None:
 
 def test_a_crowded_scene_holds_more_than_the_same_one_without(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("plant.dataset.compose.DISTRACTORS", ("mug",))
-    monkeypatch.setattr("plant.dataset.compose._any_instance", lambda _rng, family, _for_training: instance(family, 0))
+    monkeypatch.setattr("plant.dataset.compose._any_instance", lambda _rng, name, _for_training: instance(name, 0))
     held = dict[bool, Counter[str]]()
     for share in (0.0, 1.0):
         monkeypatch.setattr("plant.dataset.compose.CROWDED_SHARE", share)
         scene = compose(np.random.default_rng(3), 0, for_training=True)
-        held[scene.crowded] = Counter(thing.model.family for thing in scene.things)
+        held[scene.crowded] = Counter(thing.model.category for thing in scene.things)
     assert sum(held[True].values()) > 1.5 * sum(held[False].values())
     assert set(held[True]) >= {"beer", "coke", "hammer", "screwdriver", "wrench", "cylinder", "cube", "mug"}
     assert held[True]["person"] <= 1

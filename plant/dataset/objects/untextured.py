@@ -12,10 +12,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plant.models.builder.mesh import Mesh
-from plant.models.builder.outlines import arc
-from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_ring, add_tube
-from plant.models.families.draft import (
+from plant.dataset.objects.draft import (
     ALUMINIUM,
     FLESH,
     GLASS,
@@ -30,14 +27,17 @@ from plant.models.families.draft import (
     turned,
     varied,
 )
-from plant.models.families.solids import COLOURS, add_drum, add_rod, paint_grey, paint_plain, some_shine
+from plant.dataset.objects.solids import COLOURS, add_drum, add_rod, paint_grey, paint_plain, some_shine
+from plant.models.builder.mesh import Mesh
+from plant.models.builder.outlines import arc
+from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_ring, add_tube
 from skills.robot import FloatArray
 
-__all__ = ["SKETCH_MAKERS"]
+__all__ = ["UNTEXTURED_MAKERS"]
 
 Maker = Callable[[Draft], tuple[Finished, str, str]]
 
-KIND = "sketch"
+KIND = "untextured"
 _ALONG_Y = turned("x", -np.pi / 2)
 
 
@@ -394,7 +394,7 @@ def cylinder(draft: Draft) -> tuple[Finished, str, str]:
     return draft.finish(), KIND, word
 
 
-SKETCH_MAKERS: Mapping[str, Maker] = {
+UNTEXTURED_MAKERS: Mapping[str, Maker] = {
     "beer": beer,
     "coke": coke,
     "extinguisher": extinguisher,

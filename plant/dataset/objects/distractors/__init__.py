@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from plant.models.families.distractors import garage, groceries, house, kitchen, office, workshop
-from plant.models.families.draft import Draft, Finished
+from plant.dataset.objects.distractors import garage, groceries, house, kitchen, office, workshop
+from plant.dataset.objects.draft import Draft, Finished
 
 Maker = Callable[[Draft], tuple[Finished, str, str]]
 

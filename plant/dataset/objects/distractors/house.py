@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.models.builder.outlines import curve
-from plant.models.builder.pictures import cloth, noise
-from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_rounded_box, add_tube
-from plant.models.families.distractors.common import (
+from plant.dataset.objects.distractors.common import (
     Made,
     any_colour,
     between,
@@ -17,8 +14,11 @@ from plant.models.families.distractors.common import (
     surface_of,
     turn,
 )
-from plant.models.families.draft import CERAMIC, PLASTIC, Draft, pick, shade, turned
-from plant.models.families.wear import plain
+from plant.dataset.objects.draft import CERAMIC, PLASTIC, Draft, pick, shade, turned
+from plant.dataset.objects.wear import plain
+from plant.models.builder.outlines import curve
+from plant.models.builder.pictures import cloth, noise
+from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_rounded_box, add_tube
 
 
 def vase(draft: Draft) -> Made:

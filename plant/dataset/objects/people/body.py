@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from plant.dataset.objects.people.form import Build, Limb, Skeleton
 from plant.models.builder.implicit import Field, ball, cut, join, limb
-from plant.models.families.people.form import Build, Limb, Skeleton
 from skills.robot import FloatArray
 
 

@@ -7,10 +7,10 @@ from typing import Self
 
 import numpy as np
 
+from plant.dataset.objects.draft import ALUMINIUM, GLASS, WATER, Draft, Finished, pick, shade
+from plant.dataset.objects.wear import plain, scratched, uneven
 from plant.models.builder.mesh import Colour
 from plant.models.builder.pictures import noise
-from plant.models.families.draft import ALUMINIUM, GLASS, WATER, Draft, Finished, pick, shade
-from plant.models.families.wear import plain, scratched, uneven
 from skills.robot import FloatArray
 
 Profile = list[tuple[float, float]]

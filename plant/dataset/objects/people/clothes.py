@@ -8,13 +8,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.dataset.objects.draft import shade
+from plant.dataset.objects.lettering import blend, brand, emblem, write_word
+from plant.dataset.objects.people.body import lower_limbs, trunk, upper_limbs
+from plant.dataset.objects.people.form import Build, Skeleton
 from plant.models.builder.implicit import Field, ball, both, cut, grown, half_space, join, limb
 from plant.models.builder.mesh import Colour
 from plant.models.builder.pictures import cloth, noise
-from plant.models.families.draft import shade
-from plant.models.families.lettering import blend, brand, emblem, write_word
-from plant.models.families.people.body import lower_limbs, trunk, upper_limbs
-from plant.models.families.people.form import Build, Skeleton
 from skills.robot import FloatArray
 
 CLOTH_COLOURS: tuple[Colour, ...] = (

@@ -1,4 +1,4 @@
-"""Basic solids in plain colours: what sketches and oddments are put together from."""
+"""Basic solids in plain colours: the parts of untextured models."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from plant.dataset.objects.draft import UP_TO_X, Draft, pick, varied
 from plant.models.builder.mesh import Colour, Mesh
 from plant.models.builder.surfaces import add_ellipsoid
-from plant.models.families.draft import UP_TO_X, Draft, pick, varied
 
 __all__ = ["COLOURS", "GREYS", "add_drum", "add_rod", "any_plain", "paint_grey", "paint_plain", "some_shine"]
 

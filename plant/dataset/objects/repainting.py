@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from plant.dataset.objects.draft import Finished, pick, varied
+from plant.dataset.objects.solids import GREYS, any_plain
 from plant.models.builder.mesh import Material, Mesh
-from plant.models.families.draft import Finished, pick, varied
-from plant.models.families.solids import GREYS, any_plain
 
 __all__ = ["in_one_colour", "plainly_painted"]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plant.dataset.objects.draft import Draft, Finished, Profile, pick, shade
+from plant.dataset.objects.lettering import bar_code, blend, brand, emblem, small_print, write_word
+from plant.dataset.objects.wear import brushed, plain, rusty, used
 from plant.models.builder.mesh import Colour
 from plant.models.builder.outlines import curve
 from plant.models.builder.surfaces import add_rounded_box
-from plant.models.families.draft import Draft, Finished, Profile, pick, shade
-from plant.models.families.lettering import bar_code, blend, brand, emblem, small_print, write_word
-from plant.models.families.wear import brushed, plain, rusty, used
 from skills.robot import FloatArray
 
 Made = tuple[Finished, str, str]

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.models.builder.outlines import curve
-from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_tube
-from plant.models.families.containers import Bottle, Can, make_bottle, make_can
-from plant.models.families.distractors.common import (
+from plant.dataset.objects.containers import Bottle, Can, make_bottle, make_can
+from plant.dataset.objects.distractors.common import (
     Made,
     any_colour,
     between,
@@ -16,7 +14,9 @@ from plant.models.families.distractors.common import (
     surface_of,
     turn,
 )
-from plant.models.families.draft import Draft, pick, shade
+from plant.dataset.objects.draft import Draft, pick, shade
+from plant.models.builder.outlines import curve
+from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_tube
 
 
 def wine_bottle(draft: Draft) -> Made:

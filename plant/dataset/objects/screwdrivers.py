@@ -7,12 +7,12 @@ from typing import Self
 
 import numpy as np
 
+from plant.dataset.objects.draft import PLASTIC, STEEL, UP_TO_X, WOOD, Draft, Finished, shade
+from plant.dataset.objects.wear import plain, used
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import curve
 from plant.models.builder.pictures import wood
 from plant.models.builder.surfaces import add_fan, add_grid
-from plant.models.families.draft import PLASTIC, STEEL, UP_TO_X, WOOD, Draft, Finished, shade
-from plant.models.families.wear import plain, used
 
 _COLOURS = (
     ("red", (0.80, 0.07, 0.06)),

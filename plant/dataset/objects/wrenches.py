@@ -8,11 +8,11 @@ from typing import Self
 
 import numpy as np
 
+from plant.dataset.objects.draft import RUBBER, STEEL, Draft, Finished, pick, shade, turned
+from plant.dataset.objects.wear import brushed, plain, rusty, used
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import arc
 from plant.models.builder.surfaces import add_extruded, add_ring, add_tube
-from plant.models.families.draft import RUBBER, STEEL, Draft, Finished, pick, shade, turned
-from plant.models.families.wear import brushed, plain, rusty, used
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.models.builder.outlines import curve
-from plant.models.builder.surfaces import add_ellipsoid, add_tube
-from plant.models.families.distractors.common import (
+from plant.dataset.objects.distractors.common import (
     Made,
     any_colour,
     between,
@@ -15,7 +13,9 @@ from plant.models.families.distractors.common import (
     surface_of,
     turn,
 )
-from plant.models.families.draft import CERAMIC, GLASS, PLASTIC, STEEL, Draft, pick, shade
+from plant.dataset.objects.draft import CERAMIC, GLASS, PLASTIC, STEEL, Draft, pick, shade
+from plant.models.builder.outlines import curve
+from plant.models.builder.surfaces import add_ellipsoid, add_tube
 
 
 def mug(draft: Draft) -> Made:

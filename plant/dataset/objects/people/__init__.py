@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plant.dataset.objects.draft import FLESH, Draft, Finished, pick, shade
+from plant.dataset.objects.people.body import hand, hand_tip, head, lower_limbs, neck, upper_limbs
+from plant.dataset.objects.people.clothes import Outfit, bottom_field, bottom_picture, top_field, top_picture
+from plant.dataset.objects.people.form import SEAT_HEIGHT_M, Build, Limb, Skeleton, skeleton
+from plant.dataset.objects.wear import plain
 from plant.models.builder.implicit import Field, ball, both, cut, grown, half_space, join, limb, surface
 from plant.models.builder.mesh import Colour, Mesh
 from plant.models.builder.pictures import noise
 from plant.models.builder.shapes import Capsule, Cylinder
 from plant.models.builder.surfaces import add_ellipsoid, add_tube
-from plant.models.families.draft import FLESH, Draft, Finished, pick, shade
-from plant.models.families.people.body import hand, hand_tip, head, lower_limbs, neck, upper_limbs
-from plant.models.families.people.clothes import Outfit, bottom_field, bottom_picture, top_field, top_picture
-from plant.models.families.people.form import SEAT_HEIGHT_M, Build, Limb, Skeleton, skeleton
-from plant.models.families.wear import plain
 from skills.robot import FloatArray
 
 __all__ = ["SEAT_HEIGHT_M", "person"]

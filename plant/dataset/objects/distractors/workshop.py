@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.models.builder.outlines import curve
-from plant.models.builder.pictures import wood
-from plant.models.builder.surfaces import add_extruded, add_rounded_box, add_tube
-from plant.models.families.distractors.common import (
+from plant.dataset.objects.distractors.common import (
     Made,
     any_colour,
     between,
@@ -15,7 +12,10 @@ from plant.models.families.distractors.common import (
     steel,
     surface_of,
 )
-from plant.models.families.draft import STEEL, UP_TO_X, WOOD, Draft, pick, turned
+from plant.dataset.objects.draft import STEEL, UP_TO_X, WOOD, Draft, pick, turned
+from plant.models.builder.outlines import curve
+from plant.models.builder.pictures import wood
+from plant.models.builder.surfaces import add_extruded, add_rounded_box, add_tube
 
 
 def pliers(draft: Draft) -> Made:

@@ -7,12 +7,12 @@ from typing import Self
 
 import numpy as np
 
+from plant.dataset.objects.draft import RUBBER, STEEL, Draft, Finished, pick, shade, turned
+from plant.dataset.objects.lettering import bar_code, blend, brand, emblem, small_print, write_tall, write_word
+from plant.dataset.objects.wear import dirty, plain, used
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import curve
 from plant.models.builder.surfaces import add_rounded_box, add_tube
-from plant.models.families.draft import RUBBER, STEEL, Draft, Finished, pick, shade, turned
-from plant.models.families.lettering import bar_code, blend, brand, emblem, small_print, write_tall, write_word
-from plant.models.families.wear import dirty, plain, used
 from skills.robot import FloatArray
 
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.models.builder.mesh import Colour
-from plant.models.builder.outlines import curve
-from plant.models.families.containers import Bottle, Can, Profile, make_bottle, make_can
-from plant.models.families.draft import Draft, Finished, pick, shade, varied
-from plant.models.families.lettering import (
+from plant.dataset.objects.containers import Bottle, Can, Profile, make_bottle, make_can
+from plant.dataset.objects.draft import Draft, Finished, pick, shade, varied
+from plant.dataset.objects.lettering import (
     SCRIPT_FACES,
     bar_code,
     blend,
@@ -18,7 +16,9 @@ from plant.models.families.lettering import (
     write_tall,
     write_word,
 )
-from plant.models.families.wear import plain
+from plant.dataset.objects.wear import plain
+from plant.models.builder.mesh import Colour
+from plant.models.builder.outlines import curve
 from skills.robot import FloatArray
 
 LABEL_SHAPE = (256, 512)

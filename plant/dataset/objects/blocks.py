@@ -7,11 +7,11 @@ from typing import Self
 
 import numpy as np
 
+from plant.dataset.objects.draft import Draft, Finished, shade
+from plant.dataset.objects.lettering import write_word
+from plant.dataset.objects.wear import brushed, plain, used
 from plant.models.builder.pictures import cloth, noise, speckle, wood
 from plant.models.builder.surfaces import add_rounded_box
-from plant.models.families.draft import Draft, Finished, shade
-from plant.models.families.lettering import write_word
-from plant.models.families.wear import brushed, plain, used
 from skills.robot import FloatArray
 
 COLOURS = {

@@ -1,4 +1,4 @@
-"""Pictures of many models at once, to look at: `python -m plant.models.families.sheet FOLDER [FAMILY ...]`."""
+"""Pictures of many models at once, to look at: `python -m plant.dataset.objects.sheet FOLDER [FAMILY ...]`."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
+from plant.dataset.objects import CLASSES, DISTRACTORS, instance
+from plant.dataset.objects.model import ObjectModel
 from plant.models.builder.pictures import write_png
-from plant.models.families import CLASSES, DISTRACTORS, ODDMENT, instance
-from plant.models.families.model import ObjectModel
 from plant.pictures import look_at, render_view
 from plant.worlds.lights import lights
 from skills.robot import Picture
@@ -63,14 +63,14 @@ def _cell(model: ObjectModel, size: tuple[int, int]) -> Picture:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Write one sheet for each family, and one of all distractors."""
-    folder, families = Path(arguments[0]), arguments[1:] or [*CLASSES, "distractors"]
-    for family in families:
-        if family == "distractors":
+    """Write one sheet for each category, and one of all distractors."""
+    folder, categories = Path(arguments[0]), arguments[1:] or [*CLASSES, "distractors"]
+    for category in categories:
+        if category == "distractors":
             models = [instance(name, k) for name in DISTRACTORS for k in range(2)]
         else:
-            models = [instance(family, k) for k in range(48 if family in (*CLASSES, ODDMENT) else 8)]
-        write_png(folder / f"{family}.png", sheet(models, 8))
+            models = [instance(category, k) for k in range(48 if category in CLASSES else 8)]
+        write_png(folder / f"{category}.png", sheet(models, 8))
 
 
 if __name__ == "__main__":

@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.dataset.objects.draft import Finished
 from plant.models.builder.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, plain_colours, write_text
 from plant.models.builder.pictures import write_png
 from plant.models.builder.sdf import Model, model_sdf
-from plant.models.families.draft import Finished
 from skills.robot import FloatArray
 
 HELD_OUT_EVERY = 4
@@ -38,14 +38,14 @@ class Surface:
 
 @dataclass(frozen=True)
 class ObjectModel:
-    """One instance of a family. `folder` holds its SDF, OBJ, glTF and pictures.
+    """One instance of a category. `folder` holds its SDF, OBJ, glTF and pictures.
 
-    `class_id` is 0 for a distractor; `kind` is the form within the family ("claw"), `colour` its main colour.
+    `class_id` is 0 for a distractor; `kind` is the form within the category ("claw"), `colour` its main colour.
     The model's frame has its origin in the centre of the bounding box, a person's on the floor; `size_m` is that box.
     """
 
     folder: Path
-    family: str
+    category: str
     seed: int
     class_id: int
     kind: str
@@ -56,23 +56,23 @@ class ObjectModel:
 
     @property
     def name(self) -> str:
-        """Family and number, such as `hammer_017`."""
-        return f"{self.family}_{self.seed:03d}"
+        """Category and number, such as `hammer_017`."""
+        return f"{self.category}_{self.seed:03d}"
 
     @property
     def path(self) -> Path:
         """The SDF file."""
-        return self.folder / f"{self.family}.sdf"
+        return self.folder / f"{self.category}.sdf"
 
     @property
     def obj_path(self) -> Path:
         """The looks as OBJ, for rendering with plain shading."""
-        return self.folder / f"{self.family}.obj"
+        return self.folder / f"{self.category}.obj"
 
     @property
     def gltf_path(self) -> Path:
         """The looks as glTF, for rendering with physical shading."""
-        return self.folder / f"{self.family}.gltf"
+        return self.folder / f"{self.category}.gltf"
 
     @property
     def held_out(self) -> bool:
@@ -88,10 +88,12 @@ class ObjectModel:
 
 def write_model(folder: Path, model: ObjectModel, made: Finished) -> None:
     """Write all files of a model into a folder."""
-    sdf = Model(model.family, model.obj_path.name, made.collisions, made.mass, comment=f"{model.kind} {model.family}")
+    sdf = Model(
+        model.category, model.obj_path.name, made.collisions, made.mass, comment=f"{model.kind} {model.category}"
+    )
     write_text(folder / model.path.name, model_sdf(sdf))
-    write_text(folder / model.obj_path.name, obj_text(made.mesh, f"{model.family}.mtl"))
-    write_text(folder / f"{model.family}.mtl", mtl_text(made.mesh, "palette.png"))
+    write_text(folder / model.obj_path.name, obj_text(made.mesh, f"{model.category}.mtl"))
+    write_text(folder / f"{model.category}.mtl", mtl_text(made.mesh, "palette.png"))
     write_text(folder / model.gltf_path.name, gltf_text(made.mesh))
     for name, picture in made.pictures.items():
         write_png(folder / name, picture, compression=_QUICK)

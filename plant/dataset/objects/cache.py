@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-_SOURCES = ("models/families", "models/builder")
+_SOURCES = ("dataset/objects", "models/builder")
 
 
 @cache

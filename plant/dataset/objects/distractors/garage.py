@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.models.builder.outlines import arc, curve
-from plant.models.builder.pictures import wood
-from plant.models.builder.surfaces import add_extruded, add_ring, add_rounded_box, add_tube
-from plant.models.families.distractors.common import (
+from plant.dataset.objects.distractors.common import (
     Made,
     any_colour,
     between,
@@ -18,7 +15,10 @@ from plant.models.families.distractors.common import (
     surface_of,
     turn,
 )
-from plant.models.families.draft import PLASTIC, STEEL, UP_TO_X, WOOD, Draft, pick, shade, turned
+from plant.dataset.objects.draft import PLASTIC, STEEL, UP_TO_X, WOOD, Draft, pick, shade, turned
+from plant.models.builder.outlines import arc, curve
+from plant.models.builder.pictures import wood
+from plant.models.builder.surfaces import add_extruded, add_ring, add_rounded_box, add_tube
 
 
 def tape_measure(draft: Draft) -> Made:

@@ -12,12 +12,12 @@ from typing import Self
 
 import numpy as np
 
+from plant.dataset.objects.draft import RUBBER, STEEL, WOOD, Draft, Finished, pick, shade, turned
+from plant.dataset.objects.wear import brushed, plain, rusty, used
 from plant.models.builder.mesh import Mesh
 from plant.models.builder.outlines import curve
 from plant.models.builder.pictures import wood
 from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_grid, add_rounded_box, add_tube
-from plant.models.families.draft import RUBBER, STEEL, WOOD, Draft, Finished, pick, shade, turned
-from plant.models.families.wear import brushed, plain, rusty, used
 
 ALONG_Y = turned("x", -np.pi / 2)
 """Turns a part made along z so that it lies along y."""

@@ -1,0 +1,149 @@
+"""Families of things: nine classes and many distractors, each instance made from its number.
+
+`instance("hammer", 17)` gives an `ObjectModel`; the same category, number and sources give the same files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from plant.dataset.objects.blocks import cube, cylinder
+from plant.dataset.objects.cache import cache_folder, kept_folder, sources_digest
+from plant.dataset.objects.distractors import DISTRACTOR_MAKERS
+from plant.dataset.objects.draft import Draft, Finished
+from plant.dataset.objects.drinks import beer, coke
+from plant.dataset.objects.extinguishers import extinguisher
+from plant.dataset.objects.hammers import hammer
+from plant.dataset.objects.model import ObjectModel, Surface, held_out, read_model, write_model
+from plant.dataset.objects.people import person
+from plant.dataset.objects.repainting import in_one_colour, plainly_painted
+from plant.dataset.objects.screwdrivers import screwdriver
+from plant.dataset.objects.untextured import UNTEXTURED_MAKERS
+from plant.dataset.objects.wrenches import wrench
+from plant.models.catalogue import load_catalogue
+
+__all__ = [
+    "CLASSES",
+    "DISTRACTORS",
+    "ObjectModel",
+    "Surface",
+    "held_out",
+    "instance",
+    "is_untextured",
+    "make",
+    "numbers",
+    "repainted",
+    "sources_digest",
+]
+
+Maker = Callable[[Draft], tuple[Finished, str, str]]
+
+INSTANCES = 960
+"""How many instances of each class there are for the data set, but of people."""
+PEOPLE = 72
+"""How many people: each textured one takes seconds to make."""
+DISTRACTOR_INSTANCES = 96
+"""How many of each kind of distractor there are."""
+VALIDATION_BELOW, DISTRACTOR_VALIDATION_BELOW = 48, 8
+"""Validation takes held-out instances below these numbers, so that its pictures stay the same when more are added."""
+UNTEXTURED_OF_FIVE = (0, 2)
+"""Remainders by five of the numbers that are untextured, among the instances that validation does not take."""
+REPAINTED_OF_FIVE = 4
+"""Of those of some classes, the ones whose number leaves this are detailed in form and plain in colour."""
+_ONE_COLOUR: Mapping[str, float] = {"extinguisher": 0.0, "hammer": 0.4, "screwdriver": 0.4, "wrench": 0.4}
+"""Those classes, and how often they are of a single colour: not what is told by its colours."""
+_PLAIN_AS_A_CLASS = frozenset(
+    {
+        "battery",
+        "candle",
+        "food_can",
+        "jar",
+        "paint_tin",
+        "pipe",
+        "sauce_bottle",
+        "soda_can",
+        "spray_can",
+        "tissue_box",
+        "wine_bottle",
+    }
+)
+"""What would pass for a cylinder, a cube or a bottle of beer without its picture."""
+
+_CLASS_MAKERS: Mapping[str, Maker] = {
+    "beer": beer,
+    "coke": coke,
+    "extinguisher": extinguisher,
+    "hammer": hammer,
+    "screwdriver": screwdriver,
+    "wrench": wrench,
+    "person": person,
+    "cylinder": cylinder,
+    "cube": cube,
+}
+CLASSES: tuple[str, ...] = tuple(_CLASS_MAKERS)
+DISTRACTORS: tuple[str, ...] = tuple(sorted(DISTRACTOR_MAKERS))
+
+
+def numbers(category: str, *, for_training: bool) -> list[int]:
+    """The instances of a category that training may see, or those that validation does.
+
+    Every fourth number is kept from training.
+    """
+    if not for_training:
+        below = VALIDATION_BELOW if category in _CLASS_MAKERS else DISTRACTOR_VALIDATION_BELOW
+        return [number for number in range(below) if held_out(number)]
+    count = PEOPLE if category == "person" else INSTANCES if category in _CLASS_MAKERS else DISTRACTOR_INSTANCES
+    return [number for number in range(count) if not held_out(number)]
+
+
+def is_untextured(category: str, seed: int) -> bool:
+    """Whether an instance is untextured: plain colours, and for one of a class a few basic solids.
+
+    So are all people from number 48 on.
+    """
+    below = VALIDATION_BELOW if category in _CLASS_MAKERS else DISTRACTOR_VALIDATION_BELOW
+    if seed < below or category in _PLAIN_AS_A_CLASS:
+        return False
+    return category == "person" or seed % 5 in UNTEXTURED_OF_FIVE
+
+
+def repainted(category: str, seed: int) -> bool:
+    """Whether an instance of a class is of its usual form, but in plain colours without pictures."""
+    return category in _ONE_COLOUR and seed >= VALIDATION_BELOW and seed % 5 == REPAINTED_OF_FIVE
+
+
+def make(category: str, seed: int) -> tuple[Finished, str, str]:
+    """Make an instance without writing it: the model, its kind and its main colour. Raises KeyError, ValueError."""
+    plain = is_untextured(category, seed)
+    makers = UNTEXTURED_MAKERS if plain else _CLASS_MAKERS
+    maker = makers.get(category) or DISTRACTOR_MAKERS.get(category)
+    if maker is None:
+        raise KeyError(f"no category {category!r}; there are {', '.join((*CLASSES, *DISTRACTORS))}")
+    if seed < 0:
+        raise ValueError(f"an instance's number is 0 or more, not {seed}")
+    draft = Draft(np.random.default_rng([seed, *category.encode()]))
+    made, kind, colour = maker(draft)
+    if plain and category in DISTRACTOR_MAKERS:
+        made = plainly_painted(made, draft.rng)
+    if repainted(category, seed):
+        if draft.rng.random() < _ONE_COLOUR[category]:
+            made, colour = in_one_colour(made, draft.rng)
+        else:
+            made = plainly_painted(made, draft.rng, own_colours=1.0)
+    return made, kind, colour
+
+
+def instance(category: str, seed: int) -> ObjectModel:
+    """The instance of a category by its number, made now unless the cache has it. Raises KeyError, ValueError."""
+
+    def fill(folder: Path) -> None:
+        made, kind, colour = make(category, seed)
+        x, y, z = (float(v) for v in made.mass.com)
+        class_id = load_catalogue()[category].id if category in _CLASS_MAKERS else 0
+        model = ObjectModel(folder, category, seed, class_id, kind, colour, made.mass.mass_kg, (x, y, z), made.size_m)
+        write_model(folder, model, made)
+
+    return read_model(kept_folder(cache_folder() / f"{category}_{seed:03d}", fill))

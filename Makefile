@@ -1,6 +1,7 @@
 # make env    the virtual environment .venv with all but the training extra
 # make demo   one mission, end to end; look into out/
-# make test   all tests
+# make test   all tests; those of training run when the extra `train` is there
+# make train  adds the extra `train`: torch, to train the detector and the speech adapter
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
 
@@ -20,7 +21,7 @@ define install
 	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $(1) >/dev/null; }
 endef
 
-.PHONY: env demo test fast check bench format debian voices clean
+.PHONY: env train demo test fast check bench format debian voices clean
 
 env: $(VENV)/.ready
 
@@ -29,6 +30,12 @@ $(VENV)/.ready: pyproject.toml constraints.txt | debian
 	  || { echo "Errand needs Python 3.11; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[looks,view,speech,test,browser,bench,dev]'
+	@touch $@
+
+train: $(VENV)/.train
+
+$(VENV)/.train: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[train]'
 	@touch $@
 
 debian:

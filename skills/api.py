@@ -11,16 +11,18 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform
 
 from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
 from skills.robot import Clock, Lease, Pose2D, Robot, Scan
+
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
 
 ResultT = TypeVar("ResultT")
 ResultT_co = TypeVar("ResultT_co", covariant=True)

@@ -14,11 +14,13 @@ from __future__ import annotations
 import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NewType, Protocol
+from typing import TYPE_CHECKING, NewType, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform, RollPitchYaw
+
+if TYPE_CHECKING:  # Drake takes a third of a second to import; commands that move nothing do without
+    from pydrake.math import RigidTransform
 
 FloatArray = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -36,11 +38,15 @@ class Pose2D:
 
     def transform(self, z_m: float = 0.0) -> RigidTransform:
         """The same pose as a RigidTransform at height z_m."""
+        from pydrake.math import RigidTransform, RollPitchYaw
+
         return RigidTransform(RollPitchYaw(0.0, 0.0, self.yaw_rad), [self.x_m, self.y_m, z_m])
 
     @staticmethod
     def from_transform(X_AB: RigidTransform) -> Pose2D:
         """The planar part of X_AB."""
+        from pydrake.math import RollPitchYaw
+
         p = X_AB.translation()
         return Pose2D(float(p[0]), float(p[1]), float(RollPitchYaw(X_AB.rotation()).yaw_angle()))
 
@@ -97,6 +103,8 @@ class FrameTree:
         return self._from_root(parent).inverse() @ self._from_root(child)
 
     def _from_root(self, frame: str) -> RigidTransform:
+        from pydrake.math import RigidTransform
+
         X = RigidTransform()
         while frame != "odom":
             parent, X_PF = self.edges[frame]

@@ -57,7 +57,7 @@ def test_no_module_breaks_the_import_rule(package: str) -> None:
         ("plant/spot/robot.py", "from skills.api import Surface", ["skills.api.Surface"]),
         ("plant/spot/robot.py", "from skills.robot import Robot", []),
         ("executive/run/runner.py", "def f():\n    import plant.simulation", ["plant.simulation"]),
-        ("executive/run/runner.py", "from executive.cli.main import app", ["executive.cli.main.app"]),
+        ("executive/run/runner.py", "from executive.cli.entry import app", ["executive.cli.entry.app"]),
         ("executive/run/runner.py", "from skills.api import Cause", []),
         ("executive/cli/assembly.py", "from plant.simulation import Simulation", []),
     ],

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 from executive.cli.detector_choice import detector_of
 from executive.cli.promises import promises_of
-from executive.mission.errors import InputError, did_you_mean
-from executive.mission.knowledge import Knowledge, load_knowledge
+from executive.mission.errors import InputError
+from executive.mission.knowledge import Knowledge
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.check import Abilities, PlannedWays
@@ -19,7 +19,7 @@ from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
 from plant.spot.capabilities import spot_capabilities
-from plant.worlds.world import World, WorldError, known_worlds, load_world
+from plant.worlds.world import World, WorldError
 from skills.detect.attributes import known_attributes
 from skills.detect.careful_detector import CarefulDetector
 from skills.detect.detector_file import MODEL_FILE
@@ -35,28 +35,6 @@ UNSURE_SIGMA = (0.5, 0.5, 0.3)
 UNSURE_RADIUS_M = 4.0
 LIFT_KG = 5.0
 """What Spot's arm lifts continuously at half a metre, by its data sheet."""
-
-
-def open_world(name: str) -> World:
-    """A world by its name or folder. Raises InputError."""
-    try:
-        return load_world(name)
-    except (WorldError, OSError) as error:
-        raise _world_error(name, error) from error
-
-
-def _world_error(name: str, error: Exception) -> InputError:
-    """Of a world that is not there its name and what there is; else what its files say."""
-    if not isinstance(error, OSError) and not str(error).startswith("unknown world"):
-        return InputError(str(error))
-    near = did_you_mean(name, known_worlds())
-    known = f"known are {', '.join(known_worlds())}, and folders with a world.dmd.yaml"
-    return InputError(f"unknown world '{name[:60]}'", mend=f"did you mean '{near}'?" if near else known)
-
-
-def knowledge_of(world: World) -> Knowledge:
-    """What the robot is told of a world. Raises InputError."""
-    return load_knowledge(world.knowledge_path)
 
 
 def simulate(world: World, *, seed: int, robot_name: str, record: bool) -> Simulation:

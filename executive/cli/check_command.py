@@ -12,8 +12,9 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from executive.cli.assembly import abilities_of, itinerary_of, knowledge_of, open_world
+from executive.cli.assembly import abilities_of, itinerary_of
 from executive.cli.output import BAD_INPUT, console_for, print_json
+from executive.cli.worlds import knowledge_of, open_world
 from executive.language import DependencyParser, load_parser
 from executive.mission.errors import InputError
 from executive.mission.knowledge import Knowledge

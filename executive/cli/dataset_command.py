@@ -6,7 +6,7 @@ import os
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -19,7 +19,9 @@ from executive.cli.score_command import score_command
 from executive.cli.train_command import train_command
 from executive.mission.errors import InputError
 from plant.dataset.errors import DatasetError
-from plant.dataset.shards import Summary, render
+
+if TYPE_CHECKING:
+    from plant.dataset.shards import Summary
 
 __all__ = ["dataset"]
 
@@ -55,6 +57,8 @@ def render_command(
 
 
 def _rendered(out: Path, images: int, seed: int, jobs: int, console: Console) -> Summary:
+    from plant.dataset.shards import render
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

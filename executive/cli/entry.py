@@ -1,47 +1,101 @@
-"""Where the console script begins: commands on pictures alone are run without loading the language and the plant."""
+"""The command line: each command's module is imported when that command is asked for, and no sooner.
+
+Help and start-up would otherwise import the plant, the sentence parser and the detector for everything.
+"""
 
 from __future__ import annotations
 
-import sys
-from typing import Final
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Final
 
 import typer
+from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command
 
-from executive.cli.detect_command import detect
-from executive.cli.refine_command import refine_command
-from executive.cli.score_command import score_command
-from executive.cli.train_command import train_command
-
-__all__ = ["main"]
-
-LIGHT: Final = (("detect",), ("dataset", "score"), ("dataset", "train"), ("dataset", "refine"))
+__all__ = ["app", "loaded", "main"]
 
 
-def light_app() -> typer.Typer:
-    """The commands that need only pictures and the detector, as they stand in `executive.cli.main` too."""
-    app = typer.Typer(name="errand", add_completion=False, pretty_exceptions_enable=False)
-    app.command()(detect)
-    dataset = typer.Typer(name="dataset", help="Pictures with labels.")
-    dataset.command(name="score")(score_command)
-    dataset.command(name="train")(train_command)
-    dataset.command(name="refine")(refine_command)
-    dataset.callback()(_group)
-    app.add_typer(dataset)
-    return app
+@dataclass(frozen=True)
+class _Command:
+    """Where a command stands: its module, the function or `typer.Typer` in it, and its line in the help."""
+
+    module: str
+    attribute: str
+    help: str
 
 
-def _group() -> None:
-    """Pictures with labels."""
+COMMANDS: Final[Mapping[str, _Command]] = {
+    "run": _Command("main", "run", "Run a sentence or a mission file in the simulated world."),
+    "check": _Command(
+        "check_command", "check", "Check mission files without running them: commands, tree, paths, time and battery."
+    ),
+    "parse": _Command("parse_command", "parse", "Show the commands that a sentence means."),
+    "tree": _Command("tree_command", "tree", "Show the tree of a sentence, a mission file or a log."),
+    "listen": _Command(
+        "listen_command", "listen", "Recognise what is said in wav files or at the microphone, and its commands."
+    ),
+    "log": _Command("log_command", "log", "Print what each node of a run did and why, detections and the outcome."),
+    "replay": _Command("replay_command", "replay", "Show a run at any time of it: tree, map, pictures, events, 3D."),
+    "queue": _Command("queue_command", "queue", "Missions kept in a store, to be run one after another."),
+    "resume": _Command("resume_command", "resume", "Resume the mission that was interrupted; then run its queue."),
+    "evaluate": _Command(
+        "main", "evaluate", "Run a mission at many seeds and count what the trees claim and what the referee saw."
+    ),
+    "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
+    "dataset": _Command("dataset_command", "dataset", "Labelled pictures rendered in the plant; scores, training."),
+    "new-skill": _Command("new_skill_command", "new_skill", "Write an installable package with a skill and tests."),
+}
+"""The commands by name, in the order of the help."""
+
+
+def loaded(name: str) -> Any:
+    """The command of a name, its module imported. Raises KeyError."""
+    entry = COMMANDS[name]
+    found = getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute)
+    if isinstance(found, typer.Typer):
+        return get_command(found)
+    alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    alone.command(name=name)(found)
+    return get_command(alone)
+
+
+class _LazyGroup(TyperGroup):
+    """Lists all commands by their line of help, and imports the one that is resolved."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        for name, entry in COMMANDS.items():
+            self.add_command(TyperCommand(name, help=entry.help))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the first argument names, imported."""
+        if args and args[0] in COMMANDS:
+            self.add_command(loaded(args[0]), args[0])
+        return super().resolve_command(ctx, args)
+
+
+app = typer.Typer(
+    name="errand",
+    cls=_LazyGroup,
+    help="From an English request to a robot's work.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.callback()
+def _errand() -> None:
+    """From an English request to a robot's work."""
 
 
 def main() -> None:
-    """The entry point."""
-    if any(tuple(sys.argv[1 : 1 + len(words)]) == words for words in LIGHT):
-        light_app()()
-        return
-    from executive.cli.main import main as all_commands
-
-    all_commands()
+    """The entry point of the console script."""
+    logging.getLogger("drake").setLevel(logging.WARNING)
+    app()
 
 
 if __name__ == "__main__":

@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from executive.cli.assembly import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, console_for, refusals
+from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Status, Understanding, load_parser
 from executive.mission.errors import InputError
 from executive.mission.knowledge import Knowledge

@@ -1,8 +1,7 @@
-"""The command line: `errand parse | tree | run | evaluate`."""
+"""`errand run` and `errand evaluate`: missions in the simulated world."""
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -14,34 +13,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from executive.cli.answers import Answers
-from executive.cli.check_command import check
-from executive.cli.dataset_command import dataset
-from executive.cli.detect_command import detect
 from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run, run_arguments
-from executive.cli.listen_command import hear_request, listen
-from executive.cli.log_command import log
+from executive.cli.listen_command import hear_request
 from executive.cli.mission_run import Finished, run_request
-from executive.cli.new_skill_command import new_skill
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.page_view import PageView, queueing
-from executive.cli.parse_command import parse
-from executive.cli.queue_command import queue
-from executive.cli.replay_command import replay
 from executive.cli.requests import Request
-from executive.cli.resume_command import resume
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.sweep import rows, seed_range, sweep, totals
-from executive.cli.tree_command import tree
 from executive.language.questions import QuestionPolicy
 from executive.store.missions import MissionStore
-
-app = typer.Typer(
-    name="errand",
-    help="From an English request to a robot's work.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]
@@ -57,20 +38,6 @@ AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard 
 PageOf = Callable[[Request], PageView | None]
 
 
-app.command()(check)
-app.command()(tree)
-app.command()(parse)
-app.command()(listen)
-app.command()(log)
-app.command()(replay)
-app.command()(new_skill)
-app.command()(resume)
-app.add_typer(queue)
-app.add_typer(dataset)
-app.command()(detect)
-
-
-@app.command()
 def run(
     file: MissionFile = None,
     say: Say = None,
@@ -119,7 +86,6 @@ def run(
         raise typer.Exit(NOT_ACHIEVED)
 
 
-@app.command()
 def evaluate(
     file: MissionFile = None,
     say: Say = None,
@@ -155,12 +121,6 @@ def evaluate(
         print_json(result)
     if result["referee_successes"] < len(reports) or result["false_claims"]:
         raise typer.Exit(NOT_ACHIEVED)
-
-
-def main() -> None:
-    """The entry point of the console script."""
-    logging.getLogger("drake").setLevel(logging.WARNING)
-    app()
 
 
 def _run_kept(

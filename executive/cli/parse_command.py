@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from executive.cli.assembly import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json, refusals
+from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Status, Understanding, explain, load_parser, parse_lines
 from executive.language.explain_svg import arcs_svg
 from executive.language.explain_text import explanation_lines

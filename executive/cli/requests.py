@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from executive.cli.answers import NO_ANSWERS, Answers
-from executive.cli.assembly import knowledge_of, open_world
+from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Understanding, load_parser
 from executive.mission.command import parse_command
 from executive.mission.errors import InputError

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import Final, Protocol
+from types import ModuleType
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
-import spacy
-from spacy.language import Language
-from spacy.tokens import Token as SpacyToken
 
 from executive.language.nouns import FloatArray, NounKind, NounKinds, noun_examples
 from executive.language.repairs import repaired
 from executive.language.tokens import Token
 from executive.mission.errors import InputError
+
+if TYPE_CHECKING:
+    from spacy.language import Language
+    from spacy.tokens import Token as SpacyToken
 
 __all__ = ["DependencyParser", "SpacyParser", "Token", "load_parser"]
 
@@ -96,12 +101,31 @@ def load_parser() -> SpacyParser:
     folders = [] if spec is None or spec.origin is None else sorted(Path(spec.origin).parent.glob("en_core_web_*"))
     if not folders:
         raise InputError(f"the language model {_MODEL_PACKAGE!r} is missing", mend="install it with 'make env'")
+    with _spacy_without_command_line():
+        from spacy.util import load_model_from_path
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"\[W095\]")  # trained with a release a little older
-        pipeline = spacy.load(folders[-1], exclude=["senter", "ner", "strings"])
+        pipeline = load_model_from_path(folders[-1], exclude=["senter", "ner", "strings"])
     for label in (label for _, pipe in pipeline.pipeline for label in getattr(pipe, "labels", ())):
         pipeline.vocab.strings.add(label)
     return SpacyParser(pipeline)
+
+
+@contextmanager
+def _spacy_without_command_line() -> Iterator[None]:
+    """While spaCy is imported, an empty module stands in for its command line, which is most of the import's time."""
+    if "spacy" in sys.modules:
+        yield
+        return
+    names = ("spacy.cli", "spacy.cli.info")
+    stand_ins = {name: ModuleType(name) for name in names}
+    stand_ins["spacy.cli.info"].__dict__["info"] = None
+    sys.modules.update(stand_ins)
+    try:
+        yield
+    finally:
+        for name in names:
+            sys.modules.pop(name, None)
 
 
 def _token(token: SpacyToken, kind: NounKind | None) -> Token:

@@ -8,13 +8,15 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydrake.multibody.parsing import PackageMap
 
 from skills.robot import Pose2D
+
+if TYPE_CHECKING:
+    from pydrake.multibody.parsing import PackageMap
 
 WORLDS_FOLDER = Path(__file__).resolve().parent
 PACKAGE_NAME = "errand"

@@ -5,13 +5,11 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-import typer.main
-
-from executive.cli.main import app
+from executive.cli.entry import COMMANDS, loaded
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-_COMMANDS = typer.main.get_command(app).commands
+_COMMANDS = {name: loaded(name) for name in COMMANDS}
 _BLOCK = re.compile(r"(?:^<!-- (?P<mark>[^>]*) -->\n+)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 sys.path.insert(0, str(Path(__file__).parent))
 from documents import ROOT, unknown_command
 
-from executive.cli.main import app
+from executive.cli.entry import app
 
 _SHOWN = re.compile(r"^    (errand .*)$", re.MULTILINE)
 _QUICK = {"parse", "tree", "check", "queue"}

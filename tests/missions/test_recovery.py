@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from executive.cli.assembly import judge, knowledge_of, open_world, run_entry
+from executive.cli.assembly import judge, run_entry
+from executive.cli.worlds import knowledge_of, open_world
 from executive.mission.command import parse_command
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings, run

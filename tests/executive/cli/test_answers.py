@@ -5,7 +5,7 @@ import io
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import answers, main
+from executive.cli import answers, entry
 from executive.cli.answers import Answers, ask_at_terminal
 from executive.cli.durable import Asked
 from executive.language.questions import ClarifyingQuestion, QuestionPolicy, Slot
@@ -69,12 +69,12 @@ def test_the_files_own_policy_counts_unless_another_is_given(tmp_path):
 def test_without_a_policy_a_file_with_an_open_question_is_refused_with_its_line(tmp_path):
     path = tmp_path / "m.yaml"
     path.write_text(f"name: tidy\nsteps:\n  - say: {TABLE}\n")
-    result = CliRunner().invoke(main.app, ["check", str(path)])
+    result = CliRunner().invoke(entry.app, ["check", str(path)])
     assert result.exit_code == 2
     assert "m.yaml:3: Which table: kitchen table or coffee table?" in result.stdout + result.stderr
 
 
 def test_the_command_line_takes_answers():
     said = ["run", "--no-wake", "--say", "fetch me a cake", "--answer", "the moon"]
-    result = CliRunner().invoke(main.app, said)
+    result = CliRunner().invoke(entry.app, said)
     assert (result.exit_code, "cake" in result.stderr or "moon" in result.stderr) == (2, True)

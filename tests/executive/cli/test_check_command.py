@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import main
+from executive.cli import entry
 
 ROOT = Path(__file__).parents[3]
 GOOD = ROOT / "missions" / "go_living_room.yaml"
 
 
 def invoke(*arguments):
-    return CliRunner().invoke(main.app, ["check", *map(str, arguments)])
+    return CliRunner().invoke(entry.app, ["check", *map(str, arguments)])
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import cv2
 import pytest
 from typer.testing import CliRunner, Result
 
-from executive.cli.main import app
+from executive.cli.entry import app
 
 
 def errand(*arguments: str) -> Result:

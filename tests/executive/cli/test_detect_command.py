@@ -10,7 +10,7 @@ import pytest
 from tiny_detector import picture_of, write_model
 from typer.testing import CliRunner
 
-from executive.cli.entry import light_app
+from executive.cli.entry import app
 
 HAMMER = ("hammer", 0.9, (100, 50, 200, 80))
 BEER = ("beer", 0.6, (0, 0, 50, 50))
@@ -24,7 +24,7 @@ def model(tmp_path_factory):
 @pytest.fixture
 def detect(model):
     def invoked(*arguments):
-        return CliRunner().invoke(light_app(), ["detect", "--model", str(model), *(str(one) for one in arguments)])
+        return CliRunner().invoke(app, ["detect", "--model", str(model), *(str(one) for one in arguments)])
 
     return invoked
 
@@ -111,7 +111,7 @@ def test_wrong_arguments_are_refused(detect, arguments):
 
 def test_a_missing_model_is_named_with_the_command_that_makes_one(tmp_path):
     arguments = ["detect", str(picture(tmp_path / "a.png")), "--model", str(tmp_path / "none.onnx"), "--json"]
-    result = CliRunner().invoke(light_app(), arguments)
+    result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 2
     assert result.stdout == ""
     assert result.stderr == (

@@ -4,7 +4,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from executive.cli import learning
-from executive.cli.entry import light_app
+from executive.cli.entry import app
 
 
 @pytest.fixture(params=["train", "refine"])
@@ -14,7 +14,7 @@ def command(request: pytest.FixtureRequest) -> str:
 
 
 def run(*words: str) -> Result:
-    return CliRunner().invoke(light_app(), ["dataset", *words])
+    return CliRunner().invoke(app, ["dataset", *words])
 
 
 def test_without_torch_the_extra_is_named(

@@ -8,8 +8,8 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import executive.cli.listen_command as listen_command
+from executive.cli.entry import app
 from executive.cli.listen_command import answer_line, hear_request, show_hearing
-from executive.cli.main import app
 from executive.language import Status, Understanding
 from executive.mission.errors import InputError
 from executive.speech.microphone import follow

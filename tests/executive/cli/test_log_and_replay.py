@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import main, replay_command
+from executive.cli import entry, replay_command
 from executive.record.event_log import EventLog
 from skills.api import Cause, Failed
 
 
 def invoke(*arguments: object):
-    return CliRunner().invoke(main.app, [str(argument) for argument in arguments])
+    return CliRunner().invoke(entry.app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import main
+from executive.cli import entry, main
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
 from executive.view.model import node_view
@@ -15,7 +15,7 @@ FETCH = "Hey Alice, can you fetch me a drink from the kitchen"
 
 
 def invoke(*arguments: str):
-    return CliRunner().invoke(main.app, list(arguments))
+    return CliRunner().invoke(entry.app, list(arguments))
 
 
 def report(**changes) -> RunReport:

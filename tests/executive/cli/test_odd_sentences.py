@@ -6,7 +6,7 @@ import time
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import main
+from executive.cli import entry
 
 ODD = {
     "empty": "",
@@ -27,7 +27,7 @@ ODD = {
 @pytest.mark.parametrize("command", [("parse",), ("tree",), ("run", "--no-wake", "--say"), ("run", "--say")])
 def test_an_odd_sentence_is_refused_in_one_line(command, sentence):
     begin = time.process_time()
-    result = CliRunner().invoke(main.app, [*command, sentence])
+    result = CliRunner().invoke(entry.app, [*command, sentence])
     assert (result.exit_code, result.stdout) == (2, "")
     (line,) = result.stderr.splitlines()
     assert line.startswith("errand: ")
@@ -38,7 +38,7 @@ def test_an_odd_sentence_is_refused_in_one_line(command, sentence):
 def test_a_file_of_odd_sentences_is_answered_line_by_line(tmp_path):
     path = tmp_path / "odd.txt"
     path.write_text("\n".join(text.replace("\x08", "") for text in ODD.values()), encoding="utf-8")
-    result = CliRunner().invoke(main.app, ["parse", "--jsonl", "--file", str(path)])
+    result = CliRunner().invoke(entry.app, ["parse", "--jsonl", "--file", str(path)])
     answers = [json.loads(line) for line in result.stdout.splitlines()]
     assert result.exit_code == 0
     assert len(answers) >= len(ODD)
@@ -46,5 +46,5 @@ def test_a_file_of_odd_sentences_is_answered_line_by_line(tmp_path):
 
 
 def test_emoji_and_control_characters_around_a_sentence_do_no_harm():
-    result = CliRunner().invoke(main.app, ["parse", "🙂 go to\x07 the kitchen 🙂"])
+    result = CliRunner().invoke(entry.app, ["parse", "🙂 go to\x07 the kitchen 🙂"])
     assert result.stdout.splitlines() == ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"]

@@ -4,13 +4,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import main
+from executive.cli import entry
 
 SENTENCE = "bring me the cup, no, the red mug"
 
 
 def invoke(*arguments):
-    return CliRunner().invoke(main.app, ["parse", "--open", *arguments])
+    return CliRunner().invoke(entry.app, ["parse", "--open", *arguments])
 
 
 def test_explain_shows_the_steps_from_the_words_to_the_commands():

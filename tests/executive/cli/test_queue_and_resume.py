@@ -8,7 +8,7 @@ import pytest
 from py_trees.common import Status
 from typer.testing import CliRunner
 
-from executive.cli import main, queue_run, requests, resume_command
+from executive.cli import entry, main, queue_run, requests, resume_command
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
 from executive.mission.command import Command
@@ -73,7 +73,7 @@ def errand(tmp_path):
     def invoke(*arguments):
         where = ("--store", str(tmp_path / "out" / "missions.sqlite"))
         out = () if arguments[0] == "resume" else ("--out", str(tmp_path / "out"))
-        return CliRunner().invoke(main.app, [*arguments, *where, *out])
+        return CliRunner().invoke(entry.app, [*arguments, *where, *out])
 
     return invoke
 

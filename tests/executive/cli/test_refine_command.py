@@ -4,11 +4,11 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from executive.cli import learning
-from executive.cli.entry import light_app
+from executive.cli.entry import app
 
 
 def run(*words: str) -> Result:
-    return CliRunner().invoke(light_app(), ["dataset", "refine", *words])
+    return CliRunner().invoke(app, ["dataset", "refine", *words])
 
 
 def test_a_first_network_that_is_not_there_is_named(

@@ -8,7 +8,7 @@ import pytest
 from tiny_detector import picture_of, write_model
 from typer.testing import CliRunner
 
-from executive.cli.entry import light_app
+from executive.cli.entry import app
 from skills.detect.careful_detector import CarefulDetector
 
 HAMMER, BEER, STRAY = (
@@ -27,7 +27,7 @@ def model(tmp_path_factory):
 def score(model):
     def invoked(*arguments):
         words = ["dataset", "score", "--model", str(model), *(str(one) for one in arguments)]
-        return CliRunner().invoke(light_app(), words)
+        return CliRunner().invoke(app, words)
 
     return invoked
 

@@ -18,12 +18,13 @@ from pydrake.geometry import (
     SceneGraph,
 )
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import LoadModelDirectives, Parser, ProcessModelDirectives
+from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.scene import Scene
+from plant.scenery import add_model, add_scenery
 from plant.spot.model import SpotModel
 
 TIME_STEP_S = 0.005
@@ -45,7 +46,8 @@ class LooseModel:
 class WorldDiagram:
     """The finished Diagram and handles to its parts.
 
-    `scene` renders it, where that was wanted; `rebuild` makes the same once more, shown in a Meshcat.
+    `scenery` names the model that each collision shape of the world body comes from. `scene` renders it, where that
+    was wanted; `rebuild` makes the same once more, shown in a Meshcat.
     """
 
     diagram: Diagram
@@ -53,6 +55,7 @@ class WorldDiagram:
     scene_graph: SceneGraph
     robots: Mapping[str, SpotModel]
     models: Mapping[str, ModelInstanceIndex]
+    scenery: Mapping[GeometryId, str]
     scene: Scene | None
     rebuild: Callable[[Meshcat], WorldDiagram]
 
@@ -88,11 +91,8 @@ def build_diagram(
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(time_step=time_step_s, discrete_contact_approximation="sap")
     plant, scene_graph = AddMultibodyPlant(config, builder)
-    parser = Parser(plant)
-    parser.SetAutoRenaming(True)
-    parser.package_map().Add(PACKAGE, Path(__file__).parent)
-    if directives is not None:
-        ProcessModelDirectives(LoadModelDirectives(directives), parser)
+    parser = _parser_of(plant)
+    scenery = {} if directives is None else add_scenery(plant, directives, _parser_of)
     instances = {model.name: _add_model(plant, parser, model) for model in models}
     robots = {name: SpotModel(plant, name, looks=looks, carried=carried) for name in sorted(robot_names)}
     plant.Finalize()
@@ -109,13 +109,19 @@ def build_diagram(
     diagram = builder.Build()
     scene = Scene(diagram, plant, scene_graph, renderer_parameters) if render else None
     return WorldDiagram(
-        diagram, plant, scene_graph, robots, instances, scene, lambda shown_in: rebuild(meshcat=shown_in)
+        diagram, plant, scene_graph, robots, instances, scenery, scene, lambda shown_in: rebuild(meshcat=shown_in)
     )
 
 
+def _parser_of(plant: MultibodyPlant) -> Parser:
+    parser = Parser(plant)
+    parser.SetAutoRenaming(True)
+    parser.package_map().Add(PACKAGE, Path(__file__).parent)
+    return parser
+
+
 def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> ModelInstanceIndex:
-    instance: ModelInstanceIndex
-    (instance,) = parser.AddModels(str(model.path))
+    instance = add_model(parser, model.path)
     plant.RenameModelInstance(instance, model.name)
     if model.fixed:
         (body,) = plant.GetBodyIndices(instance)[:1]

@@ -171,7 +171,11 @@ class Simulation:
         )
         self.engine = Engine(built, _starts(world.start, robot_names), seed=seed, dock=world.dock, charge=charge)
         self.referee = Referee(
-            built.plant, [*things, *people], robots=sorted(robot_names), persons=[each.name for each in people]
+            built.plant,
+            [*things, *people],
+            robots=sorted(robot_names),
+            persons=[each.name for each in people],
+            scenery=built.scenery,
         )
         self.recorder = Recorder(built, self.engine.context) if record else None
         self._watch()

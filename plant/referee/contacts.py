@@ -16,15 +16,17 @@ Pair = tuple[int, int]
 FLOOR_Z_M = 0.04
 
 
-def touching(results: ContactResults, body_of_geometry: Mapping[GeometryId, int]) -> dict[Pair, float]:
-    """Pairs of body indices (lower first) in contact, and the height of their lowest contact point (m)."""
+def touching(results: ContactResults, actor_of_geometry: Mapping[GeometryId, int]) -> dict[Pair, float]:
+    """Pairs of actors' numbers (lower first) in contact, and the height of their lowest contact point (m)."""
     lowest: dict[Pair, float] = {}
     for i in range(results.num_point_pair_contacts()):
         info = results.point_pair_contact_info(i)
-        _lower(lowest, int(info.bodyA_index()), int(info.bodyB_index()), float(info.contact_point()[2]))
+        pair = info.point_pair()
+        a, b = actor_of_geometry[pair.id_A], actor_of_geometry[pair.id_B]
+        _lower(lowest, a, b, float(info.contact_point()[2]))
     for i in range(results.num_hydroelastic_contacts()):
         surface = results.hydroelastic_contact_info(i).contact_surface()
-        a, b = body_of_geometry[surface.id_M()], body_of_geometry[surface.id_N()]
+        a, b = actor_of_geometry[surface.id_M()], actor_of_geometry[surface.id_N()]
         _lower(lowest, a, b, float(surface.centroid()[2]))
     return lowest
 

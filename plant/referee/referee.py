@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
+from pydrake.geometry import GeometryId
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
@@ -31,14 +33,15 @@ class Referee:
         robots: Sequence[str],
         persons: Sequence[str] = (),
         links: LinkNames | None = None,
+        scenery: Mapping[GeometryId, str] = MappingProxyType({}),
     ) -> None:
-        """Build for a finalized plant.
+        """Build for a finalized plant; `scenery` names the pieces of furniture whose shapes are the world body's.
 
         `placements` are the loose objects; those named in `persons` are people. `robots` are the model instances of the
         robots. Raises ValueError that names what the plant does not have.
         """
         self._plant, self._results = plant, plant.get_contact_results_output_port()
-        self._cast = Cast.of(plant, placements, robots, persons, links or LinkNames())
+        self._cast = Cast.of(plant, placements, robots, persons, links or LinkNames(), scenery)
         self._counter = CollisionCounter(self._cast.actors)
         self._stories = {name: ObjectStory(name, self._cast.classes[name]) for name in self._cast.objects}
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
@@ -73,7 +76,7 @@ class Referee:
 
     def observe(self, plant_context: Context, time_s: float) -> None:
         """Look at the plant's state at time_s."""
-        pairs = touching(self._results.Eval(plant_context), self._cast.body_of_geometry)
+        pairs = touching(self._results.Eval(plant_context), self._cast.actor_of_geometry)
         self._counter.update(time_s, pairs)
         self._bases = {name: self._position(plant_context, body) for name, body in self._cast.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._cast.persons.items()}

@@ -104,7 +104,11 @@ class SpotModel:
 
 
 class JointIndex:
-    """Index arrays of a Spot's joints: into the plant's positions and velocities, in the order of its actuators."""
+    """Index arrays of a Spot's joints: into the plant's positions and velocities, in the order of its actuators.
+
+    `arm`, `jaw` and `legs` stand for positions in the desired state of the actuators, `arm_rates` and `leg_rates` for
+    velocities there.
+    """
 
     def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
         actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices(instance)]
@@ -118,4 +122,5 @@ class JointIndex:
         self.arm = np.array([self.names.index(name) for name in arm_joint_names()])
         self.jaw = self.names.index(JAW)
         self.legs = np.array([[self.names.index(joint) for joint in leg_joint_names(leg)] for leg in LEGS])
+        self.arm_rates, self.leg_rates = len(joints) + self.arm, len(joints) + self.legs
         self.jaw_gain = _ARM_GAINS[JAW][0]

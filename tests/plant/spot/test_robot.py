@@ -27,7 +27,7 @@ def lease(spot):
 def truth(engine):
     """(x, y, yaw, height, pitch) of the carrier."""
     model = engine.world.robots["Alice"]
-    return model.carrier.state(engine.world.plant.GetPositions(engine.context))
+    return np.array(model.carrier.state(engine.world.plant.GetPositions(engine.context)))
 
 
 def arm_to(spot, offset_rad, seconds):

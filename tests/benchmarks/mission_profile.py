@@ -20,7 +20,15 @@ ROOT = Path(__file__).resolve().parents[2]
 FETCH = ("--say", "Hey Alice, can you fetch me a drink from the kitchen", "--world", "flat", "--seed", "1")
 QUIET = ("--no-record", "--quiet", "--json")
 PERIOD_S = 0.002
-WHOLE = ("plant/snapshot", "plant/worlds", "plant/diagram.py", "skills/navigate/people_watch.py", "skills/grasp")
+WHOLE = (
+    "plant/snapshot",
+    "plant/worlds",
+    "plant/diagram.py",
+    "plant/sensors/camera",
+    "plant/scene.py",
+    "skills/navigate/people_watch.py",
+    "skills/grasp",
+)
 SUBSYSTEMS = {
     "plant/snapshot": "snapshots",
     "plant/worlds": "parsing the world",

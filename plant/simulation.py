@@ -15,6 +15,7 @@ from plant.diagram import LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
+from plant.sleeping import Sleepers
 from plant.snapshot.file import read_snapshot
 from plant.snapshot.keeper import SnapshotKeeper, restore
 from plant.snapshot.values import State
@@ -27,7 +28,8 @@ from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 
 CONTROL_PERIOD_S = 0.01
-REFEREE_PERIOD_STEPS = 2
+SLEEP_PERIOD_STEPS = 2
+REFEREE_PERIOD_STEPS = 5
 SETTLING_S = 1.5
 
 
@@ -57,6 +59,7 @@ class Engine:
             name: SpotRobot(model, self._sensors(model, seed), self.context)
             for name, model in sorted(world.robots.items())
         }
+        self._sleepers = Sleepers(world, self.root_context)
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
         self._after_advance: list[Callable[[], None]] = []
@@ -79,6 +82,11 @@ class Engine:
         """The robots by name."""
         return self._spots
 
+    @property
+    def asleep(self) -> frozenset[str]:
+        """Loose objects at rest, which do not move until something comes near."""
+        return self._sleepers.asleep
+
     def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
         """Call `observer(now_s)` after every control period, or every so many."""
         self._observers.append((every, observer))
@@ -90,6 +98,8 @@ class Engine:
     def advance(self, dt_s: float) -> None:
         """Step the plant by dt_s, rounded to whole control periods (at least one)."""
         for _ in range(max(1, round(dt_s / CONTROL_PERIOD_S))):
+            if self._steps % SLEEP_PERIOD_STEPS == 0:
+                self._sleepers.update(self.now())
             self._command_robots()
             self._steps += 1
             self._simulator.AdvanceTo(self.now())
@@ -122,6 +132,7 @@ class Engine:
         """
         if set(world) != set(self.world_state()):
             raise ValueError("the parts of the world are others")
+        self._sleepers.wake_all()
         self._steps = state["steps"]
         self.root_context.SetTime(self.now())
         for group, values in world.items():
@@ -187,7 +198,7 @@ class Simulation:
             self.engine.observe(self.recorder)
 
     def _referee_looks(self, now_s: float) -> None:
-        self.referee.observe(self.engine.context, now_s)
+        self.referee.observe(self.engine.context, now_s, asleep=self.engine.asleep)
 
     @property
     def clock(self) -> Engine:

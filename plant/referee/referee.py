@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -74,8 +75,8 @@ class Referee:
         """The way of a robot's body so far, (N, 3) in the world, a point every few centimetres. Raises KeyError."""
         return np.array(self._paths[robot], dtype=np.float64).reshape(-1, 3)
 
-    def observe(self, plant_context: Context, time_s: float) -> None:
-        """Look at the plant's state at time_s."""
+    def observe(self, plant_context: Context, time_s: float, *, asleep: Collection[str] = ()) -> None:
+        """Look at the plant's state at time_s; objects that are `asleep` are as they were at the last look."""
         pairs = touching(self._results.Eval(plant_context), self._cast.actor_of_geometry)
         self._counter.update(time_s, pairs)
         self._bases = {name: self._position(plant_context, body) for name, body in self._cast.bases.items()}
@@ -84,8 +85,11 @@ class Referee:
             _extend(self._paths[name], p_WB)
         neighbours = self._neighbours(pairs)
         for name, body in self._cast.objects.items():
-            touches = neighbours.get(int(body.index()), {})
-            self._stories[name].take(self._look(plant_context, time_s, self._position(plant_context, body), touches))
+            story, touches = self._stories[name], neighbours.get(int(body.index()), {})
+            if name in asleep:
+                story.take(replace(story.last, time_s=time_s))
+            else:
+                story.take(self._look(plant_context, time_s, self._position(plant_context, body), touches))
         self._note_offers(time_s)
 
     def judge(self, promises: Sequence[Promise]) -> Verdict:

@@ -28,7 +28,7 @@ class LidarSpec:
 
     rings: int = 16
     half_fov_rad: float = float(np.radians(15.0))
-    azimuth_step_rad: float = float(np.radians(0.2))
+    azimuth_step_rad: float = float(np.radians(0.4))
     min_range_m: float = 0.5
     max_range_m: float = 100.0
     sigma_m: float = 0.03

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -55,6 +56,7 @@ class Engine:
         self.context: Context = world.plant.GetMyMutableContextFromRoot(self.root_context)
         for name, pose in starts.items():
             world.robots[name].place(self.context, pose)
+        self.work: Counter[str] = Counter()
         self._spots = {
             name: SpotRobot(model, self._sensors(model, seed), self.context)
             for name, model in sorted(world.robots.items())
@@ -75,6 +77,7 @@ class Engine:
             scene=self.world.scene,
             dock=self._dock,
             charge=self._charge,
+            work=self.work,
         )
 
     @property
@@ -103,6 +106,7 @@ class Engine:
             self._command_robots()
             self._steps += 1
             self._simulator.AdvanceTo(self.now())
+            self.work["plant_steps"] += round(CONTROL_PERIOD_S / self.world.plant.time_step())
             for every, observer in self._observers:
                 if self._steps % every == 0:
                     observer(self.now())
@@ -209,6 +213,10 @@ class Simulation:
     def robots(self) -> Mapping[str, Robot]:
         """The robots by name."""
         return self.engine.robots
+
+    def work(self) -> Mapping[str, int]:
+        """What this process has had to do so far, by name: counts that the same run repeats, whatever the machine."""
+        return {**self.engine.work, "contact_points": self.referee.contact_points}
 
     def keep_in(self, path: Path, *, label: str = "") -> None:
         """Write the whole state to a file now and after every advance of the clock; `label` says what it is for."""

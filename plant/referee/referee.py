@@ -47,6 +47,7 @@ class Referee:
         self._stories = {name: ObjectStory(name, self._cast.classes[name]) for name in self._cast.objects}
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
         self._offers: dict[tuple[str, str], float] = {}
+        self.contact_points = 0
         self._bases: dict[str, FloatArray] = {}
         self._persons: dict[str, FloatArray] = {}
 
@@ -77,7 +78,9 @@ class Referee:
 
     def observe(self, plant_context: Context, time_s: float, *, asleep: Collection[str] = ()) -> None:
         """Look at the plant's state at time_s; objects that are `asleep` are as they were at the last look."""
-        pairs = touching(self._results.Eval(plant_context), self._cast.actor_of_geometry)
+        results = self._results.Eval(plant_context)
+        self.contact_points += results.num_point_pair_contacts() + results.num_hydroelastic_contacts()
+        pairs = touching(results, self._cast.actor_of_geometry)
         self._counter.update(time_s, pairs)
         self._bases = {name: self._position(plant_context, body) for name, body in self._cast.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._cast.persons.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Protocol
@@ -59,10 +60,12 @@ class SpotSensors:
         scene: Scene | None = None,
         dock: Pose2D | None = None,
         charge: float = 1.0,
+        work: Counter[str] | None = None,
     ) -> None:
         """`context` is the plant's. The seed and the robot's name give the noise. Without a scene, cameras are blind.
 
-        The battery begins at `charge` (0 to 1) and charges while the body stands still at `dock`.
+        The battery begins at `charge` (0 to 1) and charges while the body stands still at `dock`. `work` counts rays
+        cast and pictures rendered.
         """
         self._model, self._scene_graph, self._dock = model, scene_graph, dock
         self._scene, self._context = scene, context
@@ -75,18 +78,18 @@ class SpotSensors:
         self._joint_model = JointModel(next(rngs), self._index.names)
         self._gripper_model = GripperModel(next(rngs))
         self._battery_model = BatteryModel(next(rngs), charge, BatterySpec(runtime_s=body["runtime"]))
-        self._lidar = self._make_lidar(next(rngs))
+        self._lidar = self._make_lidar(next(rngs), work)
         self._cameras = {
-            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER)
+            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER, work=work)
             for name, spec in load_cameras(CAMERAS).items()
         }
         self._scan: Scan | None = None
         self.update(0.0)
 
-    def _make_lidar(self, rng: np.random.Generator) -> Lidar:
+    def _make_lidar(self, rng: np.random.Generator, work: Counter[str] | None) -> Lidar:
         plant, X_BL = self._model.plant, RigidTransform(spot_facts()["lidar"]["xyz"])
         inspector = self._scene_graph.model_inspector()
-        return Lidar(plant, inspector, self._model.body, X_BL, rng, unseen=self._model.instances())
+        return Lidar(plant, inspector, self._model.body, X_BL, rng, unseen=self._model.instances(), work=work)
 
     def _link_frame(self, link: str) -> FrameId:
         plant = self._model.plant

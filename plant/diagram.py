@@ -91,8 +91,8 @@ def build_diagram(
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(time_step=time_step_s, discrete_contact_approximation="sap")
     plant, scene_graph = AddMultibodyPlant(config, builder)
-    parser = _parser_of(plant)
-    scenery = {} if directives is None else add_scenery(plant, directives, _parser_of)
+    parser = parser_of(plant)
+    scenery = {} if directives is None else add_scenery(plant, directives, parser_of)
     instances = {model.name: _add_model(plant, parser, model) for model in models}
     robots = {name: SpotModel(plant, name, looks=looks, carried=carried) for name in sorted(robot_names)}
     plant.Finalize()
@@ -113,7 +113,8 @@ def build_diagram(
     )
 
 
-def _parser_of(plant: MultibodyPlant) -> Parser:
+def parser_of(plant: MultibodyPlant) -> Parser:
+    """A parser that knows the package of the worlds and models."""
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
     parser.package_map().Add(PACKAGE, Path(__file__).parent)

@@ -74,7 +74,8 @@ def build_diagram(
 ) -> WorldDiagram:
     """A Diagram of the directives' world (or an empty one) with models and robots.
 
-    SAP contact at `time_step_s`; positions of the models are defaults of the plant, the robots' are set by the caller.
+    SAP contact at `time_step_s`; sampled outputs, which would double the cost of a step, are off, so that evaluating
+    contact results solves once more. Positions of the models are defaults, the robots' are set by the caller.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
     `looks` draws Spot with meshes where they are installed; `render` makes the scene for cameras.
     """
@@ -89,7 +90,9 @@ def build_diagram(
         time_step_s=time_step_s,
     )
     builder = DiagramBuilder()
-    config = MultibodyPlantConfig(time_step=time_step_s, discrete_contact_approximation="sap")
+    config = MultibodyPlantConfig(
+        time_step=time_step_s, discrete_contact_approximation="sap", use_sampled_output_ports=False
+    )
     plant, scene_graph = AddMultibodyPlant(config, builder)
     parser = parser_of(plant)
     scenery = {} if directives is None else add_scenery(plant, directives, parser_of)

@@ -41,7 +41,7 @@ class Referee:
         `placements` are the loose objects; those named in `persons` are people. `robots` are the model instances of the
         robots. Raises ValueError that names what the plant does not have.
         """
-        self._plant, self._results = plant, plant.get_contact_results_output_port()
+        self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
         self._cast = Cast.of(plant, placements, robots, persons, links or LinkNames(), scenery)
         self._counter = CollisionCounter(self._cast.actors)
         self._stories = {name: ObjectStory(name, self._cast.classes[name]) for name in self._cast.objects}
@@ -78,9 +78,9 @@ class Referee:
 
     def observe(self, plant_context: Context, time_s: float, *, asleep: Collection[str] = ()) -> None:
         """Look at the plant's state at time_s; objects that are `asleep` are as they were at the last look."""
-        results = self._results.Eval(plant_context)
-        self.contact_points += results.num_point_pair_contacts() + results.num_hydroelastic_contacts()
-        pairs = touching(results, self._cast.actor_of_geometry)
+        penetrations = self._geometry.Eval(plant_context).ComputePointPairPenetration()
+        self.contact_points += len(penetrations)
+        pairs = touching(penetrations, self._cast.actor_of_geometry)
         self._counter.update(time_s, pairs)
         self._bases = {name: self._position(plant_context, body) for name, body in self._cast.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._cast.persons.items()}

@@ -106,7 +106,7 @@ class SpotSensors:
         self._imu = self._imu_model.update(now_s, X_WB, w_WB, v_WB)
         positions = _array(plant.GetPositions(self._context)[index.positions])
         rates = _array(plant.GetVelocities(self._context)[index.velocities])
-        efforts = _array(plant.get_net_actuation_output_port(self._model.instance).Eval(self._context))
+        efforts = self._efforts(positions, rates)
         self._joints = self._joint_model.update(now_s, positions, rates, efforts)
         self._gripper = self._gripper_model.update(
             now_s, -float(positions[index.jaw]), self._clamp_force_n(rates, efforts)
@@ -115,6 +115,16 @@ class SpotSensors:
         self._battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
         if self._scan is None or now_s - self._scan.stamp_s >= _LIDAR_PERIOD_S - 1e-6:
             self._scan = self._lidar.scan(self._context, now_s, self._odometry.X_OB)
+
+    def _efforts(self, positions: FloatArray, rates: FloatArray) -> FloatArray:
+        """What the motors do: the servos' law with limits, as the plant's solver has it at the end of a step."""
+        plant, instance = self._model.plant, self._model.instance
+        servos = plant.get_desired_state_input_port(instance)
+        if not servos.HasValue(self._context):
+            return np.zeros(len(positions))
+        desired = _array(servos.Eval(self._context))
+        feed_forward = _array(plant.get_actuation_input_port(instance).Eval(self._context))
+        return self._index.efforts_of(desired, feed_forward, positions, rates)
 
     def _docked(self, X_WB: RigidTransform, v_WB: FloatArray) -> bool:
         """Whether the body stands still at the dock."""

@@ -22,6 +22,10 @@ from plant.diagram import WorldDiagram
 from plant.sensors.ray_shapes import shape_row
 from skills.robot import FloatArray
 
+_EXACT = 1e-9
+_REACH_M = 2.0
+"""Farther from its body than any link of a robot gets, with an object's own size and the margin."""
+
 
 @dataclass(frozen=True)
 class SleepLimits:
@@ -81,6 +85,9 @@ class Sleepers:
         own = {int(each.body.index()) for each in self._objects}
         others = [body for body in _moving_bodies(plant) if int(body.index()) not in own]
         self._links = _Spheres(plant, inspector, others)
+        of_robots = {int(instance) for robot in world.robots.values() for instance in robot.instances()}
+        self._only_robots_move = all(int(body.model_instance()) in of_robots for body in others)
+        self._robots = [robot.body for robot in world.robots.values()]
         self._bounds = _Spheres(plant, inspector, [each.body for each in self._objects])
         starts = [each.body.floating_positions_start() for each in self._objects]
         self._places = np.array([range(start, start + 7) for start in starts], dtype=np.int64).reshape(-1, 7)
@@ -98,13 +105,14 @@ class Sleepers:
         """Wake whom something is about to reach, and put to sleep who has been still for long enough."""
         if not self._objects:
             return
-        poses, centres_W = self._plant.GetPositions(self._context)[self._places], self._bounds.centres_W(self._context)
-        last_s, last_poses, last_centres_W = self._last or (now_s, poses, centres_W)
+        poses = self._plant.GetPositions(self._context)[self._places]
+        last_s, last_poses, last_centres_W = self._last or (now_s, poses, self._bounds.centres_W(self._context))
+        elapsed_s, change = now_s - last_s, np.abs(poses - last_poses).max(axis=1)
+        moved = change > self._limits.still * elapsed_s
+        centres_W = self._bounds.centres_W(self._context) if change.max() > _EXACT else last_centres_W
         self._last = (now_s, poses, centres_W)
-        elapsed_s = now_s - last_s
-        moved = np.abs(poses - last_poses).max(axis=1) > self._limits.still * elapsed_s
         radii_m, margin_m = self._bounds.radii_m, self._limits.margin_m
-        disturbed = moved | self._near(centres_W, self._links.centres_W(self._context), self._links.radii_m, margin_m)
+        disturbed = moved | self._reached(centres_W)
         for places_W in (last_centres_W, centres_W) if moved.any() else ():
             disturbed |= self._near(centres_W, places_W[moved], radii_m[moved], margin_m)
         for _ in range(len(self._objects) - 1) if disturbed.any() else ():
@@ -120,6 +128,14 @@ class Sleepers:
             self._turn(int(number))
         self._still_s = np.zeros(len(self._objects))
         self._last = None
+
+    def _reached(self, centres_W: FloatArray) -> NDArray[np.bool_]:
+        """For each object, whether a link is about to reach it."""
+        bases = [self._plant.EvalBodyPoseInWorld(self._context, body).translation() for body in self._robots]
+        if self._only_robots_move and all(np.abs(centres_W - p_WB).max(axis=1).min() > _REACH_M for p_WB in bases):
+            return np.zeros(len(centres_W), dtype=bool)
+        links_W = self._links.centres_W(self._context)
+        return self._near(centres_W, links_W, self._links.radii_m, self._limits.margin_m)
 
     def _near(
         self, centres_W: FloatArray, others_W: FloatArray, radii_m: FloatArray, margin_m: float

@@ -12,11 +12,11 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from executive.cli.output import print_json
 from executive.mission.errors import InputError
-from skills.detect.training.labels import TrainingDataError, read_split
-from skills.detect.training.schedule import Budget
+from skills.perception.training.labels import TrainingDataError, read_split
+from skills.perception.training.schedule import Budget
 
 if TYPE_CHECKING:
-    from skills.detect.training.together import Report, Told
+    from skills.perception.training.together import Report, Told
 
 __all__ = ["budget_of", "check_folders", "check_libraries", "check_time", "learnt", "tell_learnt"]
 

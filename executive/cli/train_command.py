@@ -12,8 +12,8 @@ from rich.console import Console
 
 from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, learnt, tell_learnt
 from executive.cli.output import console_for, refusals
-from skills.detect.training.options import TrainOptions
-from skills.detect.training.schedule import HIGHEST_RATE, REFINING_RATE, Schedule
+from skills.perception.training.options import TrainOptions
+from skills.perception.training.schedule import HIGHEST_RATE, REFINING_RATE, Schedule
 
 __all__ = ["train_command"]
 
@@ -43,9 +43,6 @@ def train_command(
         Path | None,
         typer.Option(help="A checkpoint or a detector's ONNX file whose weights are taken over, and refined."),
     ] = None,
-    keep_early: Annotated[
-        bool, typer.Option("--keep-early", help="Leave the first layers as they are: more steps in the same time.")
-    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
     """Train the detector and export it, with checkpoints and curves on the way."""
@@ -62,7 +59,6 @@ def train_command(
             processes=jobs or os.cpu_count() or 1,
             resume=resume,
             start=start,
-            keep_early=keep_early,
             schedule=Schedule.refining(rate or REFINING_RATE) if start else Schedule(rate or HIGHEST_RATE),
         )
         model, figures = _trained(options, console)
@@ -71,6 +67,6 @@ def train_command(
 
 def _trained(options: TrainOptions, console: Console) -> tuple[Path, dict[str, float]]:
     """The ONNX file and its figures. Raises InputError."""
-    from skills.detect.training.train import train
+    from skills.perception.training.train import train
 
     return learnt(partial(train, options), options.out, console)

@@ -1,0 +1,1 @@
+"""Perception: the detector, and how it is trained."""

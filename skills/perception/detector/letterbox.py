@@ -1,0 +1,115 @@
+"""Pictures of any size in the sizes that the detector's networks take, and boxes on the way back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.robot import Picture
+
+__all__ = [
+    "FULL_PX",
+    "HEIGHT_PX",
+    "PADDING",
+    "SMALL_PX",
+    "WIDTH_PX",
+    "Letterbox",
+    "check_picture",
+    "fill_letterbox",
+    "letterbox",
+]
+
+WIDTH_PX: Final = 640
+HEIGHT_PX: Final = 480
+FULL_PX: Final = (WIDTH_PX, HEIGHT_PX)
+SMALL_PX: Final = (320, 256)
+"""Width and height of the letterbox for a quick look: half the full one, in whole cells of the coarsest level."""
+PADDING: Final = 114
+
+Boxes = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Letterbox:
+    """How a picture of width_px x height_px lies in a letterbox: from the upper left corner, scaled by scale_xy.
+
+    Both scales are the same but for the rounding to whole pixels. Boxes are (N, 4) rows of (u0, v0, u1, v1): edges in
+    pixels, so that a whole picture is (0, 0, width, height).
+    """
+
+    width_px: int
+    height_px: int
+    frame_px: tuple[int, int] = FULL_PX
+
+    @property
+    def inside_px(self) -> tuple[int, int]:
+        """Width and height of the part that shows the picture; the rest, at right or bottom, is padding."""
+        scale = min(self.frame_px[0] / self.width_px, self.frame_px[1] / self.height_px)
+        return max(1, round(self.width_px * scale)), max(1, round(self.height_px * scale))
+
+    @property
+    def scale_xy(self) -> tuple[float, float]:
+        """Letterbox pixels in a pixel of the picture, across and down."""
+        width, height = self.inside_px
+        return width / self.width_px, height / self.height_px
+
+    def to_picture(self, boxes: NDArray[np.floating]) -> Boxes:
+        """Boxes of the letterbox in the picture's pixels, clipped to it."""
+        found = np.asarray(boxes, dtype=np.float32).reshape(-1, 4) / self._factors()
+        limits = np.array([self.width_px, self.height_px] * 2, dtype=np.float32)
+        return np.asarray(np.clip(found, 0.0, limits), dtype=np.float32)
+
+    def from_picture(self, boxes: NDArray[np.floating]) -> Boxes:
+        """Boxes of the picture in pixels of the letterbox."""
+        return np.asarray(boxes, dtype=np.float32).reshape(-1, 4) * self._factors()
+
+    def _factors(self) -> Boxes:
+        return np.array(self.scale_xy * 2, dtype=np.float32)
+
+
+def letterbox(picture: Picture, frame_px: tuple[int, int] = FULL_PX) -> tuple[Picture, Letterbox]:
+    """A picture (H, W, 3) RGB or (H, W) grey as RGB of a letterbox's width and height: scaled to fit, then padded.
+
+    Raises ValueError for what is no such picture.
+    """
+    filled = np.empty((frame_px[1], frame_px[0], 3), dtype=np.uint8)
+    return filled, fill_letterbox(picture, filled)
+
+
+def fill_letterbox(picture: Picture, into: Picture) -> Letterbox:
+    """The same, written `into` an array (H, W, 3), such as one of a batch. Raises ValueError."""
+    check_picture(picture)
+    frame_px = into.shape[1], into.shape[0]
+    placed = Letterbox(width_px=picture.shape[1], height_px=picture.shape[0], frame_px=frame_px)
+    width, height = placed.inside_px
+    into[height:] = PADDING
+    into[:height, width:] = PADDING
+    into[:height, :width] = _coloured(_resized(picture, width, height))
+    return placed
+
+
+def check_picture(picture: Picture) -> None:
+    """Raises ValueError for what is no picture: no array of uint8, neither (H, W, 3) nor (H, W), or empty."""
+    if not isinstance(picture, np.ndarray) or picture.dtype != np.uint8:
+        raise ValueError(f"a picture is an array of uint8, not {getattr(picture, 'dtype', type(picture).__name__)}")
+    if picture.ndim not in (2, 3) or (picture.ndim == 3 and picture.shape[2] != 3) or not picture.size:
+        raise ValueError(f"a picture is (H, W, 3) or (H, W), not {picture.shape}")
+
+
+def _resized(picture: Picture, width: int, height: int) -> Picture:
+    """Scaled: averaged when smaller, interpolated when larger."""
+    rows, columns = picture.shape[:2]
+    if (columns, rows) == (width, height):
+        return picture
+    smaller = width < columns or height < rows
+    scaled = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA if smaller else cv2.INTER_LINEAR)
+    return np.asarray(scaled, dtype=np.uint8)
+
+
+def _coloured(picture: Picture) -> Picture:
+    """RGB; grey in all three channels."""
+    return picture if picture.ndim == 3 else np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2RGB), dtype=np.uint8)

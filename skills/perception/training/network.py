@@ -1,0 +1,267 @@
+"""The network: plain convolutions on three levels (strides 8, 16, 32), one box and one score per class at each cell.
+
+Cross-stage blocks after Wang et al., "CSPNet" (2020); top-down and bottom-up paths after Liu et al., "Path Aggregation
+Network" (2018); pooled context after Jocher's SPPF; anchor-free boxes as distances from the cell's middle to the four
+sides after Tian et al., "FCOS" (2019). ReLU and channel counts that are multiples of 16, because ONNX Runtime is fast
+with those.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import torch
+from torch import Tensor, nn
+
+STRIDES: Final = (8, 16, 32)
+FIRST_SCORE: Final = 0.003
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Channels after each halving of the picture, of the neck's levels and of the heads; depth of each block.
+
+    `residuals` are how many residual blocks of the full width follow at strides 16 and 32.
+    """
+
+    stem: tuple[int, int] = (16, 32)
+    levels: tuple[int, int, int] = (48, 96, 192)
+    depths: tuple[int, int, int] = (2, 2, 2)
+    residuals: tuple[int, int] = (0, 0)
+    neck: tuple[int, int, int] = (48, 64, 96)
+    neck_depth: int = 1
+    head_scores: int = 48
+    head_boxes: int = 32
+
+
+class ConvUnit(nn.Sequential):
+    """Convolution, batch normalisation, ReLU; keeps the size, or halves it with stride 2."""
+
+    def __init__(self, inputs: int, outputs: int, size: int = 1, stride: int = 1) -> None:
+        super().__init__(
+            nn.Conv2d(inputs, outputs, size, stride, size // 2, bias=False),
+            nn.BatchNorm2d(outputs, eps=1e-3, momentum=0.03),
+            nn.ReLU(inplace=True),
+        )
+
+
+class Bottleneck(nn.Module):
+    """Two 3x3 convolutions, and the input added where `shortcut`."""
+
+    def __init__(self, channels: int, shortcut: bool) -> None:
+        super().__init__()
+        self.first = ConvUnit(channels, channels, 3)
+        self.second = ConvUnit(channels, channels, 3)
+        self.shortcut = shortcut
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(N, C, H, W) to the same shape."""
+        y: Tensor = self.second(self.first(x))
+        return x + y if self.shortcut else y
+
+
+class CrossStage(nn.Module):
+    """Half of the channels go through `depth` bottlenecks, half pass by; all are joined and mixed."""
+
+    def __init__(self, inputs: int, outputs: int, depth: int, shortcut: bool = True) -> None:
+        super().__init__()
+        half = outputs // 2
+        self.through = ConvUnit(inputs, half)
+        self.past = ConvUnit(inputs, half)
+        self.blocks = nn.Sequential(*(Bottleneck(half, shortcut) for _ in range(depth)))
+        self.mix = ConvUnit(2 * half, outputs)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(N, inputs, H, W) to (N, outputs, H, W)."""
+        joined = torch.cat([self.blocks(self.through(x)), self.past(x)], dim=1)
+        mixed: Tensor = self.mix(joined)
+        return mixed
+
+
+class Residual(nn.Module):
+    """Two 3x3 convolutions added to the input, from 0 on, which it passes on unchanged until it has learnt something.
+
+    After He et al., "Deep Residual Learning" (2015); that the last normalisation begins at nought, after Goyal et al.,
+    "Accurate, Large Minibatch SGD" (2017).
+    """
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.first = ConvUnit(channels, channels, 3)
+        self.second = nn.Sequential(
+            nn.Conv2d(channels, channels, 3, 1, 1, bias=False), nn.BatchNorm2d(channels, eps=1e-3, momentum=0.03)
+        )
+        nn.init.zeros_(self.second[1].weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(N, C, H, W) to the same shape."""
+        return nn.functional.relu(x + self.second(self.first(x)))
+
+
+class PooledContext(nn.Module):
+    """The highest values within 5, 9 and 13 cells beside the cell's own."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.squeeze = ConvUnit(channels, channels // 2)
+        self.pool = nn.MaxPool2d(5, stride=1, padding=2)
+        self.mix = ConvUnit(channels * 2, channels)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(N, C, H, W) to the same shape."""
+        near = [self.squeeze(x)]
+        for _ in range(3):
+            near.append(self.pool(near[-1]))
+        mixed: Tensor = self.mix(torch.cat(near, dim=1))
+        return mixed
+
+
+class EarlyLayers(nn.Module):
+    """A backbone's layers up to stride 8."""
+
+    stem: nn.Sequential
+    stage8: nn.Sequential
+
+    def early(self, pictures: Tensor) -> Tensor:
+        """Pictures (N, 3, H, W) to features at stride 8: edges and textures."""
+        raise NotImplementedError
+
+
+class Backbone(EarlyLayers):
+    """Picture to features at strides 8, 16 and 32."""
+
+    def __init__(self, widths: Widths) -> None:
+        super().__init__()
+        first, second = widths.stem
+        one, two, three = widths.levels
+        depths = widths.depths
+        self.stem = nn.Sequential(ConvUnit(3, first, 3, 2), ConvUnit(first, second, 3, 2))
+        self.stage8 = nn.Sequential(ConvUnit(second, one, 3, 2), CrossStage(one, one, depths[0]))
+        more16, more32 = widths.residuals
+        self.stage16 = nn.Sequential(
+            ConvUnit(one, two, 3, 2), CrossStage(two, two, depths[1]), *(Residual(two) for _ in range(more16))
+        )
+        self.stage32 = nn.Sequential(
+            ConvUnit(two, three, 3, 2),
+            CrossStage(three, three, depths[2]),
+            PooledContext(three),
+            *(Residual(three) for _ in range(more32)),
+        )
+
+    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """(N, 3, H, W) to three levels."""
+        return self.late(self.early(pictures))
+
+    def early(self, pictures: Tensor) -> Tensor:
+        """(N, 3, H, W) to features at stride 8: edges and textures, half of the time that a step of learning takes."""
+        at8: Tensor = self.stage8(self.stem(pictures))
+        return at8
+
+    @torch.no_grad()
+    def take_bytes(self) -> None:
+        """Take values from 0 to 255 from now on."""
+        self.stem[0][0].weight.mul_(1.0 / 255.0)
+
+    def late(self, at8: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Features at stride 8 to three levels."""
+        at16 = self.stage16(at8)
+        return at8, at16, self.stage32(at16)
+
+
+class Neck(nn.Module):
+    """Levels exchange what they know: downwards from the coarse one, then upwards again."""
+
+    def __init__(self, widths: Widths) -> None:
+        super().__init__()
+        one, two, three = widths.levels
+        low, middle, high = widths.neck
+        depth = widths.neck_depth
+        self.enlarge = nn.Upsample(scale_factor=2, mode="nearest")
+        self.narrow32 = ConvUnit(three, middle)
+        self.down16 = CrossStage(two + middle, middle, depth, shortcut=False)
+        self.narrow16 = ConvUnit(middle, low)
+        self.down8 = CrossStage(one + low, low, depth, shortcut=False)
+        self.halve8 = ConvUnit(low, low, 3, 2)
+        self.up16 = CrossStage(low + low, middle, depth, shortcut=False)
+        self.halve16 = ConvUnit(middle, middle, 3, 2)
+        self.up32 = CrossStage(middle + middle, high, depth, shortcut=False)
+
+    def forward(self, levels: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Tensor, Tensor]:
+        """Three levels to three levels of the neck's widths."""
+        at8, at16, at32 = levels
+        coarse = self.narrow32(at32)
+        middle = self.narrow16(self.down16(torch.cat([self.enlarge(coarse), at16], dim=1)))
+        fine = self.down8(torch.cat([self.enlarge(middle), at8], dim=1))
+        middle = self.up16(torch.cat([self.halve8(fine), middle], dim=1))
+        coarse = self.up32(torch.cat([self.halve16(middle), coarse], dim=1))
+        return fine, middle, coarse
+
+
+class Head(nn.Module):
+    """Scores and box sides of one level."""
+
+    def __init__(self, inputs: int, widths: Widths, classes: int) -> None:
+        super().__init__()
+        self.for_scores = ConvUnit(inputs, widths.head_scores, 3)
+        self.for_boxes = ConvUnit(inputs, widths.head_boxes, 3)
+        self.scores = nn.Conv2d(widths.head_scores, classes, 1)
+        self.sides = nn.Conv2d(widths.head_boxes, 4, 1)
+        nn.init.constant_(self.scores.bias, -math.log((1.0 - FIRST_SCORE) / FIRST_SCORE))
+        nn.init.constant_(self.sides.bias, 1.0)
+
+    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, classes, H, W), and the logarithm-like sides (N, 4, H, W)."""
+        return self.scores(self.for_scores(x)), self.sides(self.for_boxes(x))
+
+
+class DetectorNetwork(nn.Module):
+    """Pictures (N, 3, H, W) from 0 to 1, H and W multiples of 32, to logits and boxes of every cell."""
+
+    def __init__(self, classes: int, widths: Widths | None = None) -> None:
+        super().__init__()
+        widths = widths or Widths()
+        self.classes = classes
+        self.backbone = Backbone(widths)
+        self.neck = Neck(widths)
+        self.heads = nn.ModuleList(Head(width, widths, classes) for width in widths.neck)
+
+    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, A, classes) and boxes (N, A, 4) as x0 y0 x1 y1 in pixels."""
+        return self.from_early(self.backbone.early(pictures))
+
+    def from_early(self, at8: Tensor) -> tuple[Tensor, Tensor]:
+        """The same of what the backbone's early part makes of pictures."""
+        return self.from_levels(self.neck(self.backbone.late(at8)))
+
+    def from_levels(self, levels: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        """The same of the neck's three levels."""
+        logits, boxes = [], []
+        for head, level, stride in zip(self.heads, levels, STRIDES, strict=True):
+            scores, sides = head(level)
+            logits.append(scores.flatten(2))
+            boxes.append(decoded(sides, stride).flatten(2))
+        return torch.cat(logits, dim=2).transpose(1, 2), torch.cat(boxes, dim=2).transpose(1, 2)
+
+
+def decoded(sides: Tensor, stride: int) -> Tensor:
+    """Boxes (N, 4, H, W) in pixels of raw sides: distances from the cell's middle are softplus of them, in strides."""
+    far = nn.functional.softplus(sides.float()) * float(stride)
+    middle = cell_middles(sides.shape[2], sides.shape[3], stride, sides.device)
+    return torch.cat([middle - far[:, :2], middle + far[:, 2:]], dim=1)
+
+
+def cell_middles(rows: int, columns: int, stride: int, device: torch.device) -> Tensor:
+    """Middles (2, rows, columns) of a level's cells as x, y in pixels. When it is exported, sizes stay variable."""
+    x = (torch.arange(columns, device=device, dtype=torch.float32) + 0.5) * stride
+    y = (torch.arange(rows, device=device, dtype=torch.float32) + 0.5) * stride
+    return torch.stack([x[None, :].expand(rows, columns), y[:, None].expand(rows, columns)])
+
+
+def cells(height: int, width: int, strides: Sequence[int] = STRIDES) -> tuple[Tensor, Tensor]:
+    """Middles (A, 2) and strides (A,) of all cells of a picture, in the network's order."""
+    middles = [cell_middles(height // step, width // step, step, torch.device("cpu")).flatten(1).T for step in strides]
+    steps = [torch.full((len(middle),), float(step)) for middle, step in zip(middles, strides, strict=True)]
+    return torch.cat(middles), torch.cat(steps)

@@ -15,7 +15,7 @@ STEP_PX = 2.5
 
 
 def model_bytes(
-    *, classes=CLASSES, form="errand-detector-2", names=None, output="scores", size=("H", "W"), metadata=None
+    *, classes=CLASSES, form="errand-detector-1", names=None, output="scores", size=(480, 640), metadata=None
 ) -> bytes:
     """A network that reads its answer from the picture's first two rows (red): scores, then boxes."""
     nodes = [

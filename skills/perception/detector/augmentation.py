@@ -127,14 +127,11 @@ class DetectsClass(Protocol):
 
 @dataclass(frozen=True)
 class AugmentationOptions:
-    """The views, and when one is enough: when it finds something, and every score is up to `nothing` or from `sure` on.
-
-    A rival class of a sure detection counts as doubt from `nothing` on as well.
-    """
+    """The views, and when the first one is enough: when no score, also of a rival, lies between `low` and `high`."""
 
     views: tuple[View, ...] = VIEWS
-    sure: float = 0.85
-    nothing: float = 0.15
+    low: float = 0.3
+    high: float = 0.7
 
 
 @dataclass(frozen=True)
@@ -170,7 +167,7 @@ class AugmentedDetector:
         )
         views = self.options.views
         found = sensitive.detect([views[0].of(picture)])
-        if self._is_sure(found[0]):
+        if not self._in_doubt(found[0]):
             views = views[:1]
         else:
             found += sensitive.detect([view.of(picture) for view in views[1:]])
@@ -179,11 +176,10 @@ class AugmentedDetector:
             fused.from_score(min(threshold, options.rival_threshold)), self.class_names, threshold, options.suppression
         )
 
-    def _is_sure(self, found: Sequence[Detection]) -> bool:
-        """Whether one view leaves no doubt: it finds something, and nothing that may or may not be."""
+    def _in_doubt(self, found: Sequence[Detection]) -> bool:
+        """Whether one view finds what may or may not be there."""
         scores = [score for one in found for score in (one.score, *(score for _, score in one.rivals))]
-        doubtful = any(self.options.nothing < score < self.options.sure for score in scores)
-        return not doubtful and any(score >= self.options.sure for score in scores)
+        return any(self.options.low < score < self.options.high for score in scores)
 
 
 def _fused(

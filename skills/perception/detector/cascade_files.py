@@ -1,6 +1,6 @@
 """The files of the detector's cascade: where they are, and whether they can be used.
 
-The proposal network takes `images` uint8 (N, H, W, 3) RGB, H and W multiples of 32 up to 480 and 640, and gives `boxes`
+The proposal network takes `images` uint8 (N, 480, 640, 3) RGB, and gives `boxes`
 float32 (N, A, 4), which are (u0, v0, u1, v1) in pixels of the letterbox, and `scores` float32 (N, A, K) from 0 to 1.
 
 The refinement network stands beside it: beside detector.onnx as detector_refinement.onnx. It takes `chips`, crops of
@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX
 from skills.perception.detector.network_file import Inputs, ModelFileError, Network, NetworkKind, Outputs, load_network
 from skills.perception.detector.proposals import CROP_PX
 
@@ -35,7 +36,7 @@ __all__ = [
 ]
 
 MODEL_FILE: Final = Path(__file__).with_name("model") / "errand_detector.onnx"
-FORMAT: Final = "errand-detector-2"
+FORMAT: Final = "errand-detector-1"
 REFINEMENT_FORMAT: Final = "errand-regions-1"
 CLASSIFIER_FORMAT: Final = "errand-third-1"
 
@@ -55,7 +56,7 @@ def _crops(classes: int) -> Inputs:
 _PROPOSAL: Final = NetworkKind(
     FORMAT,
     "make a new one: errand dataset train --data DIR --out DIR",
-    lambda _classes: {"images": ("uint8", ("H", "W", 3))},
+    lambda _classes: {"images": ("uint8", (HEIGHT_PX, WIDTH_PX, 3))},
     _one_box,
 )
 _REFINEMENT: Final = NetworkKind(

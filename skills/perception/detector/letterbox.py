@@ -1,4 +1,4 @@
-"""Pictures of any size in the sizes that the detector's networks take, and boxes on the way back."""
+"""Pictures of any size in the one size that the detector's network takes, and boxes on the way back."""
 
 from __future__ import annotations
 
@@ -11,23 +11,10 @@ from numpy.typing import NDArray
 
 from skills.robot import Picture
 
-__all__ = [
-    "FULL_PX",
-    "HEIGHT_PX",
-    "PADDING",
-    "SMALL_PX",
-    "WIDTH_PX",
-    "Letterbox",
-    "check_picture",
-    "fill_letterbox",
-    "letterbox",
-]
+__all__ = ["HEIGHT_PX", "PADDING", "WIDTH_PX", "Letterbox", "check_picture", "fill_letterbox", "letterbox"]
 
 WIDTH_PX: Final = 640
 HEIGHT_PX: Final = 480
-FULL_PX: Final = (WIDTH_PX, HEIGHT_PX)
-SMALL_PX: Final = (320, 256)
-"""Width and height of the letterbox for a quick look: half the full one, in whole cells of the coarsest level."""
 PADDING: Final = 114
 
 Boxes = NDArray[np.float32]
@@ -35,7 +22,7 @@ Boxes = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Letterbox:
-    """How a picture of width_px x height_px lies in a letterbox: from the upper left corner, scaled by scale_xy.
+    """How a picture of width_px x height_px lies in the letterbox: from the upper left corner, scaled by scale_xy.
 
     Both scales are the same but for the rounding to whole pixels. Boxes are (N, 4) rows of (u0, v0, u1, v1): edges in
     pixels, so that a whole picture is (0, 0, width, height).
@@ -43,12 +30,11 @@ class Letterbox:
 
     width_px: int
     height_px: int
-    frame_px: tuple[int, int] = FULL_PX
 
     @property
     def inside_px(self) -> tuple[int, int]:
         """Width and height of the part that shows the picture; the rest, at right or bottom, is padding."""
-        scale = min(self.frame_px[0] / self.width_px, self.frame_px[1] / self.height_px)
+        scale = min(WIDTH_PX / self.width_px, HEIGHT_PX / self.height_px)
         return max(1, round(self.width_px * scale)), max(1, round(self.height_px * scale))
 
     @property
@@ -63,28 +49,23 @@ class Letterbox:
         limits = np.array([self.width_px, self.height_px] * 2, dtype=np.float32)
         return np.asarray(np.clip(found, 0.0, limits), dtype=np.float32)
 
-    def from_picture(self, boxes: NDArray[np.floating]) -> Boxes:
-        """Boxes of the picture in pixels of the letterbox."""
-        return np.asarray(boxes, dtype=np.float32).reshape(-1, 4) * self._factors()
-
     def _factors(self) -> Boxes:
         return np.array(self.scale_xy * 2, dtype=np.float32)
 
 
-def letterbox(picture: Picture, frame_px: tuple[int, int] = FULL_PX) -> tuple[Picture, Letterbox]:
-    """A picture (H, W, 3) RGB or (H, W) grey as RGB of a letterbox's width and height: scaled to fit, then padded.
+def letterbox(picture: Picture) -> tuple[Picture, Letterbox]:
+    """A picture (H, W, 3) RGB or (H, W) grey as (480, 640, 3) RGB: scaled to fit with its aspect kept, then padded.
 
     Raises ValueError for what is no such picture.
     """
-    filled = np.empty((frame_px[1], frame_px[0], 3), dtype=np.uint8)
+    filled = np.empty((HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
     return filled, fill_letterbox(picture, filled)
 
 
 def fill_letterbox(picture: Picture, into: Picture) -> Letterbox:
-    """The same, written `into` an array (H, W, 3), such as one of a batch. Raises ValueError."""
+    """The same, written `into` an array (480, 640, 3), such as one of a batch. Raises ValueError."""
     check_picture(picture)
-    frame_px = into.shape[1], into.shape[0]
-    placed = Letterbox(width_px=picture.shape[1], height_px=picture.shape[0], frame_px=frame_px)
+    placed = Letterbox(width_px=picture.shape[1], height_px=picture.shape[0])
     width, height = placed.inside_px
     into[height:] = PADDING
     into[:height, width:] = PADDING

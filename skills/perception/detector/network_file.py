@@ -21,13 +21,12 @@ from skills.perception.detector.processor import adds_byte_products_exactly
 __all__ = ["Inputs", "ModelFileError", "Network", "NetworkKind", "Outputs", "load_network", "sealed"]
 
 QUIET: Final = 4
-_TRIED_PX: Final = 64
 _SEAL_KEY: Final = b"sha256"
 _SEAL_HEAD: Final = b"\x72\x4a\x0a\x06" + _SEAL_KEY + b"\x12\x40"
 _SEAL_LENGTH: Final = len(_SEAL_HEAD) + 64
 _NUMPY: Final = {"uint8": np.uint8, "float": np.float32}
 
-Inputs = Mapping[str, tuple[str, tuple[int | str, ...]]]
+Inputs = Mapping[str, tuple[str, tuple[int, ...]]]
 Outputs = Mapping[str, tuple[str, int]]
 
 
@@ -43,8 +42,8 @@ class ModelFileError(ValueError):
 class NetworkKind:
     """What is expected of a file of some `format`; `mend` says how to make a new one.
 
-    For a number of classes, `inputs` are ("uint8" or "float", shape of a row) by name, with names for sizes that vary,
-    and `outputs` ("float", length of the last axis).
+    For a number of classes, `inputs` are ("uint8" or "float", shape of a row) by name, and `outputs` ("float", length
+    of the last axis).
     """
 
     format: str
@@ -150,11 +149,8 @@ class _Reader:
 
     def try_out(self, session: onnxruntime.InferenceSession, classes: int) -> None:
         """Run once on zeros: the first run takes longer, and shows damage that loading does not."""
-        shapes = {
-            name: (of, [_TRIED_PX if isinstance(size, str) else size for size in shape])
-            for name, (of, shape) in self.kind.inputs(classes).items()
-        }
-        nothing = {name: np.zeros((1, *shape), dtype=_NUMPY[of]) for name, (of, shape) in shapes.items()}
+        ports = self.kind.inputs(classes)
+        nothing = {name: np.zeros((1, *shape), dtype=_NUMPY[of]) for name, (of, shape) in ports.items()}
         try:
             session.run(list(self.kind.outputs(classes)), nothing)
         except Exception as error:  # the library has no common class of its own for them

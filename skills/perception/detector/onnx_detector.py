@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from skills.detection import Detection
 from skills.perception.detector.cascade_files import MODEL_FILE, DetectorModel, load_model
 from skills.perception.detector.crops import classified, refined
-from skills.perception.detector.letterbox import SMALL_PX, Letterbox, letterbox
+from skills.perception.detector.letterbox import Letterbox, letterbox
 from skills.perception.detector.network_file import Network
 from skills.perception.detector.proposals import CLASSIFIED, ProposalOptions
 from skills.perception.detector.scales import Scales, halved
@@ -43,7 +43,7 @@ class DetectorOptions:
     suppression: SuppressionOptions = field(default_factory=SuppressionOptions)
     proposals: ProposalOptions = field(default_factory=ProposalOptions)
     classified: ProposalOptions = CLASSIFIED
-    quick_score: float = 0.1
+    quick_score: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class OnnxDetector:
     def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[tuple[Detection, ...]]:
         """The objects of one class in each picture, quickly.
 
-        The proposal network sees the picture at half the usual size, and the others run only where it sees the class.
+        The proposal network sees the picture, and the others only what it gives a score of the class.
         Raises ValueError for what is no picture, and for a class that the detector does not know.
         """
         if class_name not in self.class_names:
@@ -80,30 +80,24 @@ class OnnxDetector:
 
     def _detect(self, picture: Picture) -> tuple[Detection, ...]:
         image, placed = letterbox(picture)
-        boxes, scores = _proposed(self.model.proposal, image)
-        scales = Scales(image, halved(image))
-        if self.model.refinement is not None:
-            boxes, scores = refined(self.model.refinement.session, scales, boxes, scores, self.options.proposals)
-        return self._judged(scales, boxes, scores, placed)
+        return self._judged(image, placed, *_proposed(self.model.proposal, image))
 
     def _detect_class(self, picture: Picture, number: int) -> tuple[Detection, ...]:
-        small, placed = letterbox(picture, SMALL_PX)
-        boxes, scores = _proposed(self.model.proposal, small)
+        image, placed = letterbox(picture)
+        boxes, scores = _proposed(self.model.proposal, image)
         likely = scores[:, number] >= self.options.quick_score
         if not likely.any():
             return ()
-        image, full = letterbox(picture)
-        scales = Scales(image, halved(image))
-        boxes, scores = full.from_picture(placed.to_picture(boxes[likely])), scores[likely]
-        if self.model.refinement is not None:
-            boxes, scores = refined(self.model.refinement.session, scales, boxes, scores, self.options.proposals)
-        found = self._judged(scales, boxes, scores, full)
+        found = self._judged(image, placed, boxes[likely], scores[likely])
         return tuple(one for one in found if one.class_name == self.class_names[number])
 
-    def _judged(self, scales: Scales, boxes: Floats, scores: Floats, placed: Letterbox) -> tuple[Detection, ...]:
-        """The objects of one picture from refined boxes (A, 4) and scores (A, K)."""
-        if self.model.classifier is not None:
-            boxes, scores = classified(self.model.classifier.session, scales, boxes, scores, self.options.classified)
+    def _judged(self, image: Picture, placed: Letterbox, boxes: Floats, scores: Floats) -> tuple[Detection, ...]:
+        """The objects of a picture in the letterbox from proposals: boxes (A, 4) and scores (A, K)."""
+        model, scales = self.model, Scales(image, halved(image))
+        if model.refinement is not None:
+            boxes, scores = refined(model.refinement.session, scales, boxes, scores, self.options.proposals)
+        if model.classifier is not None:
+            boxes, scores = classified(model.classifier.session, scales, boxes, scores, self.options.classified)
         options = self.options
         least = min(options.threshold, options.rival_threshold)
         found = candidates_of(boxes, scores, least, options.suppression.most_candidates)

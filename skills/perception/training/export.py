@@ -1,4 +1,4 @@
-"""The network as an ONNX file that takes pictures of any size as bytes and gives boxes in their pixels, and scores."""
+"""The network as an ONNX file that takes pictures as bytes and gives boxes and scores in the letterbox's pixels."""
 
 from __future__ import annotations
 
@@ -23,13 +23,11 @@ from skills.perception.training.onnx_files import shorten_names, write_sealed
 __all__ = ["Exportable", "export", "fused", "normalised_layers", "write_onnx"]
 
 _OPSET = 17
-_OUTPUTS = ("boxes", "scores")
-Axes = Mapping[str, Mapping[int, str]]
 Network = TypeVar("Network", bound=nn.Module)
 
 
 class Exportable(nn.Module):
-    """Pictures (N, H, W, 3) of bytes to boxes (N, A, 4) and scores (N, A, K)."""
+    """Pictures (N, 480, 640, 3) of bytes to boxes (N, A, 4) and scores (N, A, K)."""
 
     def __init__(self, network: DetectorNetwork, score_offsets: Sequence[float] | None = None) -> None:
         super().__init__()
@@ -89,41 +87,32 @@ def export(
     """
     model = Exportable(network, score_offsets).eval()
     example = {"images": torch.zeros((1, HEIGHT_PX, WIDTH_PX, 3), dtype=torch.uint8)}
-    facts = {"format": FORMAT, "class_names": json.dumps(list(class_names)), **facts}
-    write_onnx(model, example, file, facts, sizes={"images": {1: "H", 2: "W"}, "boxes": {1: "A"}, "scores": {1: "A"}})
+    write_onnx(model, example, file, {"format": FORMAT, "class_names": json.dumps(list(class_names)), **facts})
 
 
 def write_onnx(
-    model: nn.Module,
-    example: Mapping[str, Tensor],
-    file: Path,
-    facts: Mapping[str, str],
-    *,
-    sizes: Mapping[str, Mapping[int, str]] | None = None,
-    compact: bool = False,
+    model: nn.Module, example: Mapping[str, Tensor], file: Path, facts: Mapping[str, str], *, compact: bool = False
 ) -> None:
     """Write the ONNX file of a model that makes boxes and scores, each of N rows, of inputs by name of N rows.
 
-    `sizes` names the axes of inputs and outputs that vary besides N. A `compact` one holds its weights in 16 bits each,
-    which become 32 when it is loaded.
+    A `compact` one holds its weights in 16 bits each, which become 32 when it is loaded.
     """
     with torch.no_grad():
         shapes = [tuple(output.shape) for output in model(*example.values())]
-    axes = {name: {0: "N", **(sizes or {}).get(name, {})} for name in (*example, *_OUTPUTS)}
     with tempfile.TemporaryDirectory() as folder:
         raw = Path(folder) / "raw.onnx"
-        _trace(model, example, raw, axes)
+        _trace(model, example, raw)
         traced = onnx.load(raw)
     if compact:
         onnx_files.compact(traced.graph)
-    _size_outputs(traced, shapes, axes)
+    _size_outputs(traced, shapes)
     shorten_names(traced.graph)
     traced.producer_name, traced.producer_version = "errand", ""
     onnx.checker.check_model(traced)
     write_sealed(traced, file, facts)
 
 
-def _trace(model: nn.Module, example: Mapping[str, Tensor], file: Path, axes: Axes) -> None:
+def _trace(model: nn.Module, example: Mapping[str, Tensor], file: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         torch.onnx.export(
@@ -133,14 +122,13 @@ def _trace(model: nn.Module, example: Mapping[str, Tensor], file: Path, axes: Ax
             dynamo=False,
             opset_version=_OPSET,
             input_names=list(example),
-            output_names=list(_OUTPUTS),
-            dynamic_axes=axes,
+            output_names=["boxes", "scores"],
+            dynamic_axes={name: {0: "N"} for name in (*example, "boxes", "scores")},
         )
 
 
-def _size_outputs(model: onnx.ModelProto, shapes: Sequence[Sequence[int]], axes: Axes) -> None:
+def _size_outputs(model: onnx.ModelProto, shapes: Sequence[Sequence[int]]) -> None:
     """Let a model tell the sizes of its outputs."""
     for port, sizes in zip(model.graph.output, shapes, strict=True):
-        for axis, size in enumerate(sizes):
-            if axis not in axes[port.name]:
-                port.type.tensor_type.shape.dim[axis].dim_value = size
+        for axis, size in enumerate(sizes[1:], start=1):
+            port.type.tensor_type.shape.dim[axis].dim_value = size

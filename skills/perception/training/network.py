@@ -249,12 +249,12 @@ class DetectorNetwork(nn.Module):
 def decoded(sides: Tensor, stride: int) -> Tensor:
     """Boxes (N, 4, H, W) in pixels of raw sides: distances from the cell's middle are softplus of them, in strides."""
     far = nn.functional.softplus(sides.float()) * float(stride)
-    middle = cell_middles(sides.shape[2], sides.shape[3], stride, sides.device)
+    middle = cell_middles(int(sides.shape[2]), int(sides.shape[3]), stride, sides.device)
     return torch.cat([middle - far[:, :2], middle + far[:, 2:]], dim=1)
 
 
 def cell_middles(rows: int, columns: int, stride: int, device: torch.device) -> Tensor:
-    """Middles (2, rows, columns) of a level's cells as x, y in pixels. When it is exported, sizes stay variable."""
+    """Middles (2, rows, columns) of a level's cells as x, y in pixels."""
     x = (torch.arange(columns, device=device, dtype=torch.float32) + 0.5) * stride
     y = (torch.arange(rows, device=device, dtype=torch.float32) + 0.5) * stride
     return torch.stack([x[None, :].expand(rows, columns), y[:, None].expand(rows, columns)])

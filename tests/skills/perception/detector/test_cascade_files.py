@@ -59,7 +59,7 @@ def test_a_folder_is_no_file(tmp_path):
 def test_another_version_is_named(tmp_path):
     told = refused(write_model(tmp_path / "model.onnx", form="errand-detector-9"))
     assert "format 'errand-detector-9'" in told
-    assert "reads 'errand-detector-2'" in told
+    assert "reads 'errand-detector-1'" in told
 
 
 def test_a_model_of_others_is_refused(tmp_path):

@@ -3,15 +3,7 @@
 import numpy as np
 import pytest
 
-from skills.perception.detector.letterbox import (
-    HEIGHT_PX,
-    PADDING,
-    SMALL_PX,
-    WIDTH_PX,
-    Letterbox,
-    fill_letterbox,
-    letterbox,
-)
+from skills.perception.detector.letterbox import HEIGHT_PX, PADDING, WIDTH_PX, Letterbox, fill_letterbox, letterbox
 
 
 def noise(*shape):
@@ -82,17 +74,6 @@ def test_boxes_beyond_the_picture_are_clipped():
     placed = Letterbox(1280, 720)
     found = placed.to_picture(np.array([[-5.0, 300.0, 640.0, 480.0]]))
     assert found.tolist() == [[0.0, 600.0, 1280.0, 720.0]]
-
-
-def test_a_small_letterbox_holds_a_body_cameras_picture_as_it_is():
-    picture = np.arange(240 * 320, dtype=np.uint32).reshape(240, 320).astype(np.uint8)
-    filled, placed = letterbox(picture, SMALL_PX)
-    assert filled.shape == (256, 320, 3)
-    assert np.array_equal(filled[:240, :, 0], picture)
-    assert (filled[240:] == PADDING).all()
-    box = np.array([[10.0, 20.0, 30.0, 40.0]])
-    assert placed.to_picture(box).tolist() == box.tolist()
-    assert Letterbox(320, 240).from_picture(box).tolist() == (2 * box).tolist()
 
 
 def test_no_boxes_stay_no_boxes():

@@ -19,11 +19,9 @@ from skills.perception.training.eight_bits import detector_in_eight_bits, in_eig
 from skills.perception.training.labels import TrainingDataError  # noqa: E402
 from skills.perception.training.onnx_files import learnt_weights  # noqa: E402
 
-CELLS = 15 * 20
-
 
 def convolutions(*, separable: bool = False) -> "onnx.ModelProto":
-    """A proposal network of three convolutions, to a box and scores at each of 300 cells.
+    """A proposal network of three convolutions, to a box and scores at each cell of 32 pixels.
 
     One that is `separable` has two more after the first: of each channel by itself, and of all.
     """
@@ -39,7 +37,7 @@ def convolutions(*, separable: bool = False) -> "onnx.ModelProto":
     constants["network.last.bias"] += 2.0
     whole = {
         "ends": np.array([4, classes]),
-        "cells": np.array([0, CELLS, 4 + classes]),
+        "cells": np.array([0, -1, 4 + classes]),
         "far": np.array([20.0, 20.0, 40.0, 40.0], np.float32),
     }
     nodes = [
@@ -60,15 +58,15 @@ def convolutions(*, separable: bool = False) -> "onnx.ModelProto":
     ports = [
         [helper.make_tensor_value_info("images", TensorProto.UINT8, ["N", 480, 640, 3])],
         [
-            helper.make_tensor_value_info("boxes", TensorProto.FLOAT, ["N", CELLS, 4]),
-            helper.make_tensor_value_info("scores", TensorProto.FLOAT, ["N", CELLS, classes]),
+            helper.make_tensor_value_info("boxes", TensorProto.FLOAT, ["N", "A", 4]),
+            helper.make_tensor_value_info("scores", TensorProto.FLOAT, ["N", "A", classes]),
         ],
     ]
     kept = [numpy_helper.from_array(value.astype(np.float32), name) for name, value in constants.items()]
     kept += [numpy_helper.from_array(value, name) for name, value in whole.items()]
     graph = helper.make_graph(nodes, "three", *ports, kept)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
-    helper.set_model_props(model, {"format": "errand-detector-2", "class_names": json.dumps(list(CLASSES))})
+    helper.set_model_props(model, {"format": "errand-detector-1", "class_names": json.dumps(list(CLASSES))})
     onnx.checker.check_model(model)
     return model
 
@@ -177,7 +175,7 @@ def test_a_proposal_network_in_8_bits_stays_as_it_is(tmp_path: Path, data: Path,
 
 
 def test_what_is_in_8_bits_already_is_refused(tmp_path: Path, data: Path) -> None:
-    told = {"format": "errand-detector-2", "class_names": json.dumps(list(CLASSES)), "eight_bits": "yes"}
+    told = {"format": "errand-detector-1", "class_names": json.dumps(list(CLASSES)), "eight_bits": "yes"}
     file = write_model(tmp_path / "detector.onnx", metadata=told)
     with pytest.raises(TrainingDataError, match=r"detector\.onnx.*8 bits already"):
         detector_in_eight_bits(file, data, tmp_path / "out")

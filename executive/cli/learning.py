@@ -16,7 +16,7 @@ from skills.perception.training.labels import TrainingDataError, read_split
 from skills.perception.training.schedule import Budget
 
 if TYPE_CHECKING:
-    from skills.perception.training.together import Report, Told
+    from skills.perception.training.parallel import Report, Told
 
 __all__ = ["budget_of", "check_folders", "check_libraries", "check_time", "learnt", "tell_learnt"]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +19,6 @@ LEAST_SHORT_PX = 4
 LEAST_NOTED_PX = 6
 MOST_OF_PICTURE = 0.95
 DARKEST_MEAN, DARKEST_SPREAD = 14.0, 7.0
-LEAST_CONTRAST, RING_PX = 6.0, 11
 
 
 def run_lengths(mask: Mask) -> dict[str, Any]:
@@ -85,19 +83,10 @@ def annotation(
     }
 
 
-def indistinct(picture: NDArray[np.uint8], mask: Mask) -> bool:
-    """Whether nobody could see the thing of a mask in the picture, (H, W) or (H, W, 3).
-
-    All black, or as even as what is around it and of the same colour: white on white.
-    """
+def lost_in_the_dark(picture: NDArray[np.uint8], mask: Mask) -> bool:
+    """Whether nobody could see the thing of a mask in the picture, (H, W) or (H, W, 3): all black."""
     seen = picture[mask].astype(np.float32)
-    if seen.mean() < DARKEST_MEAN and seen.std() < DARKEST_SPREAD:
-        return True
-    around = cv2.dilate(mask.astype(np.uint8), np.ones((RING_PX, RING_PX), np.uint8)).astype(bool) & ~mask
-    if not around.any():
-        return False
-    contrast = float(np.abs(seen.mean(axis=0) - picture[around].astype(np.float32).mean(axis=0)).max())
-    return bool(contrast < LEAST_CONTRAST and seen.std(axis=0).max() < LEAST_CONTRAST)
+    return bool(seen.mean() < DARKEST_MEAN and seen.std() < DARKEST_SPREAD)
 
 
 def categories() -> list[dict[str, Any]]:

@@ -30,7 +30,7 @@ from pydrake.geometry import (
 from pydrake.geometry import Mesh as MeshShape
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.dataset.coco import annotation, indistinct
+from plant.dataset.coco import annotation, lost_in_the_dark
 from plant.dataset.compose import SELDOM_BY_CHANCE, Held, Placed, Scene, compose
 from plant.dataset.degrade import Degradation, degraded
 from plant.dataset.hand import hand_mesh
@@ -253,7 +253,7 @@ def label_view(
             class_id=model.class_id,
             instance=model.name,
             distance_m=distance,
-            unseeable=indistinct(picture, mask) or _opened_by_camera(points_C),
+            unseeable=lost_in_the_dark(picture, mask) or _opened_by_camera(points_C),
         )
         if entry is not None:
             found.append(entry)

@@ -1,1 +1,1 @@
-"""Perception: the detector, and how it is trained."""
+"""What the robot makes of its pictures and scans: things with a place, surfaces, people."""

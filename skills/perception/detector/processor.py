@@ -1,4 +1,4 @@
-"""What the processor can do that matters to networks which reckon with whole numbers of 8 bits."""
+"""What the processor can do that matters to networks which are quantised to INT8."""
 
 from __future__ import annotations
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from skills.perception.detector.proposals import CROP_PX, crop_map, mapped
+from skills.perception.training.crop_store import CropStore
 from skills.perception.training.photometry import as_seen_otherwise
 from skills.perception.training.placing import turning
 from skills.perception.training.proposal_table import ProposalTable
 from skills.perception.training.schedule import shuffled
-from skills.perception.training.surroundings import Surroundings
 
 __all__ = ["CropBatch", "CropFeed", "changed_map"]
 
@@ -52,7 +52,7 @@ class CropFeed:
     """
 
     table: ProposalTable
-    surroundings: Surroundings
+    surroundings: CropStore
     seed: int
     rank: int
     processes: int

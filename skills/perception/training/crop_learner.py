@@ -19,8 +19,8 @@ from skills.perception.training.lite_backbone import LiteBackbone
 from skills.perception.training.losses import Losses
 from skills.perception.training.network import DetectorNetwork, EarlyLayers
 from skills.perception.training.onnx_weights import settle, take_over, take_over_classifier, take_over_refinement
-from skills.perception.training.peers import Peers
 from skills.perception.training.refinement_network import RefinementNetwork
+from skills.perception.training.workers import Workers
 
 __all__ = ["ClassifierLearner", "CropLearner", "RefinementLearner"]
 
@@ -70,9 +70,9 @@ class CropLearner(LearningState[CropNetwork]):
         mine, average = self.network.early_layers, self.average.network.early_layers
         self.early = without_learning_early(mine, average, self.device)
 
-    def step(self, batch: CropBatch, rate: float, peers: Peers, clock: float) -> tuple[float, float, float]:
+    def step(self, batch: CropBatch, rate: float, workers: Workers, clock: float) -> tuple[float, float, float]:
         """Learn from one batch: score loss, box loss, and the first process's clock."""
-        return self.take_step(lambda: self._losses(batch), rate, peers, clock)
+        return self.take_step(lambda: self._losses(batch), rate, workers, clock)
 
     def _losses(self, batch: CropBatch) -> Losses:
         crops, regions, before, wanted, classes = _moved(

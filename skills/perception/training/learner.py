@@ -19,8 +19,8 @@ from skills.perception.training.losses import Losses, LossOptions, TruthBatch, l
 from skills.perception.training.muon import Muon
 from skills.perception.training.network import DetectorNetwork, EarlyLayers, cells
 from skills.perception.training.onnx_weights import take_over
-from skills.perception.training.peers import Peers
 from skills.perception.training.records import Course
+from skills.perception.training.workers import Workers
 
 __all__ = ["Learner", "LearningState", "Progress", "optimisers_of", "read_checkpoint", "without_learning_early"]
 
@@ -53,7 +53,7 @@ class LearningState(Generic[Network]):
     course: Course = field(default_factory=Course)
 
     def take_step(
-        self, losses_now: Callable[[], Losses], rate: float, peers: Peers, clock: float
+        self, losses_now: Callable[[], Losses], rate: float, workers: Workers, clock: float
     ) -> tuple[float, float, float]:
         """Learn from what `losses_now` says: score loss, box loss, and the first process's clock."""
         for optimiser in self.optimisers:
@@ -63,7 +63,7 @@ class LearningState(Generic[Network]):
         found = losses_now()
         self.network.zero_grad(set_to_none=True)
         found.total.backward()
-        clock = peers.mean_gradients(self.network, clock)
+        clock = workers.mean_gradients(self.network, clock)
         nn.utils.clip_grad_norm_(self.network.parameters(), _LONGEST_STEP)
         for optimiser in self.optimisers:
             optimiser.step()
@@ -71,7 +71,7 @@ class LearningState(Generic[Network]):
         return float(found.scores.detach()), float(found.boxes.detach()), clock
 
     def quick(self) -> torch.autocast:
-        """Within it the network reckons with 16 bits, where that saves time."""
+        """Within it the network computes in 16 bits, where that saves time."""
         return torch.autocast(self.device.type, torch.bfloat16, enabled=quick_in_bfloat16(self.device))
 
     def save(self, file: Path) -> None:
@@ -124,9 +124,9 @@ class Learner(LearningState[DetectorNetwork]):
         last = [layer for head in network.heads for layer in (head.scores, head.sides)]
         return Learner(network, WeightAverage(network), optimisers_of(network, last), device)
 
-    def step(self, batch: Batch, rate: float, peers: Peers, clock: float) -> tuple[float, float, float]:
+    def step(self, batch: Batch, rate: float, workers: Workers, clock: float) -> tuple[float, float, float]:
         """Learn from one batch: score loss, box loss, and the first process's clock."""
-        return self.take_step(lambda: self._losses(batch), rate, peers, clock)
+        return self.take_step(lambda: self._losses(batch), rate, workers, clock)
 
     def _losses(self, batch: Batch) -> Losses:
         with self.quick():

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 from skills.perception.training.learner import LearningState
-from skills.perception.training.peers import Peers
+from skills.perception.training.parallel import Report, Told
 from skills.perception.training.records import draw_curves
 from skills.perception.training.schedule import Budget
 from skills.perception.training.scoring import Score
-from skills.perception.training.together import Report, Told
+from skills.perception.training.workers import Workers
 
 __all__ = ["CHECKPOINT", "Lesson", "Loop", "Stepped", "figures_of"]
 
@@ -54,7 +54,7 @@ class Loop:
 
     lesson: Lesson
     budget: Budget
-    peers: Peers
+    workers: Workers
     out: Path
     told: Told
     resting_since: float = field(default_factory=time.monotonic)
@@ -81,7 +81,7 @@ class Loop:
         state.progress.seconds = made.clock
         state.progress.steps += 1
         state.progress.taken += made.taken
-        if self.peers.first and state.progress.steps % _NOTED_EVERY_STEPS == 0:
+        if self.workers.first and state.progress.steps % _NOTED_EVERY_STEPS == 0:
             speed = made.taken / max(made.clock - before, 1e-6)
             state.course.steps.append({"progress": done, "scores": made.scores, "boxes": made.boxes, "rate": made.rate})
             self.told(Report(done, state.progress.steps, speed, (made.scores, made.boxes)))
@@ -89,16 +89,16 @@ class Loop:
     def _examine(self) -> None:
         """Write what there is, with checkpoint and curves, and tell how good it is."""
         state = self.lesson.state
-        self.peers.mean_statistics(state.network)
-        self.peers.mean_statistics(state.average.network)
-        if self.peers.first:
+        self.workers.mean_statistics(state.network)
+        self.workers.mean_statistics(state.average.network)
+        if self.workers.first:
             done = self._done()
             figures = self.lesson.written(last=done >= 1.0)
             state.course.exams.append({"progress": done, **figures})
             draw_curves(state.course, self.out / CURVES)
             state.save(self.out / CHECKPOINT)
             self.told(Report(done, state.progress.steps, 0.0, (0.0, 0.0), figures))
-        self.peers.wait()
+        self.workers.wait()
         self.resting_since = time.monotonic()
 
 

@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 from skills.perception.detector.network_file import sealed
 
 __all__ = [
-    "EIGHT_BITS",
     "OFFSETS",
+    "QUANTISED",
     "compact",
     "facts_of",
-    "in_32_bits",
     "in_full",
     "learnt_weights",
     "offsets_fact",
     "offsets_in",
     "shorten_names",
+    "with_float32_weights",
     "write_sealed",
 ]
 
-EIGHT_BITS: Final = "eight_bits"
-"""What a file has among its metadata when its network reckons with 8 bits."""
+QUANTISED: Final = "eight_bits"
+"""What a file has among its metadata when its network is quantised."""
 OFFSETS: Final = "score_offsets"
 """What it tells there of what was added to the logits of each class."""
 _SEAL: Final = "sha256"
@@ -99,7 +99,7 @@ def compact(graph: onnx.GraphProto) -> None:
     _replace_nodes(graph, nodes)
 
 
-def in_32_bits(graph: onnx.GraphProto) -> None:
+def with_float32_weights(graph: onnx.GraphProto) -> None:
     """Make the weights of a compact graph whole, so that no node does."""
     halved = {one.name: one for one in graph.initializer if one.name.endswith(_SHORT)}
     whole = {node.output[0]: in_full(node.input[0]) for node in graph.node if node.input and node.input[0] in halved}

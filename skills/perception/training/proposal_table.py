@@ -14,9 +14,9 @@ from pycocotools import mask as coco_mask
 from skills.perception.detector.cascade_files import DetectorModel
 from skills.perception.detector.proposals import ProposalOptions, Proposals, proposals_of
 from skills.perception.detector.scales import Scales
+from skills.perception.training.crop_store import CropWriter
 from skills.perception.training.labels import Labels
 from skills.perception.training.stages import proposed, refined_by
-from skills.perception.training.surroundings import SurroundingsWriter
 
 __all__ = ["NEAR", "Look", "ProposalTable", "proposals_in", "refined_in", "table_of"]
 
@@ -72,7 +72,7 @@ def refined_in(model: DetectorModel, scales: Scales) -> Proposals:
     return proposals_of(*refined_by(model, scales), _SEEN)
 
 
-def table_of(look: Look, pictures: Iterable[tuple[Scales, Labels]], kept: SurroundingsWriter) -> ProposalTable:
+def table_of(look: Look, pictures: Iterable[tuple[Scales, Labels]], kept: CropWriter) -> ProposalTable:
     """The regions of all pictures, of which what is about them is kept. Those on what is to be ignored are left out."""
     tables: list[ProposalTable] = []
     for number, (scales, labels) in enumerate(pictures):

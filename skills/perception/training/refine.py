@@ -25,17 +25,17 @@ from skills.perception.detector.scales import Scales
 from skills.perception.training.crop_batches import CropFeed
 from skills.perception.training.crop_export import export_crops
 from skills.perception.training.crop_learner import ClassifierLearner, CropLearner, RefinementLearner
+from skills.perception.training.crop_store import CropStore, written_crops
 from skills.perception.training.labels import LearningPicture, TrainingDataError, category_names, digest_of, read_split
 from skills.perception.training.loop import CHECKPOINT, Loop, Stepped, figures_of
 from skills.perception.training.onnx_files import offsets_fact
 from skills.perception.training.options import RefineOptions
-from skills.perception.training.peers import Peers
+from skills.perception.training.parallel import Told, run_parallel
 from skills.perception.training.proposal_table import ProposalTable, proposals_in, refined_in, table_of
 from skills.perception.training.store import read_scales
-from skills.perception.training.surroundings import Surroundings, kept_surroundings
-from skills.perception.training.together import Told, learn_together
 from skills.perception.training.train import MODEL
 from skills.perception.training.validate import CALIBRATED_BY, Examination, examination, examine, offsets_by
+from skills.perception.training.workers import Workers
 
 __all__ = ["refine"]
 
@@ -86,10 +86,10 @@ def refine(options: RefineOptions, told: Told) -> Path:
     _copy(options.model, first, options)
     if options.classifier:
         _copy(refinement_file(options.model), refinement_file(first), options)
-    if not options.resume or not (options.out / TABLE).is_file() or not Surroundings.are_in(options.out):
+    if not options.resume or not (options.out / TABLE).is_file() or not CropStore.are_in(options.out):
         (options.out / TABLE).unlink(missing_ok=True)
         _look_at_all(options, names, pictures)
-    learn_together(partial(_learn, options), options.processes, options.out, told)
+    run_parallel(partial(_learn, options), options.processes, options.out, told)
     return _stage(options).file(first)
 
 
@@ -115,7 +115,7 @@ def _look_at_all(options: RefineOptions, names: tuple[str, ...], pictures: tuple
         raise TrainingDataError(
             f"{options.model}: knows other classes than {options.data}", mend="render the data anew"
         )
-    with kept_surroundings(options.out) as kept:
+    with written_crops(options.out) as kept:
         seen = ((read_scales(picture.file), picture.labels) for picture in pictures)
         table = table_of(partial(stage.look, model), seen, kept)
     if not (table.classes >= 0).any() or not (table.classes < 0).any():
@@ -125,15 +125,15 @@ def _look_at_all(options: RefineOptions, names: tuple[str, ...], pictures: tuple
     table.save(options.out / TABLE)
 
 
-def _learn(options: RefineOptions, peers: Peers, device: torch.device, told: Told) -> None:
+def _learn(options: RefineOptions, workers: Workers, device: torch.device, told: Told) -> None:
     """One process's part in learning."""
     names = category_names(options.data)
     learner = _stage(options).learner.new(len(names), options.seed, device)
-    table, about = ProposalTable.read(options.out / TABLE), Surroundings.read(options.out)
+    table, about = ProposalTable.read(options.out / TABLE), CropStore.read(options.out)
     _begin(learner, options, CropFeed(table, about, options.seed, 0, 1))
-    feed = CropFeed(table, about, options.seed, peers.rank, peers.count)
+    feed = CropFeed(table, about, options.seed, workers.rank, workers.count)
     exam = examination(options.data, "val", names, options.examined)
-    Loop(_Regions(options, learner, peers, feed, exam), options.budget, peers, options.out, told).run()
+    Loop(_Regions(options, learner, workers, feed, exam), options.budget, workers, options.out, told).run()
 
 
 def _begin(learner: CropLearner, options: RefineOptions, feed: CropFeed) -> None:
@@ -155,7 +155,7 @@ class _Regions:
 
     options: RefineOptions
     state: CropLearner
-    peers: Peers
+    workers: Workers
     feed: CropFeed
     exam: Examination
 
@@ -164,8 +164,8 @@ class _Regions:
         progress, options = self.state.progress, self.options
         batch = self.feed.batch(progress.taken, options.batch)
         rate = options.schedule.rate(progress.steps, done)
-        scores, boxes, clock = self.state.step(batch, rate, self.peers, clock)
-        return Stepped(options.batch * self.peers.count, scores, boxes, rate, clock)
+        scores, boxes, clock = self.state.step(batch, rate, self.workers, clock)
+        return Stepped(options.batch * self.workers.count, scores, boxes, rate, clock)
 
     def written(self, *, last: bool) -> dict[str, float]:
         """Write the ONNX file, and give its figures of some held-out pictures."""

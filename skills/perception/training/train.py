@@ -18,10 +18,10 @@ from skills.perception.training.loop import CHECKPOINT, Loop, Stepped, figures_o
 from skills.perception.training.onnx_files import offsets_fact
 from skills.perception.training.onnx_weights import settle
 from skills.perception.training.options import TrainOptions
-from skills.perception.training.peers import Peers
+from skills.perception.training.parallel import Report, Told, run_parallel
 from skills.perception.training.store import open_store
-from skills.perception.training.together import Report, Told, learn_together
 from skills.perception.training.validate import CALIBRATED_BY, Examination, examination, examine, offsets_by
+from skills.perception.training.workers import Workers
 
 __all__ = ["MODEL", "Report", "TrainOptions", "train"]
 
@@ -37,11 +37,11 @@ def train(options: TrainOptions, told: Told) -> Path:
     examination(options.data, "val", category_names(options.data))
     _begin(Learner.new(len(category_names(options.data)), options.seed, torch.device("cpu")), options)
     open_store(options.out / PICTURES, pictures)
-    learn_together(partial(_learn, options), options.processes, options.out, told)
+    run_parallel(partial(_learn, options), options.processes, options.out, told)
     return options.out / MODEL
 
 
-def _learn(options: TrainOptions, peers: Peers, device: torch.device, told: Told) -> None:
+def _learn(options: TrainOptions, workers: Workers, device: torch.device, told: Told) -> None:
     """One process's part in learning."""
     names = category_names(options.data)
     learner = Learner.new(len(names), options.seed, device)
@@ -50,9 +50,9 @@ def _learn(options: TrainOptions, peers: Peers, device: torch.device, told: Told
     store = open_store(options.out / PICTURES, pictures)
     maker = CanvasMaker(pictures, store)
     _settle(learner, options, maker)
-    feed = Feed(maker, options.seed, peers.rank, peers.count)
+    feed = Feed(maker, options.seed, workers.rank, workers.count)
     exam = examination(options.data, "val", names, options.examined)
-    Loop(_Canvases(options, learner, peers, feed, exam), options.budget, peers, options.out, told).run()
+    Loop(_Canvases(options, learner, workers, feed, exam), options.budget, workers, options.out, told).run()
 
 
 def _beginning(options: TrainOptions) -> Path | None:
@@ -87,7 +87,7 @@ class _Canvases:
 
     options: TrainOptions
     state: Learner
-    peers: Peers
+    workers: Workers
     feed: Feed
     exam: Examination
 
@@ -97,8 +97,8 @@ class _Canvases:
         phase = schedule.phase(done)
         batch = self.feed.batch(progress.taken, phase)
         rate = schedule.rate(progress.steps, done)
-        scores, boxes, clock = self.state.step(batch, rate, self.peers, clock)
-        return Stepped(phase.batch * self.peers.count, scores, boxes, rate, clock)
+        scores, boxes, clock = self.state.step(batch, rate, self.workers, clock)
+        return Stepped(phase.batch * self.workers.count, scores, boxes, rate, clock)
 
     def written(self, *, last: bool) -> dict[str, float]:
         """Write the ONNX file, and give its figures of some held-out pictures."""

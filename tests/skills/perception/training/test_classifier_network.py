@@ -17,14 +17,14 @@ from skills.perception.training.classifier_network import USED, ClassifierNetwor
 from skills.perception.training.crop_batches import CropBatch  # noqa: E402
 from skills.perception.training.crop_export import export_crops  # noqa: E402
 from skills.perception.training.crop_learner import ClassifierLearner  # noqa: E402
-from skills.perception.training.eight_bits import in_eight_bits  # noqa: E402
 from skills.perception.training.export import fused  # noqa: E402
 from skills.perception.training.labels import TrainingDataError  # noqa: E402
-from skills.perception.training.peers import Peers  # noqa: E402
 from skills.perception.training.proposal_table import refined_in  # noqa: E402
+from skills.perception.training.quantisation import quantised  # noqa: E402
+from skills.perception.training.workers import Workers  # noqa: E402
 
 onnx = pytest.importorskip("onnx")
-ALONE, CPU, NAMES = Peers(0, 1), torch.device("cpu"), ("beer", "coke", "cube")
+ALONE, CPU, NAMES = Workers(0, 1), torch.device("cpu"), ("beer", "coke", "cube")
 Given = tuple["torch.Tensor", "torch.Tensor", "torch.Tensor"]
 
 
@@ -143,7 +143,7 @@ def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_pa
         "regions": boxes.numpy(),
         "logits": logits.numpy(),
     }
-    made = in_eight_bits(model, [told])
+    made = quantised(model, [told])
     kinds = {one.data_type for one in made.graph.initializer if one.name.endswith("weight_quantized")}
     assert kinds == {onnx.TensorProto.INT8}
     # 16 blocks of 3 convolutions, of which the first has 2; neither the first of all, nor this block, nor the last two

@@ -20,11 +20,11 @@ from skills.perception.training.losses import LossOptions, complete_overlap, los
 from skills.perception.training.muon import orthogonal  # noqa: E402
 from skills.perception.training.network import DetectorNetwork, cells  # noqa: E402
 from skills.perception.training.overlaps import overlap  # noqa: E402
-from skills.perception.training.peers import Peers  # noqa: E402
 from skills.perception.training.placing import Targets  # noqa: E402
+from skills.perception.training.workers import Workers  # noqa: E402
 
 NAMES = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "person", "cylinder", "cube")
-ALONE = Peers(0, 1)
+ALONE = Workers(0, 1)
 CPU = torch.device("cpu")
 
 

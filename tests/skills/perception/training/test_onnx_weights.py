@@ -9,11 +9,11 @@ from random_networks import random_network
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
-from skills.perception.training.eight_bits import write_in_eight_bits  # noqa: E402
 from skills.perception.training.export import export  # noqa: E402
 from skills.perception.training.labels import TrainingDataError  # noqa: E402
 from skills.perception.training.network import DetectorNetwork  # noqa: E402
 from skills.perception.training.onnx_weights import settle, take_over  # noqa: E402
+from skills.perception.training.quantisation import write_quantised  # noqa: E402
 
 NAMES = ("beer", "coke", "cube")
 
@@ -41,7 +41,7 @@ def test_what_reckons_with_8_bits_gives_the_weights_that_it_was_made_of(
 ) -> None:
     network, file = written
     given = {"images": np.random.default_rng(0).integers(0, 256, (1, 480, 640, 3), dtype=np.uint8)}
-    write_in_eight_bits(file, [given], tmp_path / "8.onnx")
+    write_quantised(file, [given], tmp_path / "8.onnx")
     pictures, other = torch.rand(2, 3, 64, 96), random_network(2, len(NAMES))
     take_over(other, tmp_path / "8.onnx")
     with torch.no_grad():

@@ -19,9 +19,9 @@ from skills.perception.training.labels import TrainingDataError  # noqa: E402
 from skills.perception.training.learner import read_checkpoint  # noqa: E402
 from skills.perception.training.loop import CHECKPOINT  # noqa: E402
 from skills.perception.training.options import RefineOptions  # noqa: E402
+from skills.perception.training.parallel import Report  # noqa: E402
 from skills.perception.training.refine import TABLE, refine  # noqa: E402
 from skills.perception.training.schedule import Budget, Schedule  # noqa: E402
-from skills.perception.training.together import Report  # noqa: E402
 from skills.perception.training.train import MODEL  # noqa: E402
 
 

@@ -20,16 +20,16 @@ from skills.perception.training.crop_export import export_crops  # noqa: E402
 from skills.perception.training.crop_learner import RefinementLearner  # noqa: E402
 from skills.perception.training.crop_losses import crop_losses  # noqa: E402
 from skills.perception.training.crop_network import covered, moved  # noqa: E402
+from skills.perception.training.crop_store import CropStore, written_crops  # noqa: E402
 from skills.perception.training.export import export  # noqa: E402
 from skills.perception.training.labels import Labels, LearningPicture, TrainingDataError  # noqa: E402
 from skills.perception.training.learner import Learner  # noqa: E402
 from skills.perception.training.network import Residual  # noqa: E402
-from skills.perception.training.peers import Peers  # noqa: E402
 from skills.perception.training.proposal_table import ProposalTable, proposals_in, table_of  # noqa: E402
 from skills.perception.training.refinement_network import RefinementNetwork, surest_about  # noqa: E402
-from skills.perception.training.surroundings import Surroundings, kept_surroundings  # noqa: E402
+from skills.perception.training.workers import Workers  # noqa: E402
 
-ALONE = Peers(0, 1)
+ALONE = Workers(0, 1)
 CPU = torch.device("cpu")
 THING, FAR = (100, 100, 200, 200), (300, 300, 400, 400)
 
@@ -44,7 +44,7 @@ def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> Learni
 def table(file: Path, picture: LearningPicture, *things: tuple[str, float, tuple[float, ...]]) -> ProposalTable:
     look = partial(proposals_in, load_model(write_model(file)))
     seen = picture_of(*things)
-    with kept_surroundings(file.parent) as kept:
+    with written_crops(file.parent) as kept:
         return table_of(look, [(Scales(seen, halved(seen)), picture.labels)], kept)
 
 
@@ -87,11 +87,11 @@ def feed(tmp_path: Path) -> CropFeed:
     boxes = np.where(on[:, None], THING, FAR).astype(np.float32)
     logits = np.zeros((rows, len(CLASSES)), np.float32)
     classes = np.where(on, 1, -1)
-    with kept_surroundings(tmp_path) as kept:
+    with written_crops(tmp_path) as kept:
         for seen, box in zip([bright, dark] * (rows // 2), boxes, strict=True):
             kept.add(Scales(seen, halved(seen)), box[None])
     told = ProposalTable(np.where(on, 0, 1), boxes, logits, boxes, classes)
-    return CropFeed(told, Surroundings.read(tmp_path), 5, 0, 1)
+    return CropFeed(told, CropStore.read(tmp_path), 5, 0, 1)
 
 
 def test_half_of_a_batch_is_about_things(feed: CropFeed) -> None:

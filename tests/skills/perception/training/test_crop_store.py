@@ -8,7 +8,7 @@ pytest.importorskip("torch")
 
 from skills.perception.detector.scales import Scales, halved
 from skills.perception.training.crop_batches import changed_map
-from skills.perception.training.surroundings import Surroundings, kept_surroundings
+from skills.perception.training.crop_store import CropStore, written_crops
 
 CHIP = (128, 128)
 
@@ -20,10 +20,10 @@ def smooth_picture() -> Scales:
     return Scales(full, halved(full))
 
 
-def kept(folder: Path, scales: Scales, *boxes: tuple[float, float, float, float]) -> Surroundings:
-    with kept_surroundings(folder) as writer:
+def kept(folder: Path, scales: Scales, *boxes: tuple[float, float, float, float]) -> CropStore:
+    with written_crops(folder) as writer:
         writer.add(scales, np.array(boxes, np.float32))
-    return Surroundings.read(folder)
+    return CropStore.read(folder)
 
 
 # of 640 x 480: tiny, small, at a corner, where a crop's scale is just above and below a half, the whole picture
@@ -62,9 +62,9 @@ def test_each_place_has_its_own(tmp_path: Path) -> None:
 def test_what_was_kept_before_stays_when_writing_is_broken_off(tmp_path: Path) -> None:
     before = kept(tmp_path, smooth_picture(), BOXES[0])
     data = bytes(before.data)
-    with pytest.raises(KeyboardInterrupt), kept_surroundings(tmp_path) as writer:
+    with pytest.raises(KeyboardInterrupt), written_crops(tmp_path) as writer:
         writer.add(smooth_picture(), np.array(BOXES, np.float32))
         raise KeyboardInterrupt
-    again = Surroundings.read(tmp_path)
+    again = CropStore.read(tmp_path)
     assert (len(again), bytes(again.data)) == (1, data)
     assert {file.name for file in tmp_path.iterdir()} == {"chips.u8", "chips.npz"}

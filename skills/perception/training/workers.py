@@ -10,13 +10,13 @@ import torch
 import torch.distributed as distributed
 from torch import Tensor, nn
 
-__all__ = ["Peers", "joined_peers"]
+__all__ = ["Workers", "joined_workers"]
 
 _PATIENCE = datetime.timedelta(hours=2)
 
 
 @dataclass(frozen=True)
-class Peers:
+class Workers:
     """This process among `count`. The first, number 0, has the clock, measures and writes."""
 
     rank: int
@@ -61,10 +61,10 @@ def _spread(flat: Tensor, into: list[Tensor]) -> None:
         first += gradient.numel()
 
 
-def joined_peers(rank: int, count: int, meeting: Path) -> Peers:
+def joined_workers(rank: int, count: int, meeting: Path) -> Workers:
     """Join the others by a file that does not exist yet."""
     if count > 1:
         distributed.init_process_group(
             "gloo", init_method=meeting.absolute().as_uri(), rank=rank, world_size=count, timeout=_PATIENCE
         )
-    return Peers(rank, count)
+    return Workers(rank, count)

@@ -14,9 +14,9 @@ import cv2
 import torch
 
 from skills.perception.training.labels import TrainingDataError
-from skills.perception.training.peers import Peers, joined_peers
+from skills.perception.training.workers import Workers, joined_workers
 
-__all__ = ["Report", "Told", "learn_together"]
+__all__ = ["Report", "Told", "run_parallel"]
 
 _GO_ON: Final = "perhaps for want of memory; the same command with --resume goes on from its checkpoint"
 
@@ -33,10 +33,10 @@ class Report:
 
 
 Told = Callable[[Report], None]
-Part = Callable[[Peers, torch.device, Told], None]
+Part = Callable[[Workers, torch.device, Told], None]
 
 
-def learn_together(part: Part, processes: int, out: Path, told: Told) -> None:
+def run_parallel(part: Part, processes: int, out: Path, told: Told) -> None:
     """Take part in learning in so many processes of one thread, or in this one alone where there is a GPU.
 
     What the first process tells is passed on. Raises TrainingDataError when one is killed.
@@ -66,8 +66,8 @@ def _process(rank: int, count: int, meeting: Path, part: Part, reports: Any) -> 
 
 def _take_part(rank: int, count: int, meeting: Path, part: Part, told: Told) -> None:
     cv2.setNumThreads(1)
-    peers = joined_peers(rank, count, meeting)
-    part(peers, torch.device("cuda" if torch.cuda.is_available() else "cpu"), told)
+    workers = joined_workers(rank, count, meeting)
+    part(workers, torch.device("cuda" if torch.cuda.is_available() else "cpu"), told)
 
 
 def _end(processes: Sequence[multiprocessing.Process]) -> None:

@@ -1,6 +1,6 @@
-"""Networks that reckon with whole numbers of 8 bits, which processor cores do over twice as fast as with floats.
+"""Networks that are quantised to INT8, which processor cores do over twice as fast as with floats.
 
-    python -m skills.perception.training.eight_bits DIR/errand_detector.onnx --data PICTURES --out FOLDER
+    python -m skills.perception.training.quantisation DIR/errand_detector.onnx --data PICTURES --out FOLDER
 
 Weights have 8 bits in the file, those of each output in steps of their own; learning can go on from them. What passes
 between layers gets its range from some pictures that were learnt from. The first convolution, which sees the picture
@@ -35,12 +35,19 @@ from skills.perception.detector.proposals import CLASSIFIED, ProposalOptions, Pr
 from skills.perception.detector.scales import Scales, halved
 from skills.perception.training.command import exit_code_of
 from skills.perception.training.labels import TrainingDataError
-from skills.perception.training.onnx_files import EIGHT_BITS, compact, facts_of, in_32_bits, shorten_names, write_sealed
+from skills.perception.training.onnx_files import (
+    QUANTISED,
+    compact,
+    facts_of,
+    shorten_names,
+    with_float32_weights,
+    write_sealed,
+)
 from skills.perception.training.stages import proposed, refined_by
 from skills.perception.training.store import read_picture
 from skills.perception.training.validate import examination
 
-__all__ = ["detector_in_eight_bits", "in_eight_bits", "main", "write_in_eight_bits"]
+__all__ = ["main", "quantised", "quantised_detector", "write_quantised"]
 
 _MEASURED_BY: Final = 160
 _CROPS_AT_ONCE: Final = 8
@@ -50,19 +57,19 @@ _KINDS: Final = ("Conv", "Relu", "Clip", "Concat", "MaxPool", "Resize", "Add")
 Given = Mapping[str, NDArray[Any]]
 
 
-def detector_in_eight_bits(file: Path, data: Path, out: Path) -> Path:
+def quantised_detector(file: Path, data: Path, out: Path) -> Path:
     """Write the network of a file, and those beside it, into a folder; gives the first's file.
 
-    Those that reckon with 8 bits already stay as they are. Ranges are measured on pictures of the data set `data` that
+    Those that are quantised already stay as they are. Ranges are measured on pictures of the data set `data` that
     were learnt from. Raises TrainingDataError for files that cannot be used, or when there is nothing to do.
     """
     try:
         model = load_model(file)
     except ModelFileError as error:
         raise TrainingDataError(f"{error.file}: {error.message}", mend="name a detector's ONNX file") from error
-    if EIGHT_BITS in (model.classifier or model.refinement or model.proposal).metadata:
+    if QUANTISED in (model.classifier or model.refinement or model.proposal).metadata:
         raise TrainingDataError(
-            f"{file}: reckons with 8 bits already", mend="name a file that errand dataset train or refine wrote"
+            f"{file}: is quantised already", mend="name a file that errand dataset train or refine wrote"
         )
     made = out / file.name
     if made.exists() and made.samefile(file):
@@ -80,19 +87,19 @@ def detector_in_eight_bits(file: Path, data: Path, out: Path) -> Path:
     for name, (source, network, given) in zip(("first", "second", "third"), networks, strict=True):
         if network is not None:
             target = out / source.name
-            if EIGHT_BITS in network.metadata:
+            if QUANTISED in network.metadata:
                 kept = onnx.load(source)
                 write_sealed(kept, target, {**facts_of(kept), **belongs})
             else:
-                write_in_eight_bits(source, given(), target, belongs)
+                write_quantised(source, given(), target, belongs)
             belongs = {name: hashlib.sha256(target.read_bytes()).hexdigest()}
     return made
 
 
-def in_eight_bits(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelProto:
-    """A network that reckons with 8 bits, with ranges measured on what is `given` to it, always of as many rows."""
+def quantised(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelProto:
+    """A network that is quantised, with ranges measured on what is `given` to it, always of as many rows."""
     plain = onnx.ModelProto.FromString(model.SerializeToString())
-    in_32_bits(plain.graph)
+    with_float32_weights(plain.graph)
     for number, node in enumerate(plain.graph.node):
         node.name = f"n{number}"
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
@@ -216,23 +223,23 @@ def _seen_places(model: DetectorModel, scales: Scales) -> Proposals:
     return proposals_of(*refined_by(model, scales), CLASSIFIED)
 
 
-def write_in_eight_bits(
+def write_quantised(
     file: Path, given: Sequence[Given], out: Path, other_facts: Mapping[str, str] | None = None
 ) -> None:
-    """Write the network of a file so that it reckons with 8 bits; it tells what it did, and `other_facts`."""
+    """Write the network of a file so that it is quantised; it tells what it did, and `other_facts`."""
     model = onnx.load(file)
-    facts = {**facts_of(model), **(other_facts or {}), EIGHT_BITS: "yes"}
-    write_sealed(in_eight_bits(model, given), out, facts)
+    facts = {**facts_of(model), **(other_facts or {}), QUANTISED: "yes"}
+    write_sealed(quantised(model, given), out, facts)
 
 
 def main() -> int:
     """The command line."""
-    parser = argparse.ArgumentParser(description="A detector that reckons with whole numbers of 8 bits.")
+    parser = argparse.ArgumentParser(description="A detector that is quantised to INT8.")
     parser.add_argument("file", type=Path, help="the proposal network's ONNX file")
     parser.add_argument("--data", type=Path, required=True, help="the data set's folder")
     parser.add_argument("--out", type=Path, required=True, help="the folder to write to")
     given = parser.parse_args()
-    return exit_code_of(lambda: detector_in_eight_bits(given.file, given.data, given.out))
+    return exit_code_of(lambda: quantised_detector(given.file, given.data, given.out))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from skills.perception.detector.proposals import CROP_PX, crop_map
 from skills.perception.detector.scales import Scales, cut_out, halved
 
-__all__ = ["REACH_PX", "Surroundings", "SurroundingsWriter", "kept_surroundings"]
+__all__ = ["REACH_PX", "CropStore", "CropWriter", "written_crops"]
 
 REACH_PX: Final = 108.0
 """How far from a place's middle, in pixels of its crop, is kept: as far as `changed_map` may show any of it."""
@@ -35,7 +35,7 @@ Numbers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class CropStore:
     """R pictures, one after the other in `data`, of which each ends at one of `ends` (R,).
 
     `corners` (R, 2) tell where in the letterbox their upper left corners are, and `shrinks` (R,) how many of its pixels
@@ -56,11 +56,11 @@ class Surroundings:
         return (folder / _INDEX).is_file()
 
     @staticmethod
-    def read(folder: Path) -> Surroundings:
+    def read(folder: Path) -> CropStore:
         """What was written to a folder; pictures are mapped from their file."""
         with np.load(folder / _INDEX) as kept:
             index = {name: kept[name] for name in _COLUMNS}
-        return Surroundings(np.memmap(folder / _PICTURES, dtype=np.uint8, mode="r"), **index)
+        return CropStore(np.memmap(folder / _PICTURES, dtype=np.uint8, mode="r"), **index)
 
     def cut(self, row: int, affine: NDArray[np.floating]) -> Picture:
         """The crop (128, 128, 3) into which an affine map (2, 3) brings the letterbox; grey beyond what is kept."""
@@ -76,12 +76,12 @@ class Surroundings:
 
 
 @contextmanager
-def kept_surroundings(folder: Path) -> Iterator[SurroundingsWriter]:
+def written_crops(folder: Path) -> Iterator[CropWriter]:
     """What writes them to a folder, picture by picture; they are there when it is left without an error."""
     fresh, index = folder / f".{_PICTURES}.new", folder / _INDEX
     try:
         with fresh.open("wb") as file:
-            writer = SurroundingsWriter(file)
+            writer = CropWriter(file)
             yield writer
         index.unlink(missing_ok=True)
         fresh.replace(folder / _PICTURES)
@@ -92,8 +92,8 @@ def kept_surroundings(folder: Path) -> Iterator[SurroundingsWriter]:
 
 
 @dataclass(frozen=True)
-class SurroundingsWriter:
-    """Writes pictures to a file, one after the other; the rest as `Surroundings` tells it."""
+class CropWriter:
+    """Writes pictures to a file, one after the other; the rest as `CropStore` tells it."""
 
     file: BinaryIO
     ends: list[int] = field(default_factory=list)

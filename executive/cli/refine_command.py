@@ -24,7 +24,7 @@ UNLESS_SAID_MINUTES: Final = 90.0
 
 def refine_command(
     data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
-    out: Annotated[Path, typer.Option(help="Folder for checkpoints, curves and the ONNX files.")],
+    out: Annotated[Path, typer.Option(help="Folder for checkpoints, figures and the ONNX files.")],
     model: Annotated[
         Path | None, typer.Option(help="The proposal network's file; else the one of Errand.", show_default=False)
     ] = None,

@@ -22,7 +22,7 @@ UNLESS_SAID_MINUTES: Final = 240.0
 
 def train_command(
     data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
-    out: Annotated[Path, typer.Option(help="Folder for checkpoints, curves and the ONNX file.")],
+    out: Annotated[Path, typer.Option(help="Folder for checkpoints, figures and the ONNX file.")],
     minutes: Annotated[
         float | None, typer.Option(min=0.01, help="How long to learn; four hours unless said.", show_default=False)
     ] = None,
@@ -45,7 +45,7 @@ def train_command(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Train the detector and export it, with checkpoints and curves on the way."""
+    """Train the detector and export it, with checkpoints and figures on the way."""
     console = console_for(as_json)
     with refusals():
         check_folders(data, out, resume)

@@ -1,4 +1,4 @@
-"""What the refinement network is told of its mistakes: scores as high as its boxes are good, and boxes that overlap."""
+"""The losses of crop networks: scores as high as their boxes are good, and boxes that overlap."""
 
 from __future__ import annotations
 

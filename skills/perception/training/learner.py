@@ -19,7 +19,6 @@ from skills.perception.training.losses import Losses, LossOptions, TruthBatch, l
 from skills.perception.training.muon import Muon
 from skills.perception.training.network import DetectorNetwork, EarlyLayers, cells
 from skills.perception.training.onnx_weights import take_over
-from skills.perception.training.records import Course
 from skills.perception.training.workers import Workers
 
 __all__ = ["Learner", "LearningState", "Progress", "optimisers_of", "read_checkpoint", "without_learning_early"]
@@ -50,7 +49,6 @@ class LearningState(Generic[Network]):
     optimisers: tuple[torch.optim.Optimizer, ...]
     device: torch.device
     progress: Progress = field(default_factory=Progress)
-    course: Course = field(default_factory=Course)
 
     def take_step(
         self, losses_now: Callable[[], Losses], rate: float, workers: Workers, clock: float
@@ -82,7 +80,6 @@ class LearningState(Generic[Network]):
             "average": self.average.state(),
             "optimisers": [optimiser.state_dict() for optimiser in self.optimisers],
             "progress": vars(self.progress),
-            "course": self.course.state(),
         }
         fresh = file.with_name(f".{file.name}.new")
         torch.save(state, fresh)
@@ -96,7 +93,6 @@ class LearningState(Generic[Network]):
         for optimiser, kept in zip(self.optimisers, state["optimisers"], strict=True):
             optimiser.load_state_dict(kept)
         self.progress = Progress(**state["progress"])
-        self.course = Course.of(state["course"])
 
     def start_from_checkpoint(self, file: Path) -> None:
         """Take over a checkpoint's averaged weights; all else begins anew. Raises TrainingDataError."""
@@ -164,7 +160,7 @@ def optimisers_of(network: nn.Module, last: Iterable[nn.Module]) -> tuple[torch.
 
 
 def quick_in_bfloat16(device: torch.device) -> bool:
-    """Whether numbers of 16 bits save time: on processors that cannot reckon with them they cost twice as much."""
+    """Whether bfloat16 saves time: on processors without it, it costs twice as much."""
     capabilities = torch.cpu.get_capabilities()
     return device.type != "cpu" or any(capabilities.get(name, False) for name in ("amx_bf16", "avx512_bf16"))
 

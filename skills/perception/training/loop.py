@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Protocol
 
 from skills.perception.training.learner import LearningState
 from skills.perception.training.parallel import Report, Told
-from skills.perception.training.records import draw_curves
 from skills.perception.training.schedule import Budget
 from skills.perception.training.scoring import Score
 from skills.perception.training.workers import Workers
@@ -18,7 +19,7 @@ from skills.perception.training.workers import Workers
 __all__ = ["CHECKPOINT", "Lesson", "Loop", "Stepped", "figures_of"]
 
 CHECKPOINT: Final = "checkpoint.pt"
-CURVES: Final = "curves.png"
+JOURNAL: Final = "training.jsonl"
 _NOTED_EVERY_STEPS: Final = 20
 _EXAMINED_EVERY: Final = 0.1
 
@@ -83,23 +84,27 @@ class Loop:
         state.progress.taken += made.taken
         if self.workers.first and state.progress.steps % _NOTED_EVERY_STEPS == 0:
             speed = made.taken / max(made.clock - before, 1e-6)
-            state.course.steps.append({"progress": done, "scores": made.scores, "boxes": made.boxes, "rate": made.rate})
+            self._note({"progress": done, "scores": made.scores, "boxes": made.boxes, "rate": made.rate})
             self.told(Report(done, state.progress.steps, speed, (made.scores, made.boxes)))
 
     def _examine(self) -> None:
-        """Write what there is, with checkpoint and curves, and tell how good it is."""
+        """Write the ONNX file and the checkpoint, and report the figures of held-out pictures."""
         state = self.lesson.state
         self.workers.mean_statistics(state.network)
         self.workers.mean_statistics(state.average.network)
         if self.workers.first:
             done = self._done()
             figures = self.lesson.written(last=done >= 1.0)
-            state.course.exams.append({"progress": done, **figures})
-            draw_curves(state.course, self.out / CURVES)
+            self._note({"progress": done, **figures})
             state.save(self.out / CHECKPOINT)
             self.told(Report(done, state.progress.steps, 0.0, (0.0, 0.0), figures))
         self.workers.wait()
         self.resting_since = time.monotonic()
+
+    def _note(self, row: Mapping[str, float]) -> None:
+        """Append a row to the journal: losses of a step, or figures of held-out pictures."""
+        with (self.out / JOURNAL).open("a", encoding="utf-8") as journal:
+            journal.write(json.dumps(row) + "\n")
 
 
 def figures_of(found: Score) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What the network is told of its mistakes: scores should be as high as boxes are good, and boxes should overlap."""
+"""The losses: scores should be as high as boxes are good, and boxes should overlap."""
 
 from __future__ import annotations
 

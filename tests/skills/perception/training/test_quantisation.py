@@ -177,7 +177,7 @@ def test_a_proposal_network_in_8_bits_stays_as_it_is(tmp_path: Path, data: Path,
 def test_what_is_in_8_bits_already_is_refused(tmp_path: Path, data: Path) -> None:
     told = {"format": "errand-detector-1", "class_names": json.dumps(list(CLASSES)), "eight_bits": "yes"}
     file = write_model(tmp_path / "detector.onnx", metadata=told)
-    with pytest.raises(TrainingDataError, match=r"detector\.onnx.*8 bits already"):
+    with pytest.raises(TrainingDataError, match=r"detector\.onnx.*is quantised already"):
         quantised_detector(file, data, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -73,7 +73,7 @@ def test_a_proposal_network_gets_a_second_one(options: RefineOptions, processes:
     assert len(OnnxDetector(model).detect([picture_of()])) == 1
     assert told[-1].progress == 1.0
     assert told[-1].figures is not None
-    assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, TABLE, "curves.png", "chips.u8"}
+    assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, TABLE, "training.jsonl", "chips.u8"}
 
 
 def test_both_get_a_third_one_that_belongs_to_the_second(options: RefineOptions, tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ def test_a_data_set_becomes_a_detectors_file(options: TrainOptions, processes: i
     assert load_model(file).class_names == NAMES
     assert told[-1].progress == 1.0
     assert told[-1].figures is not None
-    assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, "curves.png", "pictures"}
+    assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, "training.jsonl", "pictures"}
 
 
 def test_an_interrupted_training_leaves_no_process_behind(options: TrainOptions) -> None:

@@ -16,7 +16,7 @@ from skills.perception.detector.cascade_files import MODEL_FILE, DetectorModel, 
 from skills.perception.detector.crops import classified, refined
 from skills.perception.detector.letterbox import Letterbox, letterbox
 from skills.perception.detector.network_file import Network
-from skills.perception.detector.proposals import CLASSIFIED, ProposalOptions
+from skills.perception.detector.proposals import CLASSIFIED, ProposalOptions, rows_of
 from skills.perception.detector.scales import Scales, halved
 from skills.perception.detector.suppression import SuppressionOptions, candidates_of, detections_of
 from skills.robot import Picture
@@ -35,7 +35,7 @@ class DetectorOptions:
     """The least score of a detection, also of a rival class, and how boxes of one object become one.
 
     `proposals` are judged by the refinement network, and of those the `classified` by the classifier network. A quick
-    look for one class refines the proposals that give that class at least `quick_score`.
+    look for one class is content with the proposals that give that class at least `quick_score`.
     """
 
     threshold: float = 0.5
@@ -43,7 +43,7 @@ class DetectorOptions:
     suppression: SuppressionOptions = field(default_factory=SuppressionOptions)
     proposals: ProposalOptions = field(default_factory=ProposalOptions)
     classified: ProposalOptions = CLASSIFIED
-    quick_score: float = 0.05
+    quick_score: float = 0.02
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,9 @@ class OnnxDetector:
     def _detect_class(self, picture: Picture, number: int) -> tuple[Detection, ...]:
         image, placed = letterbox(picture)
         boxes, scores = _proposed(self.model.proposal, image)
-        likely = scores[:, number] >= self.options.quick_score
-        if not likely.any():
+        rows = rows_of(boxes, scores, self.options.proposals)
+        likely = rows[scores[rows, number] >= self.options.quick_score]
+        if not len(likely):
             return ()
         found = self._judged(image, placed, boxes[likely], scores[likely])
         return tuple(one for one in found if one.class_name == self.class_names[number])

@@ -64,7 +64,7 @@ def real_first(file: Path) -> Path:
 
 
 @pytest.mark.parametrize("processes", [1, 2])
-def test_a_proposal_network_gets_a_second_one(options: RefineOptions, processes: int) -> None:
+def test_a_proposal_network_gets_a_refinement_network(options: RefineOptions, processes: int) -> None:
     told = list[Report]()
     file = refine(replace(options, processes=processes), told.append)
     assert file == refinement_file(options.out / MODEL)
@@ -76,9 +76,9 @@ def test_a_proposal_network_gets_a_second_one(options: RefineOptions, processes:
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, TABLE, "training.jsonl", "chips.u8"}
 
 
-def test_both_get_a_third_one_that_belongs_to_the_second(options: RefineOptions, tmp_path: Path) -> None:
+def test_both_get_a_classifier_network_that_belongs_to_the_refinement_network(options: RefineOptions, tmp_path: Path) -> None:
     refine(options, lambda _: None)
-    next_one = replace(options, third=True, model=options.out / MODEL, out=tmp_path / "next")
+    next_one = replace(options, classifier=True, model=options.out / MODEL, out=tmp_path / "next")
     file = refine(next_one, lambda _: None)
     assert file == classifier_file(next_one.out / MODEL)
     model = load_model(next_one.out / MODEL)
@@ -88,9 +88,9 @@ def test_both_get_a_third_one_that_belongs_to_the_second(options: RefineOptions,
     assert len(OnnxDetector(model).detect([picture_of()])) == 1
 
 
-def test_without_a_refinement_network_there_is_no_third_one(options: RefineOptions) -> None:
-    with pytest.raises(TrainingDataError, match=r"first_regions\.onnx: cannot be copied"):
-        refine(replace(options, third=True), lambda _: None)
+def test_without_a_refinement_network_there_is_no_classifier_network(options: RefineOptions) -> None:
+    with pytest.raises(TrainingDataError, match=r"first_refinement\.onnx: cannot be copied"):
+        refine(replace(options, classifier=True), lambda _: None)
 
 
 def test_it_goes_on_where_it_stood(options: RefineOptions) -> None:

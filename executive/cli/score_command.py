@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from executive.cli.detector_choice import detector_of
+from executive.cli.learning import check_libraries
 from executive.cli.output import console_for, print_json, refusals
 from executive.cli.picture_files import read_picture, write_picture
 from executive.cli.score_report import scores_json, show_scores
@@ -63,6 +64,7 @@ def score_command(
     """Judge the detector by labelled pictures: average precision as COCO has it, precision, recall, speed."""
     console = console_for(as_json)
     with refusals():
+        check_libraries(("pycocotools",), "scoring")
         drawing = _png(sheet)
         detector = detector_of(model, DetectorOptions(threshold=LEAST_SCORE))
         work = _work(data, pictures or data.parent, limit, detector, views)

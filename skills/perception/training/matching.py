@@ -14,8 +14,6 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pycocotools.coco import COCO
-from pycocotools.cocoeval import COCOeval
 
 from skills.detection import Detection
 from skills.perception.training.scoring_labels import Label, LabelledPicture, large_enough
@@ -71,6 +69,8 @@ def evaluated(
     counts: Callable[[Label], bool] = lambda label: label.counts,
 ) -> Evaluation:
     """Evaluate what was found in each picture. Labels that do not count are passed over."""
+    from pycocotools.cocoeval import COCOeval  # of the extra `train`, which a command that scores asks for
+
     labels = [(k, one) for k, picture in enumerate(pictures) for one in picture.labels if one.class_name in class_names]
     detections = [(k, one) for k, ones in enumerate(found) for one in ones if one.class_name in class_names]
     truth = [
@@ -99,7 +99,9 @@ def _entry(
     return {**entry, "bbox": [u0, v0, u1 - u0, v1 - v0], **more}
 
 
-def _coco(annotations: list[dict[str, Any]], pictures: int, class_names: Sequence[str]) -> COCO:
+def _coco(annotations: list[dict[str, Any]], pictures: int, class_names: Sequence[str]) -> Any:
+    from pycocotools.coco import COCO
+
     made = COCO()
     made.dataset = {
         "images": [{"id": k} for k in range(pictures)],

@@ -1,5 +1,6 @@
 """`errand dataset score` with a small network whose pictures tell what it sees."""
 
+import importlib.util
 import json
 
 import cv2
@@ -91,6 +92,13 @@ def test_all_figures_are_told(score, data):
     filled = {one["from"]: one["recall"] for one in figures["by_distance_m"] if one["labels"]}
     assert filled == {0.5: 1.0, 1.0: 1.0, 2.0: 0.0}
     assert figures["by_size_px"][-1]["to"] is None
+
+
+def test_without_pycocotools_the_command_says_what_to_install(score, data, monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    result = score("--data", data)
+    assert result.exit_code == 2
+    assert "scoring needs pycocotools; pip install '.[train]'" in result.stderr
 
 
 def test_figures_are_told_by_camera(score, data):

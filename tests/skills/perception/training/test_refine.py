@@ -76,7 +76,7 @@ def test_a_proposal_network_gets_a_refinement_network(options: RefineOptions, pr
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, TABLE, "training.jsonl", "chips.u8"}
 
 
-def test_both_get_a_classifier_network_that_belongs_to_the_refinement_network(options: RefineOptions, tmp_path: Path) -> None:
+def test_both_get_a_classifier_network_that_belongs_to_them(options: RefineOptions, tmp_path: Path) -> None:
     refine(options, lambda _: None)
     next_one = replace(options, classifier=True, model=options.out / MODEL, out=tmp_path / "next")
     file = refine(next_one, lambda _: None)

@@ -205,7 +205,7 @@ def unsettled(classes: int) -> RefinementNetwork:
 
 def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
     first = write_model(tmp_path / "m.onnx")
-    facts = {"first": load_model(first).first.digest}
+    facts = {"first": load_model(first).proposal.digest}
     network = unsettled(len(CLASSES))
     export_crops(
         network,

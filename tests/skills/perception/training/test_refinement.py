@@ -219,7 +219,7 @@ def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
     crops = random.integers(0, 256, (3, CROP_PX, CROP_PX, 3), dtype=np.uint8)
     boxes = np.array([[22, 40, 106, 88], [30, 22, 80, 106], [40, 40, 90, 90]], np.float32)
     logits = random.normal(0, 2, (3, len(CLASSES))).astype(np.float32)
-    second = load_model(first).second
+    second = load_model(first).refinement
     assert second is not None
     given = {"chips": crops, "regions": boxes, "logits": logits}
     found, scores = second.session.run(["boxes", "scores"], given)

@@ -21,14 +21,14 @@ from plant.snapshot.file import SnapshotError
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError
 from skills.detect.attributes import known_attributes
-from skills.detect.careful_detector import CarefulDetector
-from skills.detect.detector_file import MODEL_FILE
-from skills.detect.onnx_detector import DetectorOptions
 from skills.detection import Detector
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
 from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
 from skills.navigate.footprint import Footprint
+from skills.perception.detector.augmentation import AugmentedDetector
+from skills.perception.detector.cascade_files import MODEL_FILE
+from skills.perception.detector.onnx_detector import DetectorOptions
 from skills.robot import Pose2D
 
 UNSURE_SIGMA = (0.5, 0.5, 0.3)
@@ -72,7 +72,7 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
 @cache
 def shared_detector() -> Detector:
     """The one detector of this process, loaded at the first call. Raises InputError when its model cannot be used."""
-    return CarefulDetector(detector_of(MODEL_FILE, DetectorOptions()))
+    return AugmentedDetector(detector_of(MODEL_FILE, DetectorOptions()))
 
 
 def _localiser(scan_map: GridMap, start: Pose2D, believed: Pose2D | None) -> ScanMatchingLocaliser:

@@ -27,11 +27,11 @@ from skills.detect.messages import (
     object_to_detect_message,
     tracks_message,
 )
-from skills.detect.seeing import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.detect.sighting import FLOOR, Sighting, observation, sightings
 from skills.detect.surface_view import Cluster, view_surface
 from skills.detect.tracks import FAINT_SCORE, SURE_SCORE, Track, TrackBook
 from skills.detect.words import counted, describe, surface_names, wanted
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.robot import FloatArray, Image
 
 _CONFIRM_SHIFTS_RAD = (0.25, -0.3)

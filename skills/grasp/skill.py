@@ -16,13 +16,13 @@ from skills.arm.collision import ArmScene, Box
 from skills.arm.poses import carry_configuration, close_stations, look_configuration, overview_stations
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.looking import cluster_box, cluster_boxes, surface_boxes
-from skills.detect.seeing import DETECTION_LATENCY_S, detections_in
 from skills.detect.sighting import Sighting, sightings
 from skills.detect.surface_view import Cluster, SurfaceView, cluster_of, parted, view_surface
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, plan_grasp
 from skills.grasp.posture import body_height_m
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.robot import FloatArray, Image
 
 GRASP_FORCE_N = 80.0

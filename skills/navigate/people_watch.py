@@ -12,8 +12,8 @@ from pydrake.math import RigidTransform
 
 from skills.api import Detection, Job, SkillContext
 from skills.detect.position import position_of
-from skills.detect.seeing import seen_in_grey
 from skills.estimate.planar import relative
+from skills.perception.detector.camera_images import found_in_grey
 from skills.robot import FloatArray, Image, Pose2D
 
 __all__ = ["PEOPLE_TOPIC", "PeopleOptions", "PeopleWatch", "SeenPerson", "cameras_towards"]
@@ -118,7 +118,7 @@ class PeopleWatch:
     def _look(self, sources: Sequence[str], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
         """People in one picture of each camera."""
         images = [self._context.robot.image(source, depth=False) for source in sources]
-        found = seen_in_grey(self._context.detector, images)
+        found = found_in_grey(self._context.detector, images, PERSON)
         pairs = [(image, one) for image, ones in zip(images, found, strict=True) for one in ones]
         seen = [self._placed(image, one, X_WO, here_W) for image, one in pairs]
         return _Look(tuple(one for one in seen if one is not None), tuple(images), X_WO, here_W)

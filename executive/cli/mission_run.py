@@ -72,11 +72,11 @@ def run_request(
             page.begin(log, simulation)
         log_map(log, request)
         announce(log, clock, tree, request.knowledge, world=request.world.name, seed=seed)
-        with cancelled_by_signals(control or Control(pace=None)) as heeded:
+        with cancelled_by_signals(control or Control(pace=None)) as heeded, LockStepWorker(clock) as worker:
             result = run(
                 [entry],
                 clock=clock,
-                worker=LockStepWorker(clock),
+                worker=worker,
                 publish=souvenirs,
                 settings=RunSettings(seed=seed),
                 control=heeded,

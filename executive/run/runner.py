@@ -6,19 +6,18 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from executive.record.schemas import CONTROL
 from executive.record.ticks import TickMeter
 from executive.run.control import Control, Event, Wishes
-from executive.run.guarded_robot import guarded, show_lease_behind
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
-from executive.run.lease_keeper import LeaseKeeper
 from executive.run.outcome import Glance, Outcome, RobotResult, RunResult
 from executive.run.session import Session
 from executive.run.snapshot import Snapshot
 from executive.run.tree_run import Ending
-from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, tick_watch
+from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
@@ -140,6 +139,7 @@ class _Run:
     ) -> None:
         self._clock, self._worker, self._publish = clock, worker, _LastingLog(publish)
         self._settings, self._control, self._observer = settings, control, observer
+        self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
@@ -148,6 +148,10 @@ class _Run:
 
     def run(self, entries: Sequence[RunEntry]) -> RunResult:
         """The whole run."""
+        with self._watchdog:
+            return self._watched_run(entries)
+
+    def _watched_run(self, entries: Sequence[RunEntry]) -> RunResult:
         ending: Ending | None = None
         try:
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
@@ -166,12 +170,12 @@ class _Run:
 
     def _open(self, entry: RunEntry) -> Session:
         settings = self._settings
-        robot = guarded(entry.robot, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s)
-        keeper = LeaseKeeper(robot, HOLDER)
-        show_lease_behind(robot, keeper.behind)
+        robot = GuardedRobot(
+            entry.robot, self._watchdog, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s
+        )
         context = RunContext(
-            robot=robot,
-            lease=keeper.token,
+            robot=cast(Robot, robot),
+            lease=robot.claim(HOLDER),
             clock=self._clock,
             worker=self._worker,
             localiser=entry.localiser,
@@ -184,9 +188,9 @@ class _Run:
             detector=entry.detector,
         )
         try:
-            return Session(entry.tree, context, keeper, self._control, entry.journal)
+            return Session(entry.tree, context, robot, self._control, entry.journal)
         except BaseException:
-            keeper.give_back()
+            robot.give_lease_back()
             raise
 
     def _cycle(self) -> None:
@@ -235,7 +239,7 @@ class _Run:
         begun = time.perf_counter()
         changes = []
         for session in moving:
-            with tick_watch(session.name, self._settings.tick_limit_s):
+            with self._watchdog.over_tick(session.name, self._settings.tick_limit_s):
                 changes.append(session.tick(breakpoints))
         self._ticks += 1
         self._meter(time.perf_counter() - begun)

@@ -9,8 +9,8 @@ from dataclasses import replace
 from executive.record.drawable import stamp
 from executive.record.schemas import OUTCOME, POSE
 from executive.run.control import Control
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
-from executive.run.lease_keeper import LeaseKeeper
 from executive.run.outcome import Glance, Outcome, RobotResult
 from executive.run.snapshot import NodeState, Snapshot
 from executive.run.tree_run import Ending, TreeRun
@@ -35,12 +35,12 @@ class Session:
         self,
         tree: CompiledTree,
         context: RunContext,
-        keeper: LeaseKeeper,
+        robot: GuardedRobot,
         control: Control,
         journal: Journal | None = None,
     ) -> None:
         self.context = context
-        self._keeper, self._control = keeper, control
+        self._robot, self._control = robot, control
         self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal),)
         self._held = False
         self._lost_since_s: float | None = None
@@ -108,7 +108,7 @@ class Session:
 
         Raises nothing; when that takes longer than LEASE_PATIENCE_S, the session is closed with cause EXECUTION.
         """
-        lost = self._keeper.lost()
+        lost = self._robot.lease_lost()
         if lost is None:
             return True
         now_s = self.context.clock.now()
@@ -116,7 +116,7 @@ class Session:
             self._lost_since_s = now_s
             self._top.suspend()
             self._control.lease_lost(self.name, lost)
-        if self._keeper.regain():
+        if self._robot.regain_lease():
             self._lost_since_s = None
             self._control.lease_lost(self.name, None)
             return True
@@ -185,7 +185,7 @@ class Session:
                 run.halt(self._attempt)
             context = self.context
             self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
-            self._attempt("return the lease", self._keeper.give_back)
+            self._attempt("return the lease", self._robot.give_lease_back)
             for run in reversed(self._stack[1:]):
                 self._note_end(run.judge(ending))
             self._stack = self._stack[:1]

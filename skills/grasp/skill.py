@@ -190,12 +190,12 @@ class Grasp(ArmSkill[GraspInputs]):
         opening = 0.9 * self.open_rad
         yield from self.move_gripper(opening, JAW_FORCE_N, "opening the jaw")
 
+        scene_now, q = self.scene_now(), self.q_rad()
+
         def plan() -> GraspPlan:
-            scene = self.prepared_scene()
+            scene = scene_now()
             scene.set_jaw(opening)
-            return plan_grasp(
-                scene, self.q_rad(), candidates, Surroundings(view.boxes, view.target_box, up_B), self._rng
-            )
+            return plan_grasp(scene, q, candidates, Surroundings(view.boxes, view.target_box, up_B), self._rng)
 
         return (
             yield from self.compute(plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}")

@@ -111,13 +111,16 @@ class PeopleWatch:
         if sources and now_s >= self._next_s:
             self._next_s = now_s + self._options.period_s
             X_WO, here_W = self._context.localiser.estimate().X_WO, self._context.pose()
-            self._job = self._context.worker.submit(
-                lambda: self._look(sources, X_WO, here_W), latency_s=self._options.latency_s, name="look for people"
+            robot = self._context.robot
+            self._job = self._context.worker.sense(
+                lambda: [robot.image(source) for source in sources],
+                lambda images: self._look(images, X_WO, here_W),
+                latency_s=self._options.latency_s,
+                name="look for people",
             )
 
-    def _look(self, sources: Sequence[str], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
+    def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
         """People in one picture of each camera."""
-        images = [self._context.robot.image(source, depth=False) for source in sources]
         found = found_in_grey(self._context.detector, images, PERSON)
         pairs = [(image, one) for image, ones in zip(images, found, strict=True) for one in ones]
         seen = [self._placed(image, one, X_WO, here_W) for image, one in pairs]
@@ -127,8 +130,7 @@ class PeopleWatch:
         """Where a detected person is; None for other things, and for people out of the reach of depth."""
         if one.class_name != PERSON or one.score < self._options.least_score:
             return None
-        depth_m = self._context.robot.image(image.source, visual=False).depth_m
-        position = position_of(replace(image, depth_m=depth_m), one)
+        position = position_of(image, one)
         if position is None:
             return None
         p_OC = image.frames.pose(image.camera_frame).translation()

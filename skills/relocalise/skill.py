@@ -69,8 +69,12 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         message = "searching the whole map"
         scan = yield from self._new_scan(message)
         assert isinstance(localiser, SearchingLocaliser)
+        belief = localiser.estimate()
         found: LocalisationEstimate | None = yield from self.compute(
-            lambda: localiser.search(scan, None), latency_s=SEARCH_LATENCY_S, name="search the map", message=message
+            lambda: localiser.search(scan, belief, None),
+            latency_s=SEARCH_LATENCY_S,
+            name="search the map",
+            message=message,
         )
         if found is None:
             return False

@@ -115,7 +115,7 @@ class Durable:
         """Take up the plant's state where that is wanted, and let it be kept from now on. Raises InputError."""
         if self.take_up:
             take_up_plant(simulation, self.plant, label=self.take_up_label)
-        simulation.keep_in(self.plant, label=self.label)
+        self.journal.keep_world = simulation.keep_in(self.plant, label=self.label)
 
 
 def fingerprint(tree: CompiledTree) -> str:

@@ -22,6 +22,7 @@ from executive.cli.requests import Request
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.language.questions import QuestionPolicy
+from executive.record.profile import Profile, lines
 from executive.store.missions import MissionStore
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
@@ -51,6 +52,7 @@ def run(
     as_json: AsJson = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
+    profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: Store = None,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
@@ -60,6 +62,7 @@ def run(
     console = console_for(as_json)
     wants_page = view or view_for is not None
     kept_in = store or out / STORE
+    timing = Profile() if profile else None
 
     def page_of(request: Request) -> PageView | None:
         later = queueing(request, world=world, store=kept_in, out=out, seed=seed)
@@ -77,7 +80,11 @@ def run(
             quiet=quiet,
             console=console,
             page=page_of,
+            profile=timing,
         )
+    if timing is not None:
+        for line in lines(timing.table()):
+            console.print(line, markup=False)
     if as_json:
         print_json(finished.report.to_json())
     if page is not None:
@@ -124,7 +131,16 @@ def evaluate(
 
 
 def _run_kept(
-    asked: Asked, seed: int, out: Path, store: Path, *, record: bool, quiet: bool, console: Console, page: PageOf
+    asked: Asked,
+    seed: int,
+    out: Path,
+    store: Path,
+    *,
+    record: bool,
+    quiet: bool,
+    console: Console,
+    page: PageOf,
+    profile: Profile | None,
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
     request = asked.request()
@@ -140,7 +156,15 @@ def _run_kept(
             control = control_for(console, quiet=quiet) if shown is None else shown.control
             durable = new_run(missions, mission)
             start = partial(
-                run_request, request, compiled, seed=seed, out=out, record=record, page=shown, durable=durable
+                run_request,
+                request,
+                compiled,
+                seed=seed,
+                out=out,
+                record=record,
+                page=shown,
+                durable=durable,
+                profile=profile,
             )
             talk = None if shown is None else shown.conversation
             finished = show_run(start, request, compiled, console, control=control, quiet=quiet, conversation=talk)

@@ -13,12 +13,16 @@ from types import FrameType
 from executive.cli.assembly import judge, run_entry, simulate
 from executive.cli.durable import Durable
 from executive.cli.page_view import PageView, log_map
+from executive.cli.profiling import profiled
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Request
 from executive.cli.souvenirs import Souvenirs, draw_answer, draw_souvenirs
 from executive.cli.warm_up import warm_up
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
+from executive.record.profile import Profile
+from executive.record.schemas import WORK
+from executive.record.work import CountedDetector, Work
 from executive.run.control import Control
 from executive.run.outcome import RunResult
 from executive.run.runner import Observer, Progress, RunSettings, run
@@ -49,11 +53,12 @@ def run_request(
     control: Control | None = None,
     page: PageView | None = None,
     durable: Durable | None = None,
+    profile: Profile | None = None,
 ) -> Finished:
     """Run a compiled request in the plant and write log, tree, recording and pictures into `out`.
 
     The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it;
-    with `durable` another process can take it up, or this one takes up another's.
+    with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
 
     Raises:
         InputError: the world cannot be used.
@@ -64,7 +69,7 @@ def run_request(
         entry = replace(entry, journal=durable.journal)
         durable.begin(simulation)
     warm_up(entry)
-    clock = simulation.clock
+    clock, work = simulation.clock, Work()
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     souvenirs = Souvenirs(log)
     try:
@@ -73,17 +78,24 @@ def run_request(
         log_map(log, request)
         announce(log, clock, tree, request.knowledge, world=request.world.name, seed=seed)
         with cancelled_by_signals(control or Control(pace=None)) as heeded, LockStepWorker(clock) as worker:
-            result = run(
-                [entry],
+            begin = run if profile is None else profiled(profile, run, simulation, entry, worker)
+            result = begin(
+                [replace(entry, detector=CountedDetector(entry.detector, work))],
                 clock=clock,
                 worker=worker,
-                publish=souvenirs,
+                publish=souvenirs if profile is None else profile.timed("log", souvenirs),
                 settings=RunSettings(seed=seed),
                 control=heeded,
                 observer=both(observer, page),
+                work=work,
+                profile=profile,
             )
-        for trouble in () if durable is None else durable.journal.troubles:
-            log(ERROR_TOPIC, {"node": tree.robot_name, "what": "keep the mission's state", "traceback": trouble})
+        if durable is not None:
+            durable.journal.keep_world()  # the next mission begins where this one ended
+            for trouble in durable.journal.troubles:
+                log(ERROR_TOPIC, {"node": tree.robot_name, "what": "keep the mission's state", "traceback": trouble})
+        counts = work.totals({**simulation.work(), "bytes_logged": log.bytes})
+        log(WORK, counts)
     finally:
         log.close()
     tree = result.trees.get(tree.robot_name, tree)
@@ -97,11 +109,14 @@ def run_request(
     if page is not None:
         page.end(out / "recording.html" if record else None)
     referee = RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops, simulation.referee.events)
-    return Finished(_report(request, tree, result, referee, seed=seed, log=log.path), view)
+    report = _report(request, tree, result, referee, seed=seed, log=log.path)
+    return Finished(replace(report, work=counts), view)
 
 
-def both(*observers: Observer | None) -> Observer:
-    """An observer that tells all that there are."""
+def both(*observers: Observer | None) -> Observer | None:
+    """An observer that tells all that there are, None where there is none."""
+    if not any(observers):
+        return None
 
     def tell(progress: Progress) -> None:
         for observer in observers:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from rich.markup import escape
@@ -22,7 +22,10 @@ class RefereeReport:
 
 @dataclass(frozen=True)
 class RunReport:
-    """One run, with the keys that scripts rely on. Times in seconds; `log` is the event log's path."""
+    """One run, with the keys that scripts rely on.
+
+    Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name.
+    """
 
     outcome: str
     cause: str | None
@@ -36,6 +39,7 @@ class RunReport:
     real_time_factor: float
     ticks: int
     log: str
+    work: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def claimed(self) -> bool:
@@ -54,7 +58,7 @@ class RunReport:
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values; the referee's events are for people only."""
-        values = {**asdict(self), "commands": list(self.commands)}
+        values = {**asdict(replace(self, work={})), "commands": list(self.commands), "work": dict(self.work)}
         del values["referee"]["events"]
         return values
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from executive.run.snapshot import Transition
+from executive.run.snapshot import Change
 from executive.tree.compiler import CompiledTree
 from skills.robot import Pose2D
 
@@ -19,7 +19,7 @@ class TickNote:
     """
 
     now_s: float
-    changes: Sequence[Transition]
+    changes: Sequence[Change]
     board: Mapping[str, Any]
     pose: Pose2D | None
     checkpoints: Mapping[str, Mapping[str, Any]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -49,6 +50,7 @@ class Session:
         self.result: RobotResult | None = None
         self._pose_due_s = context.clock.now()
         self._asked_at: Pose2D | None = None
+        self._matched_s = -math.inf
 
     @property
     def name(self) -> str:
@@ -83,10 +85,7 @@ class Session:
     @property
     def glance(self) -> Glance:
         """Where the robot is and whether it holds something."""
-        estimate = self.context.localiser.estimate()
-        X_WB = estimate.X_WO @ self.context.robot.odometry().X_OB
-        pose = Pose2D.from_transform(X_WB) if estimate.localised else None
-        return Glance(pose, self.context.robot.gripper().holding)
+        return Glance(self.context.pose(), self.context.robot.gripper().holding)
 
     @property
     def waiting_at(self) -> str | None:
@@ -97,8 +96,12 @@ class Session:
         """Bring the estimators up to date, and log the pose twice a second."""
         context = self.context
         context.localiser.update(context.robot)
-        context.costmap.update(context.robot, context.localiser.estimate())
-        self._asked_at = self._asked_at or self.glance.pose
+        estimate = context.localiser.estimate()
+        context.costmap.update(context.robot, estimate)
+        if estimate.stamp_s != self._matched_s:
+            self._matched_s = estimate.stamp_s
+            context.work.count("scan_matches")
+        self._asked_at = self._asked_at or context.pose()
         if context.clock.now() >= self._pose_due_s - _EPSILON_S:
             self._pose_due_s += POSE_PERIOD_S
             self._publish_pose()

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from executive.run.journal import TickNote
-from executive.run.snapshot import Transition
+from executive.run.snapshot import Change
 from executive.store.database import transaction
 from executive.store.recollection import Recollection
 from executive.store.records import Order
@@ -17,6 +17,7 @@ from executive.store.values import to_text
 from executive.tree.compiler import CompiledTree
 from skills.robot import Pose2D
 
+POSE_PERIOD_S: Final = 1.0
 MOVED_M: Final = 0.02
 TURNED_RAD: Final = 0.02
 _PUT_STEP: Final = "INSERT OR REPLACE INTO step VALUES (?, ?, ?, ?, ?, ?, ?)"
@@ -30,7 +31,8 @@ class StoreJournal:
     """Implements `executive.run.journal.Journal`.
 
     What cannot be written now, since another program holds the store, is written with a later tick: the robot's work
-    does not wait for it. `troubles` tells of what could not be kept.
+    does not wait for it. `troubles` tells of what could not be kept. A pose alone is written once a second.
+    `keep_world` is called before what a tick brought is written, for a simulated world must not lag behind it.
     """
 
     def __init__(self, connection: sqlite3.Connection, mission: int) -> None:
@@ -42,6 +44,8 @@ class StoreJournal:
         self._pose: Pose2D | None = None
         self._recollection: Recollection | None = None
         self._order_of: Callable[[CompiledTree], Order] | None = None
+        self.keep_world: Callable[[], None] = _no_world
+        self._due_s = -math.inf
         self.troubles: list[str] = []
 
     def replaceable(self, order_of: Callable[[CompiledTree], Order]) -> StoreJournal:
@@ -52,7 +56,7 @@ class StoreJournal:
     def replaced(self, tree: CompiledTree) -> StoreJournal:
         """Keep the mission that takes this one's place in its stead, with nothing done of it yet."""
         journal = StoreJournal(self._connection, self._mission)
-        journal.troubles = self.troubles
+        journal.troubles, journal.keep_world = self.troubles, self.keep_world
         if self._order_of is None:
             return journal
         order = self._order_of(tree)
@@ -75,8 +79,11 @@ class StoreJournal:
         """Keep what a tick brought."""
         self._take_steps(note)
         self._take_values(note.board)
-        moved = note.pose is not None and _apart(self._pose, note.pose)
-        if self._steps or self._values or moved:
+        news = bool(self._steps or self._values)
+        if news:
+            self.keep_world()
+        if news or (note.now_s >= self._due_s and note.pose is not None and _apart(self._pose, note.pose)):
+            self._due_s = note.now_s + POSE_PERIOD_S
             self._write(note)
 
     def _take_steps(self, note: TickNote) -> None:
@@ -90,7 +97,7 @@ class StoreJournal:
                 self._checkpoints[path_id] = text
                 self._steps[path_id] = (self._mission, path_id, "RUNNING", None, "", text, note.now_s)
 
-    def _row(self, change: Transition, now_s: float, checkpoint: str | None) -> tuple[object, ...]:
+    def _row(self, change: Change, now_s: float, checkpoint: str | None) -> tuple[object, ...]:
         after = change.after
         cause = None if after.cause is None else after.cause.name
         return (self._mission, change.path_id, after.status.name, cause, after.message, checkpoint, now_s)
@@ -129,6 +136,10 @@ class StoreJournal:
     def _trouble(self, sentence: str) -> None:
         if sentence not in self.troubles:
             self.troubles.append(sentence)
+
+
+def _no_world() -> None:
+    """There is no world to keep: it stays by itself."""
 
 
 def _told(order: Order) -> tuple[str | None, ...]:

@@ -6,10 +6,22 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from executive.record.profile import Profile
 from executive.tree.behaviours.board import Board
-from skills.api import Ask, Costmap, Detector, Localiser, Publish, SkillContext, Worker, nobody_to_ask
+from skills.api import (
+    NO_WORK_COUNTER,
+    Ask,
+    Costmap,
+    Detector,
+    Localiser,
+    Publish,
+    SkillContext,
+    WorkCounter,
+    Worker,
+    nobody_to_ask,
+)
 from skills.detection import NO_DETECTOR
-from skills.robot import Clock, Lease, Robot
+from skills.robot import Clock, Lease, Pose2D, Robot
 
 
 def leaf_seed(run_seed: int, path_id: str) -> int:
@@ -42,6 +54,15 @@ class RunContext:
     ask: Ask = nobody_to_ask
     detector: Detector = NO_DETECTOR
     stop_pressed: Callable[[], str | None] = never_pressed
+    work: WorkCounter = NO_WORK_COUNTER
+    profile: Profile | None = None
+
+    def pose(self) -> Pose2D | None:
+        """Where the robot believes to be, the planar part of X_WB; None while it is not localised."""
+        estimate = self.localiser.estimate()
+        if not estimate.localised:
+            return None
+        return Pose2D.from_transform(estimate.X_WO @ self.robot.odometry().X_OB)
 
     def for_skill(self, path_id: str) -> SkillContext:
         """The part of it that a skill may touch."""
@@ -56,4 +77,5 @@ class RunContext:
             seed=leaf_seed(self.seed, path_id),
             ask=self.ask,
             detector=self.detector,
+            work=self.work,
         )

@@ -130,7 +130,7 @@ def test_run_json_has_exactly_the_contract_on_the_last_line(no_plant, tmp_path):
     values = json.loads(result.stdout.splitlines()[-1])
     assert list(values) == [
         "outcome", "cause", "message", "referee", "commands", "world", "seed", "sim_time_s", "wall_time_s",
-        "real_time_factor", "ticks", "log",
+        "real_time_factor", "ticks", "log", "work",
     ]  # fmt: skip
     assert list(values["referee"]) == ["success", "why", "collisions", "drops"]
     assert (result.exit_code, len(result.stdout.splitlines())) == (0, 1)

@@ -15,7 +15,7 @@ from executive.mission.command import Command
 from executive.mission.errors import InputError
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
-from executive.run.snapshot import NodeState, Transition
+from executive.run.snapshot import Change, NodeState
 from executive.store.missions import MissionStore
 from executive.view.model import node_view
 
@@ -31,12 +31,12 @@ class Plant:
         self.runs = []
         self.outcomes = []
 
-    def __call__(self, request, tree, *, seed, out, record, durable, observer=None, control=None, page=None):
+    def __call__(self, request, tree, *, seed, out, record, durable, **_):
         out.mkdir(parents=True, exist_ok=True)
         durable.plant.with_name(f"{durable.plant.name}.a").touch()
         self.runs.append((request.mission.name, seed, out.name, durable))
         leaf = next(node.path_id for node in tree.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id)
-        done = Transition(leaf, NodeState(), NodeState(Status.SUCCESS, None, "done"))
+        done = Change(leaf, NodeState(), NodeState(Status.SUCCESS, None, "done"))
         durable.journal.note(TickNote(1.0, (done,), {}, None, {}))
         outcome = self.outcomes.pop(0) if self.outcomes else "success"
         if outcome == "killed":
@@ -148,7 +148,7 @@ def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(erra
         leaf = next(
             node.path_id for node in other.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id
         )
-        change = Transition(leaf, NodeState(), NodeState(Status.RUNNING, None, "on the way"))
+        change = Change(leaf, NodeState(), NodeState(Status.RUNNING, None, "on the way"))
         durable.journal.replaced(other).note(TickNote(2.0, (change,), {}, None, {}))
         raise GoneError
 

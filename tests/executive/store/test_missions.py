@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from executive.mission.errors import InputError
 from executive.run.journal import TickNote
-from executive.run.snapshot import NodeState, Transition
+from executive.run.snapshot import Change, NodeState
 from executive.store.missions import MissionState, MissionStore, Order
 from skills.api import Cause
 from skills.robot import Pose2D
@@ -24,7 +24,7 @@ def path(tmp_path):
 
 
 def changed(path_id, status, cause=None, message=""):
-    return Transition(path_id, NodeState(), NodeState(status, cause, message))
+    return Change(path_id, NodeState(), NodeState(status, cause, message))
 
 
 def note(*changes, now_s=1.0, board=None, pose=None, checkpoints=None):

@@ -15,7 +15,8 @@ from skills.robot import Pose2D
 class TickNote:
     """One tick: what changed in the tree, all values on the blackboard, where the robot believes to be.
 
-    `pose` is X_WB, None while the robot is not localised; `checkpoints` those of the active skills by path id.
+    `pose` is X_WB, given with changes and once a second while the robot is localised, else None; `checkpoints` are
+    those of the running skills by path id.
     """
 
     now_s: float

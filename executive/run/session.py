@@ -240,7 +240,7 @@ class Session:
         self.context.publish(OUTCOME, {**end, "answers": result.answers, **more})
 
     def _publish_pose(self) -> None:
-        X_WB = self.context.localiser.estimate().X_WO @ self.context.robot.odometry().X_OB
+        X_WB = self.context.X_WB()
         p, q = X_WB.translation(), X_WB.rotation().ToQuaternion()
         flat = Pose2D.from_transform(X_WB)
         self.context.publish(

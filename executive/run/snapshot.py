@@ -55,7 +55,8 @@ class Observed:
         self.nodes: tuple[Behaviour, ...] = tuple(_walk(root))
         self._explained = tuple(node for node in self.nodes if isinstance(node, Explained))
         self._last = [_state(node) for node in self._explained]
-        self.states: Snapshot = self._by_path_id()
+        named = zip(self._explained, self._last, strict=True)
+        self.states: Snapshot = {node.path_id: state for node, state in named}
 
     def changes(self) -> Sequence[Change]:
         """What changed since the last time, in the order of the tree; brings `states` up to date."""
@@ -71,11 +72,8 @@ class Observed:
             self._last[index] = _state(node)
             found.append(Change(node.path_id, last, self._last[index]))
         if found:
-            self.states = self._by_path_id()
+            self.states = {**self.states, **{change.path_id: change.after for change in found}}
         return found
-
-    def _by_path_id(self) -> Snapshot:
-        return {node.path_id: state for node, state in zip(self._explained, self._last, strict=True)}
 
 
 def _walk(root: Behaviour) -> Iterator[Behaviour]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -20,6 +21,8 @@ from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
 from executive.view.model import node_view
 from skills.api import Cause
+
+POSE_NOTE_PERIOD_S = 1.0
 
 Attempt = Callable[[str, Callable[[], object]], None]
 
@@ -45,6 +48,7 @@ class TreeRun:
         self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
         self._skills = frozenset(leaf.path_id for leaf in self._leaves)
         self._time_skills()
+        self._pose_due_s = -math.inf
         self._gates: dict[str, Gate] = {}
         self._breakpoints: frozenset[str] = frozenset()
         self.show()
@@ -140,8 +144,12 @@ class TreeRun:
 
     def _tick_note(self, changes: Sequence[Change]) -> TickNote:
         context = self.context
-        checkpoints = {leaf.path_id: leaf.checkpoint for leaf in self._leaves if leaf.active and leaf.checkpoint}
-        return TickNote(context.clock.now(), changes, context.board.values(), context.pose(), checkpoints)
+        running = (leaf for leaf in self._leaves if leaf.status is Status.RUNNING)
+        checkpoints = {leaf.path_id: leaf.checkpoint for leaf in running if leaf.checkpoint}
+        now_s, pose = context.clock.now(), None
+        if changes or now_s >= self._pose_due_s:
+            self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.pose()
+        return TickNote(now_s, changes, context.board.values(), pose, checkpoints)
 
     def _transition(self, change: Change) -> dict[str, object]:
         after = change.after

@@ -17,7 +17,6 @@ from executive.store.values import to_text
 from executive.tree.compiler import CompiledTree
 from skills.robot import Pose2D
 
-POSE_PERIOD_S: Final = 1.0
 MOVED_M: Final = 0.02
 TURNED_RAD: Final = 0.02
 _PUT_STEP: Final = "INSERT OR REPLACE INTO step VALUES (?, ?, ?, ?, ?, ?, ?)"
@@ -31,7 +30,7 @@ class StoreJournal:
     """Implements `executive.run.journal.Journal`.
 
     What cannot be written now, since another program holds the store, is written with a later tick: the robot's work
-    does not wait for it. `troubles` tells of what could not be kept. A pose alone is written once a second.
+    does not wait for it. `troubles` tells of what could not be kept.
     `keep_world` is called before what a tick brought is written, for a simulated world must not lag behind it.
     """
 
@@ -45,7 +44,6 @@ class StoreJournal:
         self._recollection: Recollection | None = None
         self._order_of: Callable[[CompiledTree], Order] | None = None
         self.keep_world: Callable[[], None] = _no_world
-        self._due_s = -math.inf
         self.troubles: list[str] = []
 
     def replaceable(self, order_of: Callable[[CompiledTree], Order]) -> StoreJournal:
@@ -82,8 +80,7 @@ class StoreJournal:
         news = bool(self._steps or self._values)
         if news:
             self.keep_world()
-        if news or (note.now_s >= self._due_s and note.pose is not None and _apart(self._pose, note.pose)):
-            self._due_s = note.now_s + POSE_PERIOD_S
+        if news or (note.pose is not None and _apart(self._pose, note.pose)):
             self._write(note)
 
     def _take_steps(self, note: TickNote) -> None:

@@ -6,6 +6,8 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from pydrake.math import RigidTransform
+
 from executive.record.profile import Profile
 from executive.tree.behaviours.board import Board
 from skills.api import (
@@ -59,10 +61,11 @@ class RunContext:
 
     def pose(self) -> Pose2D | None:
         """Where the robot believes to be, the planar part of X_WB; None while it is not localised."""
-        estimate = self.localiser.estimate()
-        if not estimate.localised:
-            return None
-        return Pose2D.from_transform(estimate.X_WO @ self.robot.odometry().X_OB)
+        return Pose2D.from_transform(self.X_WB()) if self.localiser.estimate().localised else None
+
+    def X_WB(self) -> RigidTransform:
+        """The body's pose in the world, as estimated."""
+        return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB
 
     def for_skill(self, path_id: str) -> SkillContext:
         """The part of it that a skill may touch."""

@@ -70,6 +70,7 @@ def run_request(
         durable.begin(simulation)
     warm_up(entry)
     clock, work = simulation.clock, Work()
+    entry = replace(entry, detector=CountedDetector(entry.detector, work))
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     souvenirs = Souvenirs(log)
     try:
@@ -80,7 +81,7 @@ def run_request(
         with cancelled_by_signals(control or Control(pace=None)) as heeded, LockStepWorker(clock) as worker:
             begin = run if profile is None else profiled(profile, run, simulation, entry, worker)
             result = begin(
-                [replace(entry, detector=CountedDetector(entry.detector, work))],
+                [entry],
                 clock=clock,
                 worker=worker,
                 publish=souvenirs if profile is None else profile.timed("log", souvenirs),

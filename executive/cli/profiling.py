@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from executive.record.profile import Profile
+from executive.record.work import CountedDetector
 from executive.run.runner import RunEntry
 from executive.run.worker import LockStepWorker
 from plant.simulation import Simulation
@@ -28,6 +29,8 @@ def profiled(
     profile.attach("rendering", entry.robot, "image")
     profile.attach("localiser", entry.localiser, "update")
     profile.attach("costmap", entry.costmap, "update", "add_points", "clearance_m")
+    if isinstance(entry.detector, CountedDetector):
+        profile.attach("detector", entry.detector, *entry.detector.methods)
     submit = worker.submit
 
     def submit_timed(work: Callable[[], Any], *, latency_s: float, name: str) -> Any:

@@ -9,9 +9,6 @@ from types import MappingProxyType
 from typing import Any
 
 from skills.api import Detector
-from skills.robot import Image
-
-Wrap = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 class Work:
@@ -32,32 +29,16 @@ class Work:
             both = self._counts + Counter(dict(more))
         return MappingProxyType(dict(sorted(both.items())))
 
-    def of_verb(self, verb: str, call: Callable[..., Any]) -> Callable[..., Any]:
-        """A verb of the Robot protocol that counts what it gives: pictures by size."""
-        if verb != "image":
-            return call
-
-        def image(*arguments: Any, **options: Any) -> Any:
-            taken = call(*arguments, **options)
-            if isinstance(taken, Image):
-                self._count_picture("pictures", taken.grey.shape)
-                self._count_picture("depth_images", taken.depth_m.shape)
-            return taken
-
-        return image
-
-    def _count_picture(self, what: str, shape: tuple[int, ...]) -> None:
-        height, width = shape[:2]
-        if height:
-            self.count(f"{what}_{width}x{height}")
-
 
 class CountedDetector:
-    """A detector that counts the pictures it looks through, by method."""
+    """A detector that counts the pictures it looks through, by method; it has all `methods` of the one within."""
 
-    def __init__(self, detector: Detector, work: Work, timed: Wrap = lambda call: call) -> None:
-        """`timed` is put around its methods."""
-        self._detector, self._work, self._timed = detector, work, timed
+    def __init__(self, detector: Detector, work: Work) -> None:
+        self._detector = detector
+        found = {name: getattr(detector, name) for name in dir(detector) if name.startswith("detect")}
+        self.methods = tuple(name for name, method in found.items() if callable(method))
+        for name in self.methods:
+            setattr(self, name, _counted(found[name], f"{name}_pictures", work))
 
     @property
     def class_names(self) -> tuple[str, ...]:
@@ -65,12 +46,12 @@ class CountedDetector:
         return self._detector.class_names
 
     def __getattr__(self, name: str) -> Any:
-        value = getattr(self._detector, name)
-        if not name.startswith("detect") or not callable(value):
-            return value
+        return getattr(self._detector, name)
 
-        def detect(pictures: Any, *arguments: Any, **options: Any) -> Any:
-            self._work.count(f"{name}_pictures", len(pictures) if isinstance(pictures, list | tuple) else 1)
-            return value(pictures, *arguments, **options)
 
-        return self._timed(detect)
+def _counted(method: Callable[..., Any], counter: str, work: Work) -> Callable[..., Any]:
+    def detect(pictures: Any, *arguments: Any, **options: Any) -> Any:
+        work.count(counter, len(pictures) if isinstance(pictures, list | tuple) else 1)
+        return method(pictures, *arguments, **options)
+
+    return detect

@@ -13,8 +13,6 @@ from executive.run.watchdog import IMAGE_LIMIT_S, VERB_LIMIT_S, Watchdog, done_a
 from executive.run.worker import in_lock_step_job
 from skills.robot import Lease, LeaseError, Robot
 
-Wrap = Callable[[str, Callable[..., Any]], Callable[..., Any]]
-
 
 class GarbageError(RuntimeError):
     """A verb of the Robot protocol gave back what the protocol does not allow."""
@@ -39,10 +37,8 @@ class GuardedRobot:
         *,
         limit_s: float = VERB_LIMIT_S,
         image_limit_s: float = IMAGE_LIMIT_S,
-        wrap: Wrap = lambda verb, call: call,
     ) -> None:
-        """`wrap` is put around the robot's own verbs: to count or to time them."""
-        self._robot, self._watchdog, self._wrap = robot, watchdog, wrap
+        self._robot, self._watchdog = robot, watchdog
         self._limit_s, self._image_limit_s = limit_s, image_limit_s
         self._main = threading.main_thread().ident
         self._holder = ""
@@ -80,7 +76,7 @@ class GuardedRobot:
         value = getattr(self._robot, verb)
         if verb.startswith("_") or not callable(value):
             return value
-        guarded = self._guarded(verb, self._wrap(verb, value))
+        guarded = self._guarded(verb, value)
         self.__dict__[verb] = guarded
         return guarded
 

@@ -180,11 +180,7 @@ class _Run:
     def _open(self, entry: RunEntry) -> Session:
         settings = self._settings
         robot = GuardedRobot(
-            entry.robot,
-            self._watchdog,
-            limit_s=settings.verb_limit_s,
-            image_limit_s=settings.image_limit_s,
-            wrap=self._work.of_verb,
+            entry.robot, self._watchdog, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s
         )
         context = RunContext(
             robot=cast(Robot, robot),

@@ -90,10 +90,10 @@ class ArmSkill(RoutineSkill[InputsT]):
         """Gives, inside a Worker job, the collision scene with what stands around and what is held just now."""
         robot, model, boxes, held = self.context.robot, self.model, self.boxes, self.held
         capabilities, joints = robot.capabilities(), robot.joints()
-        opening_rad = max(0.0, robot.gripper().opening_rad)
+        work, opening_rad = self.context.work, max(0.0, robot.gripper().opening_rad)
 
         def prepared() -> ArmScene:
-            self._scene = scene = self._scene or ArmScene(capabilities, model, joints.position_rad)
+            self._scene = scene = self._scene or ArmScene(capabilities, model, joints.position_rad, work=work)
             scene.set_boxes(boxes)
             scene.hold(held)
             scene.set_padding(0.01)

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import Costmap
+from skills.api import NO_WORK_COUNTER, Costmap, WorkCounter
 from skills.estimate.planar import wrap
 from skills.navigate.footprint import Footprint, clearance_at
 from skills.navigate.lattice import Lattice, Needs, Space, cost_to_go, lattice_moves, search
@@ -38,6 +38,7 @@ class Problem:
     start: Pose2D
     goal: Pose2D
     options: PlannerOptions
+    work: WorkCounter = NO_WORK_COUNTER
 
 
 def plan_path(
@@ -61,6 +62,7 @@ def problem_of(
     goal: Pose2D,
     options: PlannerOptions,
     margin_m: float = 3.0,
+    work: WorkCounter = NO_WORK_COUNTER,
 ) -> Problem:
     """Sample the costmap on the box around start and goal, margin_m wider to all sides."""
     low = np.minimum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) - margin_m
@@ -72,7 +74,7 @@ def problem_of(
     field = field[rows, columns]
     frame = (FIELD_CELL_M, float(xs[columns.start]), float(ys[rows.start]))
     space = Space(np.ascontiguousarray(field), frame, footprint.discs, options.weights())
-    return Problem(space, footprint, start, goal, options)
+    return Problem(space, footprint, start, goal, options, work)
 
 
 def _used(best: NDArray[np.float32]) -> slice:
@@ -180,6 +182,7 @@ def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | Non
     lattice, row, column = _lattice(problem, yaw0_rad)
     seeds, final = _seeds(problem, lattice, needs), _final_turns(problem, lattice)
     to_go = cost_to_go(problem.space, lattice, row, column, problem.footprint.inscribed_m)
+    expansions = np.zeros(1, dtype=np.int64)
     states = search(
         problem.space,
         lattice,
@@ -191,7 +194,9 @@ def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | Non
         column,
         needs,
         problem.options.greed,
+        expansions,
     )
+    problem.work.count("planner_expansions", int(expansions[0]))
     if len(states) == 0:
         return None
     cells, k = np.divmod(states, lattice.headings)

@@ -145,7 +145,7 @@ class Navigate(Skill[NavigateInputs]):
         speed = max(0.1, self._inputs.max_speed_m_s)
         options = PlannerOptions(forward_m_s=speed)
         begin, goal = start or self.context.pose(), self._inputs.goal
-        problem = problem_of(self._costmap(begin), self._footprint, begin, goal, options, margin_m=8.0)
+        problem = problem_of(self._costmap(begin), self._footprint, begin, goal, options, 8.0, self.context.work)
         self._job = self.context.worker.submit(
             lambda: solve(problem), latency_s=self._options.planning_latency_s, name="plan a way"
         )

@@ -125,6 +125,12 @@ def test_tree_of_a_file_maps_nodes_to_lines(tmp_path: Path):
     assert [child["source"]["line"] for child in root["children"][-1]["children"]] == [3, 4]
 
 
+def test_profile_prints_a_table_by_subsystem(no_plant, tmp_path):
+    asked = ("run", "--say", "Hey Alice, go to the bedroom", "--out", str(tmp_path), "--quiet")
+    assert "CPU time by subsystem" in invoke(*asked, "--profile").output
+    assert "CPU time by subsystem" not in invoke(*asked).output
+
+
 def test_run_json_has_exactly_the_contract_on_the_last_line(no_plant, tmp_path):
     result = invoke("run", "--say", "Hey Alice, go to the bedroom", "--json", "--out", str(tmp_path))
     values = json.loads(result.stdout.splitlines()[-1])

@@ -9,9 +9,6 @@ import pytest
 
 from executive.record.profile import OTHER, START, Profile, lines
 from executive.record.work import CountedDetector, Work
-from plant.spot.capabilities import spot_capabilities
-from skills.testing.clock import VirtualClock
-from skills.testing.robot import ScriptedRobot
 
 
 def busy(seconds):
@@ -29,15 +26,6 @@ def test_counts_of_threads_add_up_and_come_in_the_order_of_names():
         thread.join()
     work.count("bytes", 7)
     assert list(work.totals({"bytes": 3, "steps": 0}).items()) == [("bytes", 10), ("expansions", 2000)]
-
-
-def test_pictures_are_counted_by_size():
-    robot, work = ScriptedRobot(VirtualClock(), capabilities=spot_capabilities()), Work()
-    image = work.of_verb("image", robot.image)
-    taken = [image("hand"), image("hand")][-1]
-    height, width = taken.grey.shape
-    assert work.totals()[f"pictures_{width}x{height}"] == 2
-    assert work.of_verb("odometry", robot.odometry) == robot.odometry
 
 
 def test_a_detectors_pictures_are_counted_by_method():

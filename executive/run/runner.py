@@ -196,10 +196,9 @@ class _Run:
             stop_pressed=lambda: self._control.stop_pressed,
             detector=entry.detector,
             work=self._work,
-            profile=self._profile,
         )
         try:
-            return Session(entry.tree, context, robot, self._control, entry.journal)
+            return Session(entry.tree, context, robot, self._control, entry.journal, self._profile)
         except BaseException:
             robot.give_lease_back()
             raise

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from executive.record.drawable import stamp
+from executive.record.profile import Profile
 from executive.record.schemas import OUTCOME, POSE
 from executive.run.control import Control
 from executive.run.guarded_robot import GuardedRobot
@@ -39,10 +40,11 @@ class Session:
         robot: GuardedRobot,
         control: Control,
         journal: Journal | None = None,
+        profile: Profile | None = None,
     ) -> None:
         self.context = context
-        self._robot, self._control = robot, control
-        self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal),)
+        self._robot, self._control, self._profile = robot, control, profile
+        self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal, profile),)
         self._held = False
         self._lost_since_s: float | None = None
         self._preempting: tuple[RobotResult, ...] = ()
@@ -215,7 +217,7 @@ class Session:
         context = replace(self.context, board=Board(slug(tree.robot_name)))
         if start is not None:
             context.board.put(start_key(tree.robot_name, tree.mission_name), start)
-        self._stack = (*self._stack, TreeRun(tree, context, journal))
+        self._stack = (*self._stack, TreeRun(tree, context, journal, self._profile))
         self._control.mission_begun(self.name, tree)
 
     def _take_up_the_one_before(self) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from py_trees.common import Status
 
+from executive.record.profile import Profile
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.journal import Journal, TickNote
 from executive.run.outcome import Outcome, RobotResult
@@ -39,7 +40,9 @@ class Ending:
 class TreeRun:
     """One tree, built and ticked. Its nodes' last states are in `states`; a journal hears of every tick."""
 
-    def __init__(self, tree: CompiledTree, context: RunContext, journal: Journal | None = None) -> None:
+    def __init__(
+        self, tree: CompiledTree, context: RunContext, journal: Journal | None = None, profile: Profile | None = None
+    ) -> None:
         self.tree = tree
         self.context = context
         self.journal = journal
@@ -47,16 +50,13 @@ class TreeRun:
         self._observed = Observed(self.root)
         self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
         self._skills = frozenset(leaf.path_id for leaf in self._leaves)
-        self._time_skills()
+        if profile is not None:
+            for leaf in self._leaves:
+                profile.attach("skills", leaf, "initialise", "update", "terminate")
         self._pose_due_s = -math.inf
         self._gates: dict[str, Gate] = {}
         self._breakpoints: frozenset[str] = frozenset()
         self.show()
-
-    def _time_skills(self) -> None:
-        if self.context.profile is not None:
-            for leaf in self._leaves:
-                self.context.profile.attach("skills", leaf, "initialise", "update", "terminate")
 
     @property
     def finished(self) -> bool:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from pydrake.math import RigidTransform
 
-from executive.record.profile import Profile
 from executive.tree.behaviours.board import Board
 from skills.api import (
     NO_WORK_COUNTER,
@@ -57,7 +56,6 @@ class RunContext:
     detector: Detector = NO_DETECTOR
     stop_pressed: Callable[[], str | None] = never_pressed
     work: WorkCounter = NO_WORK_COUNTER
-    profile: Profile | None = None
 
     def pose(self) -> Pose2D | None:
         """Where the robot believes to be, the planar part of X_WB; None while it is not localised."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-
-from pydrake.math import RigidTransform
+from typing import TYPE_CHECKING
 
 from executive.tree.behaviours.board import Board
 from skills.api import (
@@ -23,6 +22,9 @@ from skills.api import (
 )
 from skills.detection import NO_DETECTOR
 from skills.robot import Clock, Lease, Pose2D, Robot
+
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
 
 
 def leaf_seed(run_seed: int, path_id: str) -> int:

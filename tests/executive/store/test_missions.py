@@ -31,6 +31,17 @@ def note(*changes, now_s=1.0, board=None, pose=None, checkpoints=None):
     return TickNote(now_s, changes, board or {}, pose, checkpoints or {})
 
 
+def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose(path):
+    with MissionStore(path) as store:
+        mission, kept = store.add(ORDER, queued=False).id, []
+        journal = store.journal(mission)
+        journal.keep_world = lambda: kept.append(store.has_steps(mission))
+        journal.note(note(pose=Pose2D(1.0, 2.0, 0.5)))
+        assert (kept, store.mission(mission).pose) == ([], Pose2D(1.0, 2.0, 0.5))
+        journal.note(note(changed("a/b", Status.RUNNING), now_s=1.1))
+        assert (kept, store.has_steps(mission)) == ([False], True)
+
+
 def test_missions_keep_their_order_and_states(path):
     with MissionStore(path) as store:
         first, second = (store.add(ORDER, queued=queued) for queued in (True, False))

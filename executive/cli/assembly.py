@@ -20,7 +20,6 @@ from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError
-from skills.detect.attributes import known_attributes
 from skills.detect.careful_detector import CarefulDetector
 from skills.detect.detector_file import MODEL_FILE
 from skills.detect.onnx_detector import DetectorOptions
@@ -29,6 +28,7 @@ from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, MapError, load_grid_map
 from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
 from skills.navigate.footprint import Footprint
+from skills.perception.attributes import known_attributes
 from skills.robot import Pose2D
 
 UNSURE_SIGMA = (0.5, 0.5, 0.3)

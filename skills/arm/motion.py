@@ -152,8 +152,8 @@ def _resampled(path_rad: FloatArray) -> FloatArray:
     count = max(_FEWEST_POINTS, int(np.ceil(along[-1] / _DENSE_RAD)) + 1)
     if len(path_rad) < 2:
         return np.repeat(path_rad[:1], 2, axis=0)
-    stations = np.linspace(0.0, along[-1], count)
-    return np.stack([np.interp(stations, along, path_rad[:, j]) for j in range(path_rad.shape[1])], axis=1)
+    samples = np.linspace(0.0, along[-1], count)
+    return np.stack([np.interp(samples, along, path_rad[:, j]) for j in range(path_rad.shape[1])], axis=1)
 
 
 def _rounded(dense_rad: FloatArray, half_window: int = 8) -> FloatArray:

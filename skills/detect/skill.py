@@ -13,13 +13,8 @@ from pydrake.math import RigidTransform
 from skills.api import Cause, Detection, LocalisationEstimate, ObjectObservation, Running, Succeeded, Surface
 from skills.arm.arm_skill import ArmSkill, hand_camera_in_hand
 from skills.arm.collision import ArmScene
-from skills.arm.poses import close_stations, look_configuration, overview_stations, stations_beside
+from skills.arm.poses import close_viewpoints, look_configuration, overview_viewpoints, viewpoints_beside
 from skills.arm.routine import Routine, SkillFailure
-from skills.detect.attention import unnamed
-from skills.detect.attributes import known_attributes, shows
-from skills.detect.coverage import Coverage
-from skills.detect.forms import class_forms
-from skills.detect.looking import in_plain_view, look_targets, surface_boxes
 from skills.detect.messages import (
     coverage_message,
     detections_message,
@@ -28,10 +23,15 @@ from skills.detect.messages import (
     tracks_message,
 )
 from skills.detect.seeing import DETECTION_LATENCY_S, detections_in, is_dark
-from skills.detect.sighting import FLOOR, Sighting, observation, sightings
-from skills.detect.surface_view import Cluster, view_surface
-from skills.detect.tracks import FAINT_SCORE, SURE_SCORE, Track, TrackBook
+from skills.detect.unidentified import unnamed
+from skills.detect.viewpoints import in_plain_view, look_targets, surface_boxes
 from skills.detect.words import counted, describe, surface_names, wanted
+from skills.perception.attributes import known_attributes, shows
+from skills.perception.class_forms import class_forms
+from skills.perception.coverage import Coverage
+from skills.perception.detection_3d import FLOOR, Detection3D, detections_3d, observation
+from skills.perception.surface_segmentation import Cluster, view_surface
+from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.robot import FloatArray, Image
 
 _CONFIRM_SHIFTS_RAD = (0.25, -0.3)
@@ -72,7 +72,7 @@ class Look:
     image: Image
     localisation: LocalisationEstimate
     detections: tuple[Detection, ...]
-    sightings: tuple[Sighting, ...]
+    detections_3d: tuple[Detection3D, ...]
     clusters: tuple[Cluster, ...]
 
 
@@ -103,7 +103,7 @@ class Detect(ArmSkill[DetectInputs]):
         targets = self._targets(inputs, X_WB)
         if not targets:
             raise SkillFailure(Cause.PRECONDITION, f"{surface_names(inputs.surfaces)} is out of sight from here")
-        self._book, self._coverage = TrackBook(self.context.detector.class_names), Coverage(inputs.surfaces)
+        self._tracker, self._coverage = Tracker(self.context.detector.class_names), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
         self._clusters: list[Cluster] = []
         X_HC = hand_camera_in_hand((yield from self.picture("looking")))
@@ -147,7 +147,7 @@ class Detect(ArmSkill[DetectInputs]):
                 yield from self._look_and_confirm(inputs, X_HC, p_BT, [], close=True)
             return
         for _ in range(_CLOSER_LOOKS):
-            left = unnamed(self._clusters, self._book.snapshot(), inputs.classes)
+            left = unnamed(self._clusters, self._tracker.snapshot(), inputs.classes)
             if self._has_enough(inputs) or not left:
                 return
             shape, base_m = left[0].shape, left[0].base_m
@@ -173,8 +173,8 @@ class Detect(ArmSkill[DetectInputs]):
         if (track := self._seen_a_while_ago(inputs)) is not None:  # from there it did not show: from where it did
             X_BW = self.X_WB().inverse()
             p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
-            stations = [*stations_beside(self.model.p_BS, eye_B, p_BO), *self._stations(p_BO)]
-            yield from self._look_if_possible(inputs, X_HC, p_BO, stations)
+            viewpoints = [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
+            yield from self._look_if_possible(inputs, X_HC, p_BO, viewpoints)
 
     def _seen_a_while_ago(self, inputs: DetectInputs) -> Track | None:
         """What was found and seen last, unless it was seen just now."""
@@ -193,7 +193,7 @@ class Detect(ArmSkill[DetectInputs]):
     ) -> Routine[None]:
         """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
         try:
-            yield from self.look(inputs, X_HC, p_BT, self._stations(p_BT, shift_rad, close=close))
+            yield from self.look(inputs, X_HC, p_BT, self._viewpoints(p_BT, shift_rad, close=close))
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -202,26 +202,26 @@ class Detect(ArmSkill[DetectInputs]):
         while (track := self._candidate(inputs)) is not None:
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
             p_BO = self.X_WB().inverse() @ track.position_W
-            yield from self._look_if_possible(inputs, X_HC, p_BO, self._stations_to_confirm(track, tries, close=close))
+            yield from self._look_if_possible(inputs, X_HC, p_BO, self._confirming(track, tries, close=close))
 
     def _look_if_possible(
-        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, stations_B: Sequence[FloatArray]
+        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray]
     ) -> Routine[None]:
         """Look at a point, unless the arm cannot."""
         try:
-            yield from self.look(inputs, X_HC, p_BT, stations_B)
+            yield from self.look(inputs, X_HC, p_BT, viewpoints_B)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
 
-    def _stations(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
+    def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
         """Camera places p_BC to look from at p_BT, turned by shift_rad about the shoulder; near ones first if close."""
-        far = overview_stations(self.model, p_BT, shift_rad)
+        far = overview_viewpoints(self.model, p_BT, shift_rad)
         if abs(shift_rad) >= max(_AROUND_RAD):
             far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
-        return [*close_stations(self.model.p_BS, p_BT, shift_rad), *far] if close else far
+        return [*close_viewpoints(self.model.p_BS, p_BT, shift_rad), *far] if close else far
 
-    def _stations_to_confirm(self, track: Track, tries: int, *, close: bool) -> list[FloatArray]:
+    def _confirming(self, track: Track, tries: int, *, close: bool) -> list[FloatArray]:
         """Camera places to look from at a track for the first, second or third time after it was seen.
 
         First from the side farther from where it was seen, then from the other, then from right beside there.
@@ -229,11 +229,11 @@ class Detect(ArmSkill[DetectInputs]):
         X_BW = self.X_WB().inverse()
         p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
         if tries > len(_CONFIRM_SHIFTS_RAD):
-            return [*stations_beside(self.model.p_BS, eye_B, p_BO), *self._stations(p_BO)]
+            return [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
         seen_rad, bearing = _bearing(eye_B - self.model.p_BS), _bearing(p_BO - self.model.p_BS)
         off = {shift: abs(math.remainder(bearing + shift - seen_rad, math.tau)) for shift in _CONFIRM_SHIFTS_RAD}
         shifts_rad = sorted(_CONFIRM_SHIFTS_RAD, key=lambda shift: -off[shift])
-        return self._stations(p_BO, shifts_rad[tries - 1], close=close)
+        return self._viewpoints(p_BO, shifts_rad[tries - 1], close=close)
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
         """The likeliest track that may be what is looked for and is to be looked at again."""
@@ -249,7 +249,7 @@ class Detect(ArmSkill[DetectInputs]):
 
     def _matching(self, inputs: DetectInputs) -> list[Track]:
         """The tracks that are of the classes, show the attributes and lie in the right place; the likeliest first."""
-        tracks = [t for t in self._book.snapshot() if t.class_name in inputs.classes and self._in_place(inputs, t)]
+        tracks = [t for t in self._tracker.snapshot() if t.class_name in inputs.classes and self._in_place(inputs, t)]
         fitting = [t for t in tracks if all(shows(t.best, word) for word in inputs.attributes)]
         if inputs.expected_W is None:
             return sorted(fitting, key=lambda t: -t.belief * t.best.detection.score)
@@ -267,13 +267,13 @@ class Detect(ArmSkill[DetectInputs]):
         inputs: DetectInputs,
         X_HC: RigidTransform,
         p_BT: FloatArray,
-        stations_B: Sequence[FloatArray],
+        viewpoints_B: Sequence[FloatArray],
     ) -> Routine[Look]:
-        """Point the camera at p_BT, from the first possible one of `stations_B`, and take in what is seen."""
+        """Point the camera at p_BT, from the first possible one of `viewpoints_B`, and take in what is seen."""
         message = f"looking for {wanted(inputs.classes, inputs.attributes)}"
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return look_configuration(scene, X_HC, stations_B, p_BT, q)
+            return look_configuration(scene, X_HC, viewpoints_B, p_BT, q)
 
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)
@@ -284,7 +284,7 @@ class Detect(ArmSkill[DetectInputs]):
             found = detections_in(detector, image, FAINT_SCORE)
             views = (view_surface(image, place.X_WO, surface) for surface in inputs.surfaces)
             clusters = tuple(cluster for view in views if view is not None for cluster in view.clusters)
-            return Look(image, place, found, sightings(image, place, found, inputs.surfaces), clusters)
+            return Look(image, place, found, detections_3d(image, place, found, inputs.surfaces), clusters)
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
         self._take_in(look)
@@ -294,9 +294,9 @@ class Detect(ArmSkill[DetectInputs]):
         X_WO = look.localisation.X_WO
         if not is_dark(look.image):
             self._coverage.add(look.image, X_WO)
-        tracks = self._book.update(look.sightings, lambda t: in_plain_view(look.image, X_WO, t.position_W))
+        tracks = self._tracker.update(look.detections_3d, lambda t: in_plain_view(look.image, X_WO, t.position_W))
         sure = [detection for detection in look.detections if detection.score >= SURE_SCORE]
-        self.context.publish("detections", detections_message(look.image, sure, look.sightings))
+        self.context.publish("detections", detections_message(look.image, sure, look.detections_3d))
         self.context.publish("tracks", tracks_message(self.context, tracks))
         self._clusters += look.clusters
         self._last = look
@@ -331,7 +331,7 @@ class Detect(ArmSkill[DetectInputs]):
 
 
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
-    """A track as an observation: its fused place, the rest from its last sighting."""
+    """A track as an observation: its fused place, the rest from its last detection."""
     return observation(replace(track.latest, position_W=track.position_W), attributes)
 
 

@@ -73,7 +73,7 @@ class GraspCandidate:
 
 
 @dataclass(frozen=True)
-class _Station:
+class _Placement:
     """A place to grasp along a thing: point (x, y), direction of the approach seen from above, local width, cost."""
 
     xy: FloatArray
@@ -87,11 +87,11 @@ def grasp_candidates(target: Target, p_BS: FloatArray, jaw: JawGeometry | None =
     """Candidates, the best first; empty when the thing is too wide. p_BS is the shoulder."""
     jaw = jaw or JawGeometry()
     ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
-    stations = _round_stations(target, ahead) if target.round else list(_long_stations(target, ahead))
+    placements = _round_placements(target, ahead) if target.round else list(_long_placements(target, ahead))
     tried = [
-        _candidate(target, station, attitude, side, jaw)
-        for station, attitude, side in itertools.product(stations, _attitudes(target), (1.0, -1.0))
-        if station.width_m < jaw.max_width
+        _candidate(target, placement, attitude, side, jaw)
+        for placement, attitude, side in itertools.product(placements, _attitudes(target), (1.0, -1.0))
+        if placement.width_m < jaw.max_width
     ]
     found = [candidate for candidate in tried if candidate is not None]
     if not target.upright:
@@ -109,16 +109,16 @@ def _attitudes(target: Target) -> Sequence[tuple[float, float]]:
     return [(float(np.radians(tilt)), float(np.radians(lean))) for tilt, lean in (*down, *leaning)]
 
 
-def _round_stations(target: Target, ahead_rad: float) -> list[_Station]:
+def _round_placements(target: Target, ahead_rad: float) -> list[_Placement]:
     """A round thing can be approached from any side; from the shoulder's is best."""
     centre = np.array(target.centre_B)
     return [
-        _Station(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, 0.5 * abs(turn))
+        _Placement(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, 0.5 * abs(turn))
         for turn in (0.0, 0.3, -0.3, 0.6, -0.6, 0.9, -0.9)
     ]
 
 
-def _long_stations(target: Target, ahead_rad: float) -> Iterator[_Station]:
+def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
     """Places along a box's axes with the local width there; both axes for one that is nearly square."""
     square = target.length_m < 1.4 * target.width_m
     for turn in (0.0, 0.5 * np.pi) if square else (0.0,):
@@ -136,38 +136,38 @@ def _long_stations(target: Target, ahead_rad: float) -> Iterator[_Station]:
             half_depth = 0.5 * (target.length_m if turn == 0.0 else target.width_m) if target.upright else 0.02
             for azimuth in (yaw, yaw + np.pi):
                 off = abs((azimuth - ahead_rad + np.pi) % (2 * np.pi) - np.pi)
-                yield _Station(xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 0.15 * off)
+                yield _Placement(xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 0.15 * off)
 
 
 def _candidate(
-    target: Target, station: _Station, attitude: tuple[float, float], side: float, jaw: JawGeometry
+    target: Target, placement: _Placement, attitude: tuple[float, float], side: float, jaw: JawGeometry
 ) -> GraspCandidate | None:
     tilt, lean = attitude
-    c, s = np.cos(station.azimuth_rad), np.sin(station.azimuth_rad)
+    c, s = np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad)
     x_axis = np.array([np.cos(tilt) * c, np.cos(tilt) * s, -np.sin(tilt)])
     z_axis = side * np.array([-s, c, 0.0])
     upright_hand = RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
     R_BH = RotationMatrix(AngleAxis(lean, np.array([c, s, 0.0]))) @ upright_hand
     if target.upright:
         height = float(np.clip(0.56 * target.height_m, 0.05, 0.095))
-        depth = jaw.palm_x + station.half_depth_m + 0.008
-        cost = station.cost + 0.4 * abs(tilt - np.radians(10.0))
+        depth = jaw.palm_x + placement.half_depth_m + 0.008
+        cost = placement.cost + 0.4 * abs(tilt - np.radians(10.0))
     else:
         height = 0.5 * target.height_m
         down = -R_BH.matrix()[2, 0]
         least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
-        room = height - _tip_drop(R_BH, station.width_m, jaw)
+        room = height - _tip_drop(R_BH, placement.width_m, jaw)
         above = _above_surface(target.height_m, room - least * down)
         beyond = (room - above) / down
         if beyond < least or height + beyond * down < _LEAST_GRIP_M:
             return None
         depth = jaw.tip_x - beyond
-        cost = station.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
+        cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
     clearance = jaw.clearance if target.upright else jaw.low_clearance
-    p_HT = np.array([depth, 0.0, jaw.fixed_z + clearance + 0.5 * station.width_m])
-    p_BT = np.array([*station.xy, target.base_m + height])
+    p_HT = np.array([depth, 0.0, jaw.fixed_z + clearance + 0.5 * placement.width_m])
+    p_BT = np.array([*placement.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
-    return GraspCandidate(X_BH, station.width_m, float(cost), tilt)
+    return GraspCandidate(X_BH, placement.width_m, float(cost), tilt)
 
 
 def _above_surface(height_m: float, spare_m: float) -> float:

@@ -13,16 +13,16 @@ from pydrake.math import RigidTransform
 from skills.api import Cause, LocalisationEstimate, ObjectObservation, Succeeded, Surface
 from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
 from skills.arm.collision import ArmScene, Box
-from skills.arm.poses import carry_configuration, close_stations, look_configuration, overview_stations
+from skills.arm.poses import carry_configuration, close_viewpoints, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
-from skills.detect.looking import cluster_box, cluster_boxes, surface_boxes
 from skills.detect.seeing import DETECTION_LATENCY_S, detections_in
-from skills.detect.sighting import Sighting, sightings
-from skills.detect.surface_view import Cluster, SurfaceView, cluster_of, parted, view_surface
+from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, plan_grasp
 from skills.grasp.posture import body_height_m
+from skills.perception.detection_3d import Detection3D, detections_3d
+from skills.perception.surface_segmentation import Cluster, SurfaceView, cluster_of, parted, view_surface
 from skills.robot import FloatArray, Image
 
 GRASP_FORCE_N = 80.0
@@ -162,8 +162,8 @@ class Grasp(ArmSkill[GraspInputs]):
         p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            stations = [*close_stations(self.model.p_BS, p_BT), *overview_stations(self.model, p_BT)]
-            return look_configuration(scene, X_HC, stations, p_BT, q)
+            viewpoints = [*close_viewpoints(self.model.p_BS, p_BT), *overview_viewpoints(self.model, p_BT)]
+            return look_configuration(scene, X_HC, viewpoints, p_BT, q)
 
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)
@@ -173,7 +173,7 @@ class Grasp(ArmSkill[GraspInputs]):
         def examine() -> CloseView | None:
             found = detections_in(detector, image)
             same_class = [each for each in found if each.class_name == seen.thing.name]
-            return _examine(image, X_WB, surface, seen, place, sightings(image, place, same_class, [surface]))
+            return _examine(image, X_WB, surface, seen, place, detections_3d(image, place, same_class, [surface]))
 
         view = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message)
         if view is None:
@@ -296,7 +296,7 @@ def _examine(
     surface: Surface,
     seen: ObjectObservation,
     place: LocalisationEstimate,
-    found: tuple[Sighting, ...],
+    found: tuple[Detection3D, ...],
 ) -> CloseView | None:
     view = view_surface(image, place.X_WO, surface, margin_m=0.0)
     if view is None:
@@ -323,7 +323,7 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
     return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), view.plane.height_m)
 
 
-def _same_thing(view: SurfaceView, seen: ObjectObservation, found: tuple[Sighting, ...]) -> Cluster | None:
+def _same_thing(view: SurfaceView, seen: ObjectObservation, found: tuple[Detection3D, ...]) -> Cluster | None:
     """The cluster that is the thing: detected as of its class and nearest, else nearest of all; None: all are far."""
     expected = np.array(seen.position_W[:2])
 

@@ -11,9 +11,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Detection, Job, SkillContext
-from skills.detect.position import position_of
 from skills.detect.seeing import seen_in_grey
 from skills.estimate.planar import relative
+from skills.perception.position import position_of
 from skills.robot import FloatArray, Image, Pose2D
 
 __all__ = ["PEOPLE_TOPIC", "PeopleOptions", "PeopleWatch", "SeenPerson", "cameras_towards"]

@@ -15,11 +15,11 @@ from skills.approach.standing import COMFORTABLE_M, standing_poses
 from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
 from skills.arm.collision import ArmScene
 from skills.arm.motion import plan_line, time_path
-from skills.arm.poses import look_configuration, overview_stations
+from skills.arm.poses import look_configuration, overview_viewpoints
 from skills.arm.routine import PlanningError, Routine, SkillFailure
-from skills.detect.looking import cluster_boxes, surface_boxes
-from skills.detect.surface_view import SurfaceView, view_surface
+from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.navigate.skill import Navigate, NavigateInputs
+from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import free_spots, spots
 from skills.robot import FloatArray, Pose2D
 
@@ -128,7 +128,7 @@ class Place(ArmSkill[PlaceInputs]):
         low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return look_configuration(scene, X_HC, overview_stations(self.model, low_BT), low_BT, q)
+            return look_configuration(scene, X_HC, overview_viewpoints(self.model, low_BT), low_BT, q)
 
         yield from self.move_to(goal, message, speed_rad_s=0.9)
         yield from self.clear_view(message)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from table_scene import BLUE, COKE, TABLE, Can, scene, seen_as
 
-from skills.detect.foreground import foreground, level_planes, window_about
-from skills.detect.forms import class_forms
+from skills.perception.class_forms import class_forms
+from skills.perception.object_segmentation import level_planes, segment_object, window_about
 
 FORM = class_forms()["coke"]
 
@@ -26,7 +26,7 @@ def test_the_table_and_the_floor_are_planes_about_a_thing_at_the_tables_edge():
 
 def test_the_things_points_are_those_of_the_thing():
     image = scene([COKE])
-    found = foreground(window_of(image), FORM)
+    found = segment_object(window_of(image), FORM)
     off = np.linalg.norm(found.points_O[:, :2] - [COKE.x, COKE.y], axis=1)
     assert np.percentile(off, 95) < COKE.radius + 0.008
     assert found.plane.height_m == pytest.approx(TABLE.height_m, abs=0.004)
@@ -38,7 +38,7 @@ def test_most_of_what_is_seen_of_the_thing_is_taken():
     window = window_of(image)
     red = np.all(image.colour == COKE.colour, axis=-1)
     of_thing = red[np.rint(window.v).astype(int), np.rint(window.u).astype(int)]
-    found = foreground(window, FORM)
+    found = segment_object(window, FORM)
     assert np.count_nonzero(found.mask & of_thing) > 0.85 * np.count_nonzero(of_thing)
 
 
@@ -47,14 +47,14 @@ def test_another_thing_in_the_box_is_left_out():
     image = scene([COKE, before])
     window = window_of(image)
     blue = np.all(image.colour == BLUE, axis=-1)[np.rint(window.v).astype(int), np.rint(window.u).astype(int)]
-    assert np.count_nonzero(foreground(window, FORM).mask & blue) < 20
+    assert np.count_nonzero(segment_object(window, FORM).mask & blue) < 20
 
 
 def test_a_wall_behind_two_parts_of_a_thing_is_left_out():
     tank, hose = Can(1.0, -0.1, 0.06, 0.30, COKE.colour), Can(1.0, 0.08, 0.012, 0.28, COKE.colour)
     image = scene([tank, hose, Can(1.85, 0.0, 0.55, 1.2, BLUE)])
     window = window_of(image)
-    mask = foreground(window, class_forms()["extinguisher"]).mask
+    mask = segment_object(window, class_forms()["extinguisher"]).mask
     for colour, low, high in ((BLUE, 0.0, 0.05), (COKE.colour, 0.8, 1.0)):
         its = np.all(image.colour == colour, axis=-1)[np.rint(window.v).astype(int), np.rint(window.u).astype(int)]
         assert low <= np.count_nonzero(mask & its) / np.count_nonzero(its & window.inside) <= high
@@ -93,4 +93,4 @@ def test_a_point_outside_of_the_picture_is_beyond_its_border():
 def test_a_grey_picture_will_do():
     image = replace(scene([COKE]), colour=None)
     box = seen_as("coke", scene([COKE])).box
-    assert foreground(window_about(image, box), FORM).covered > 0.8
+    assert segment_object(window_about(image, box), FORM).covered > 0.8

@@ -11,9 +11,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Surface
 from skills.arm.collision import Box
-from skills.detect.points import inside_polygon
-from skills.detect.sighting import depth_ahead_m
-from skills.detect.surface_view import Cluster
+from skills.perception.detection_3d import depth_ahead_m
+from skills.perception.point_cloud import inside_polygon
+from skills.perception.surface_segmentation import Cluster
 from skills.robot import FloatArray, Image
 
 NEAREST_M = 0.35

@@ -1,14 +1,14 @@
-"""Sightings made by hand."""
+"""Detections in 3D made by hand."""
 
 import numpy as np
 
 from skills.api import Detection
-from skills.detect.sighting import Sighting
+from skills.perception.detection_3d import Detection3D
 
 
-def sighting(x=1.0, y=0.0, name="coke", score=0.9, eye=(0.0, 0.0, 1.0), sigma=0.01, stamp=1.0, rivals=()):
+def detected_3d(x=1.0, y=0.0, name="coke", score=0.9, eye=(0.0, 0.0, 1.0), sigma=0.01, stamp=1.0, rivals=()):
     covariance = sigma**2 * np.eye(3)
-    return Sighting(
+    return Detection3D(
         stamp_s=stamp,
         detection=Detection(name, score, (0.0, 0.0, 10.0, 10.0), rivals),
         position_W=np.array([x, y, 0.8]),

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sighted import sighting
+from made_detections import detected_3d
 
-from skills.detect.attributes import known_attributes, shows
+from skills.perception.attributes import known_attributes, shows
 
 
 def coloured(*colours):
-    return replace(sighting(), colours=np.array(colours * 20, np.uint8))
+    return replace(detected_3d(), colours=np.array(colours * 20, np.uint8))
 
 
 @pytest.mark.parametrize(
@@ -39,12 +39,12 @@ def test_a_third_of_the_pixels_is_enough():
 
 
 def test_a_thing_in_a_grey_picture_shows_no_colour():
-    assert not shows(sighting(), "red")
+    assert not shows(detected_3d(), "red")
 
 
 def test_big_and_small_go_by_what_is_usual_in_the_class():
-    big = replace(sighting(name="hammer"), size_m=(0.8, 0.2, 0.06))
-    small = replace(sighting(name="hammer"), size_m=(0.25, 0.1, 0.03))
+    big = replace(detected_3d(name="hammer"), size_m=(0.8, 0.2, 0.06))
+    small = replace(detected_3d(name="hammer"), size_m=(0.25, 0.1, 0.03))
     assert [shows(big, "big"), shows(big, "small"), shows(small, "large"), shows(small, "small")] == [1, 0, 0, 1]
 
 

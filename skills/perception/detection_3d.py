@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from skills.api import Detection, LocalisationEstimate, ObjectObservation, Surface, Thing
-from skills.detect.forms import class_forms
-from skills.detect.points import camera_pose_W, inside_polygon
-from skills.detect.position import Position, position_of
+from skills.perception.class_forms import class_forms
+from skills.perception.point_cloud import camera_pose_W, inside_polygon
+from skills.perception.position import Position, position_of
 from skills.robot import FloatArray, Image
 
 _SURFACE_MARGIN_M = 0.05
@@ -23,7 +23,7 @@ _FAR_TOO_LARGE = 1.5
 
 
 @dataclass(frozen=True)
-class Sighting:
+class Detection3D:
     """One detection with its place in the world.
 
     `covariance` (3, 3) is that of position_W from the camera at capture; `place_covariance` adds the localisation's.
@@ -50,9 +50,9 @@ class Sighting:
         return self.detection.class_name
 
 
-def sightings(
+def detections_3d(
     image: Image, localisation: LocalisationEstimate, detections: Iterable[Detection], surfaces: Sequence[Surface]
-) -> tuple[Sighting, ...]:
+) -> tuple[Detection3D, ...]:
     """The detections that have a place.
 
     Left out are those where no depth is seen, of classes without a form, and those that span far more than the longest
@@ -61,7 +61,7 @@ def sightings(
     known = [detection for detection in detections if detection.class_name in class_forms()]
     placed = zip(known, _positions(image, known), strict=True)
     return tuple(
-        _sighting(image, localisation, detection, position, surfaces)
+        _detection_3d(image, localisation, detection, position, surfaces)
         for detection, position in placed
         if position is not None and not _is_far_too_large(detection, position)
     )
@@ -79,7 +79,7 @@ def _positions(image: Image, detections: Sequence[Detection]) -> list[Position |
         long = _is_long(detections[k])
         position = found[k] = position_of(image, detections[k], taken if long else None)
         if position is not None and not long:
-            taken |= position.fore.pixel_mask(*shape)
+            taken |= position.segment.pixel_mask(*shape)
     return [found[k] for k in range(len(detections))]
 
 
@@ -87,20 +87,20 @@ def _is_long(detection: Detection) -> bool:
     return class_forms()[detection.class_name].form == "long"
 
 
-def _sighting(
+def _detection_3d(
     image: Image,
     localisation: LocalisationEstimate,
     detection: Detection,
     position: Position,
     surfaces: Sequence[Surface],
-) -> Sighting:
+) -> Detection3D:
     X_WO, extents = localisation.X_WO, position.extents
     R_WO = X_WO.rotation().matrix()
     p_W = np.asarray(X_WO @ position.p_OT)
     covariance = R_WO @ position.covariance_O @ R_WO.T
     p_WB = X_WO @ image.frames.pose("body").translation() if "body" in image.frames.edges else X_WO.translation()
     pixels = _pixels(image, position)
-    return Sighting(
+    return Detection3D(
         stamp_s=image.stamp_s,
         detection=detection,
         position_W=p_W,
@@ -135,23 +135,23 @@ def _above(surface: Surface, p_W: FloatArray) -> bool:
 
 def _pixels(image: Image, position: Position) -> NDArray[np.int64]:
     """The thing's own pixels (N, 2)."""
-    window, mask = position.fore.window, position.fore.mask
+    window, mask = position.segment.window, position.segment.mask
     u = np.clip(np.rint(window.u[mask]), 0, image.intrinsics.width - 1)
     v = np.clip(np.rint(window.v[mask]), 0, image.intrinsics.height - 1)
     return np.stack([u, v], axis=1).astype(np.int64)
 
 
-def observation(sighting: Sighting, attributes: tuple[str, ...] = ()) -> ObjectObservation:
-    """A sighting as an observation."""
-    x, y, z = (float(value) for value in sighting.position_W)
+def observation(detected: Detection3D, attributes: tuple[str, ...] = ()) -> ObjectObservation:
+    """A 3D detection as an observation."""
+    x, y, z = (float(value) for value in detected.position_W)
     return ObjectObservation(
-        stamp_s=sighting.stamp_s,
-        thing=Thing(sighting.class_name, attributes),
+        stamp_s=detected.stamp_s,
+        thing=Thing(detected.class_name, attributes),
         position_W=(x, y, z),
-        size_m=sighting.size_m,
-        yaw_rad=sighting.yaw_rad,
-        score=round(sighting.detection.score, 3),
-        surface=sighting.surface,
+        size_m=detected.size_m,
+        yaw_rad=detected.yaw_rad,
+        score=round(detected.detection.score, 3),
+        surface=detected.surface,
     )
 
 

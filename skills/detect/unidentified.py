@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from skills.detect.forms import class_forms
-from skills.detect.surface_view import Cluster
-from skills.detect.tracks import Track
+from skills.perception.class_forms import class_forms
+from skills.perception.surface_segmentation import Cluster
+from skills.perception.tracker import Track
 from skills.robot import FloatArray
 
 _NAMED_WITHIN_M = 0.06

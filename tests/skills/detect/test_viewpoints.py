@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skills.detect.looking import standing_parts
+from skills.detect.viewpoints import standing_parts
 
 
 def filled(width_m, depth_m, x_m=0.0, y_m=0.0, yaw_rad=0.0):

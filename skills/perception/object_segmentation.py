@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.detect.forms import ClassForm
-from skills.detect.plane import LevelPlane
-from skills.detect.points import MAX_DEPTH_M, MIN_DEPTH_M
+from skills.perception.class_forms import ClassForm
+from skills.perception.plane import LevelPlane
+from skills.perception.point_cloud import MAX_DEPTH_M, MIN_DEPTH_M
 from skills.robot import FloatArray, Image, Intrinsics
 
 Box = tuple[float, float, float, float]
@@ -81,7 +81,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Foreground:
+class ObjectSegment:
     """The points of a thing: their mask in the window, the plane below (None: none is seen), how well they fit the box.
 
     An empty mask means that nothing rises above the plane: the thing is flat.
@@ -151,7 +151,7 @@ def _pixels(low: float, high: float, c: float, f: float, depth_c: float, depth_f
     return np.arange(first, last + 1, step, dtype=np.float64)
 
 
-def foreground(window: Window, form: ClassForm) -> Foreground:
+def segment_object(window: Window, form: ClassForm) -> ObjectSegment:
     """What in the window is the thing, whose class has a form."""
     planes = [*level_planes(window), None]
     found = [each for plane in planes for each in _supposing(window, plane, form)]
@@ -210,15 +210,15 @@ def _fitted(points: FloatArray, height_m: float) -> LevelPlane | None:
     return plane
 
 
-def _supposing(window: Window, plane: LevelPlane | None, form: ClassForm) -> Iterator[Foreground]:
-    """The foreground if the thing rests on a plane, or on nothing that is seen; by each way of grouping."""
+def _supposing(window: Window, plane: LevelPlane | None, form: ClassForm) -> Iterator[ObjectSegment]:
+    """The segment if the thing rests on a plane, or on nothing that is seen; by each way of grouping."""
     standing = window.valid & ~_level(window, plane)
     ways = [_groups_from_above(window, standing), _groups_in_picture(window, standing, parted=False)]
     if form.form != "long":
         ways.append(_groups_in_picture(window, standing, parted=True))
     for labels, count in ways:
         mask, fit = _best_groups(window, labels, count, form)
-        yield Foreground(window, mask, plane, fit * _resting(window, mask, plane), _covered(window, mask))
+        yield ObjectSegment(window, mask, plane, fit * _resting(window, mask, plane), _covered(window, mask))
 
 
 def _resting(window: Window, mask: Mask, plane: LevelPlane | None) -> float:

@@ -1,4 +1,4 @@
-"""What colour words mean: ranges of hue, saturation and value from `appearance.yaml`."""
+"""What colour words mean: ranges of hue, saturation and value from `colour_words.yaml`."""
 
 from __future__ import annotations
 
@@ -49,5 +49,5 @@ class Appearance(_Model):
 @lru_cache(maxsize=1)
 def load_appearance() -> Appearance:
     """The appearance data beside this module. Raises pydantic.ValidationError when it is malformed."""
-    path = Path(__file__).with_name("appearance.yaml")
+    path = Path(__file__).with_name("colour_words.yaml")
     return Appearance.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))

@@ -9,7 +9,7 @@ from table_scene import BLUE, CAMERA, COKE, GREY, LENS, RED, TABLE, Can, scene, 
 
 from skills.api import Detection
 from skills.arm.poses import camera_pose
-from skills.detect.position import position_of
+from skills.perception.position import position_of
 from skills.robot import FrameTree, Image
 
 MIDDLE = (COKE.x, COKE.y, TABLE.height_m + 0.5 * COKE.height)

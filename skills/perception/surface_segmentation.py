@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Surface
-from skills.detect.plane import LevelPlane
-from skills.detect.points import PointCloud, camera_pose_W, cloud_from_image, inside_polygon
-from skills.detect.shape import SeenShape, measure
-from skills.detect.sighting import Sighting
 from skills.detection import box_overlap
+from skills.perception.detection_3d import Detection3D
+from skills.perception.plane import LevelPlane
+from skills.perception.point_cloud import PointCloud, camera_pose_W, cloud_from_image, inside_polygon
+from skills.perception.shape import SeenShape, measure
 from skills.robot import FloatArray, Image
 
 _CELL_M = 0.008
@@ -121,22 +121,22 @@ def _cluster(points: PointCloud, surface: str, plane: LevelPlane, p_WC: FloatArr
     return Cluster(points, surface, plane, shape, (int(u0), int(v0), int(u1), int(v1)))
 
 
-def parted(view: SurfaceView, sighting: Sighting) -> SurfaceView:
+def parted(view: SurfaceView, detected: Detection3D) -> SurfaceView:
     """The view with a detected thing cut out of a cluster that holds others as well, such as two things that touch.
 
     What is above or below it is a part of it that its box left out.
     """
-    whole = cluster_of(view.clusters, sighting)
-    if whole is None or len(sighting.pixels) == 0:
+    whole = cluster_of(view.clusters, detected)
+    if whole is None or len(detected.pixels) == 0:
         return view
-    own = _own(whole.points.pixels, sighting.pixels)
+    own = _own(whole.points.pixels, detected.pixels)
     if min(np.count_nonzero(own), np.count_nonzero(~own)) < max(_FEWEST_POINTS, _LEAST_PART * len(own)):
         return view
     halves = (whole.points.where(own), whole.points.where(~own))
     middles = [np.median(points.p_W[:, :2], axis=0) for points in halves]
     if float(np.linalg.norm(middles[0] - middles[1])) < _APART_M:
         return view
-    parts = tuple(_cluster(points, whole.surface, whole.plane, sighting.eye_W) for points in halves)
+    parts = tuple(_cluster(points, whole.surface, whole.plane, detected.eye_W) for points in halves)
     others = tuple(each for each in view.clusters if each is not whole)
     return SurfaceView(view.plane, view.plane_points, (*parts, *others))
 
@@ -150,13 +150,13 @@ def _own(pixels: NDArray[np.int64], of_thing: NDArray[np.int64]) -> NDArray[np.b
     return np.asarray(closed[pixels[:, 1], pixels[:, 0]] > 0)
 
 
-def cluster_of(clusters: tuple[Cluster, ...], sighting: Sighting) -> Cluster | None:
+def cluster_of(clusters: tuple[Cluster, ...], detected: Detection3D) -> Cluster | None:
     """The cluster that a detected thing is: the one near it whose box overlaps the detection's most; None if none."""
-    near = [one for one in clusters if _apart(one, sighting) < _SAME_THING_M + 0.5 * one.shape.length_m]
-    overlaps = {id(one): box_overlap(one.box, sighting.detection.box) for one in near}
+    near = [one for one in clusters if _apart(one, detected) < _SAME_THING_M + 0.5 * one.shape.length_m]
+    overlaps = {id(one): box_overlap(one.box, detected.detection.box) for one in near}
     best = max(near, key=lambda one: overlaps[id(one)], default=None)
     return best if best is not None and overlaps[id(best)] > _LEAST_OVERLAP else None
 
 
-def _apart(cluster: Cluster, sighting: Sighting) -> float:
-    return float(np.linalg.norm(np.array(cluster.shape.centre) - sighting.position_W[:2]))
+def _apart(cluster: Cluster, detected: Detection3D) -> float:
+    return float(np.linalg.norm(np.array(cluster.shape.centre) - detected.position_W[:2]))

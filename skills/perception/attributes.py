@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from skills.detect.appearance import load_appearance
-from skills.detect.forms import class_forms
-from skills.detect.sighting import Sighting
+from skills.perception.class_forms import class_forms
+from skills.perception.colour_words import load_appearance
+from skills.perception.detection_3d import Detection3D
 
 _BIGGER: Final[Mapping[str, bool]] = MappingProxyType(
     {"big": True, "large": True, "huge": True, "small": False, "little": False, "tiny": False}
@@ -21,15 +21,15 @@ def known_attributes() -> frozenset[str]:
     return frozenset(load_appearance().attributes) | frozenset(_BIGGER)
 
 
-def shows(sighting: Sighting, attribute: str) -> bool:
+def shows(detected: Detection3D, attribute: str) -> bool:
     """Whether an attribute fits. Raises KeyError for an unknown word."""
     word = attribute.lower()
     if word in _BIGGER:
-        return _is_big(sighting) == _BIGGER[word]
-    return len(sighting.colours) > 0 and load_appearance().shows(sighting.colours, word)
+        return _is_big(detected) == _BIGGER[word]
+    return len(detected.colours) > 0 and load_appearance().shows(detected.colours, word)
 
 
-def _is_big(sighting: Sighting) -> bool:
+def _is_big(detected: Detection3D) -> bool:
     """Whether its longest side is beyond the middle of what is usual in its class."""
-    low, high = class_forms()[sighting.class_name].length_m
-    return max(sighting.size_m) > math.sqrt(low * high)
+    low, high = class_forms()[detected.class_name].length_m
+    return max(detected.size_m) > math.sqrt(low * high)

@@ -1,6 +1,6 @@
 """Where a detected thing is: the middle of the whole thing, not of the side that is seen, with its covariance.
 
-The foreground of the box gives the side that is seen. The form of the class tells how far the thing goes on behind it:
+The segment of the box gives the side that is seen. The form of the class tells how far the thing goes on behind it:
 
 | form | middle |
 |---|---|
@@ -22,10 +22,10 @@ import cv2
 import numpy as np
 
 from skills.api import Detection
-from skills.detect.foreground import Foreground, Mask, Window, foreground, window_about
-from skills.detect.forms import ClassForm, class_forms
-from skills.detect.plane import LevelPlane
-from skills.detect.shape import circle_seen, without_strays
+from skills.perception.class_forms import ClassForm, class_forms
+from skills.perception.object_segmentation import Mask, ObjectSegment, Window, segment_object, window_about
+from skills.perception.plane import LevelPlane
+from skills.perception.shape import circle_seen, without_strays
 from skills.robot import FloatArray, Image
 
 _UPRIGHT = 1.15
@@ -62,12 +62,12 @@ class Position:
     p_OT: FloatArray
     covariance_O: FloatArray
     extents: Extents
-    fore: Foreground
+    segment: ObjectSegment
 
     @property
     def spanned_m(self) -> float:
         """How long the longer side of the box is at the depth of the thing."""
-        window = self.fore.window
+        window = self.segment.window
         u0, v0, u1, v1 = window.box
         depth_m = float((window.R_OC.T @ (self.p_OT - window.p_OC))[2])
         return depth_m * max((u1 - u0) / window.lens.fx, (v1 - v0) / window.lens.fy)
@@ -82,24 +82,24 @@ def position_of(image: Image, detection: Detection, taken: Mask | None = None) -
     window = window_about(image, detection.box, taken)
     if window is None:
         return None
-    fore = foreground(window, form)
+    segment = segment_object(window, form)
     cut = _cut(image, detection)
-    extents = _extents(fore, form, cut)
+    extents = _extents(segment, form, cut)
     if extents is None:
         return None
     p_OT = np.array(extents.middle)
-    return Position(p_OT, _covariance(p_OT - window.p_OC, _doubted(extents, fore, cut)), extents, fore)
+    return Position(p_OT, _covariance(p_OT - window.p_OC, _doubted(extents, segment, cut)), extents, segment)
 
 
-def _doubted(extents: Extents, fore: Foreground, cut: _Cut) -> tuple[float, float, float]:
+def _doubted(extents: Extents, segment: ObjectSegment, cut: _Cut) -> tuple[float, float, float]:
     """The sigmas of the extents, larger where the thing reaches beyond the picture or its base is not seen."""
     along, across, up = extents.sure_m
     longest = max(extents.length_m, extents.height_m)
     if cut.anywhere:
         along, across, up = along + 0.12 * longest, across + 0.15 * longest, up + 0.1 * extents.height_m
-    if fore.plane is None:
+    if segment.plane is None:
         up += 0.02 + 0.1 * extents.height_m
-    doubt = 1.0 + 2.0 * (1.0 - min(fore.fit, 1.0)) ** 2
+    doubt = 1.0 + 2.0 * (1.0 - min(segment.fit, 1.0)) ** 2
     return along * doubt, across * doubt, up * doubt
 
 
@@ -124,43 +124,43 @@ def _cut(image: Image, detection: Detection) -> _Cut:
     return _Cut(v0 < _BORDER_PX, v1 > lens.height - _BORDER_PX, side)
 
 
-def _extents(fore: Foreground, form: ClassForm, cut: _Cut) -> Extents | None:
-    points = fore.points_O
+def _extents(segment: ObjectSegment, form: ClassForm, cut: _Cut) -> Extents | None:
+    points = segment.points_O
     few = len(points) < 12
     if form.form == "person":
-        return None if few else _person(points, fore, cut)
-    if form.form == "long" and fore.plane is not None and (few or fore.covered < _LEAST_LONG_COVERED):
-        flat = _flat(fore, fore.plane, form)
+        return None if few else _person(points, segment, cut)
+    if form.form == "long" and segment.plane is not None and (few or segment.covered < _LEAST_LONG_COVERED):
+        flat = _flat(segment, segment.plane, form)
         if flat is not None:
             return flat
     if few:
         return None
-    base_m = _base(fore, points)
+    base_m = _base(segment, points)
     height_m = float(
         np.clip(np.percentile(points[:, 2], 99.7 if form.form == "tank" else 98) - base_m, 0.005, form.length_m[1])
     )
-    across_m = _across(points, fore.window.p_OC)
+    across_m = _across(points, segment.window.p_OC)
     if form.form in ("round", "tank") and height_m > _UPRIGHT * across_m:
-        base_m, height_m = _uncut(base_m, height_m, form, fore, cut)
-        return _upright(points, fore, form, base_m, height_m)
-    return _lying(points, fore, form, base_m, height_m, cut)
+        base_m, height_m = _uncut(base_m, height_m, form, segment, cut)
+        return _upright(points, segment, form, base_m, height_m)
+    return _lying(points, segment, form, base_m, height_m, cut)
 
 
-def _uncut(base_m: float, height_m: float, form: ClassForm, fore: Foreground, cut: _Cut) -> tuple[float, float]:
+def _uncut(base_m: float, height_m: float, form: ClassForm, segment: ObjectSegment, cut: _Cut) -> tuple[float, float]:
     """Base and height of a standing thing, of usual height where the picture ends above or below it."""
     missing_m = max(0.0, form.usual_m - height_m)
     if cut.top:
         return base_m, height_m + missing_m
-    if cut.bottom and fore.plane is None:
+    if cut.bottom and segment.plane is None:
         return base_m - missing_m, height_m + missing_m
     return base_m, height_m
 
 
-def _base(fore: Foreground, points: FloatArray) -> float:
+def _base(segment: ObjectSegment, points: FloatArray) -> float:
     """Height of what the thing rests on; of its lowest points where that is not seen."""
-    if fore.plane is None:
+    if segment.plane is None:
         return float(np.percentile(points[:, 2], 1))
-    return float(fore.plane.z(np.median(points[:, :2], axis=0)))
+    return float(segment.plane.z(np.median(points[:, :2], axis=0)))
 
 
 def _view(points: FloatArray, p_OC: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -176,14 +176,14 @@ def _across(points: FloatArray, p_OC: FloatArray) -> float:
     return float(high - low)
 
 
-def _upright(points: FloatArray, fore: Foreground, form: ClassForm, base_m: float, height_m: float) -> Extents:
+def _upright(points: FloatArray, segment: ObjectSegment, form: ClassForm, base_m: float, height_m: float) -> Extents:
     """A standing round thing: its axis behind the side that is seen."""
     above = points[:, 2] - base_m
     body = points[(above > 0.12 * height_m) & (above < 0.6 * height_m), :2]
     body = body if len(body) >= 12 else points[:, :2]
-    circle = circle_seen(body, fore.window.p_OC, 0.5 * form.width_m[1])
+    circle = circle_seen(body, segment.window.p_OC, 0.5 * form.width_m[1])
     if circle is None:
-        along, across = _view(points, fore.window.p_OC)
+        along, across = _view(points, segment.window.p_OC)
         left, right = (float(value) for value in np.percentile(body @ across, [1, 99]))
         radius = float(np.clip(0.5 * (right - left), 0.5 * form.width_m[0], 0.5 * form.width_m[1]))
         near = float(np.percentile(body @ along, 5))
@@ -193,7 +193,7 @@ def _upright(points: FloatArray, fore: Foreground, form: ClassForm, base_m: floa
         x, y, radius = circle
     sure = (0.004 + 0.2 * radius, 0.003 + 0.15 * radius, 0.004 + 0.03 * height_m)
     if form.form == "tank":
-        about = _near_axis(points, np.array([x, y]), fore.window.p_OC)
+        about = _near_axis(points, np.array([x, y]), segment.window.p_OC)
         return _with_appendages(about, (x, y, radius), base_m, height_m, sure)
     return Extents((x, y, base_m + 0.5 * height_m), 2 * radius, 2 * radius, height_m, 0.0, True, sure)
 
@@ -221,19 +221,21 @@ def _with_appendages(
     return Extents((float(cx), float(cy), base_m + 0.5 * height_m), length, width, height_m, yaw, False, sure_m)
 
 
-def _lying(points: FloatArray, fore: Foreground, form: ClassForm, base_m: float, height_m: float, cut: _Cut) -> Extents:
+def _lying(
+    points: FloatArray, segment: ObjectSegment, form: ClassForm, base_m: float, height_m: float, cut: _Cut
+) -> Extents:
     """The outline from above, completed on the far side and beyond the picture's edge."""
     centre, length, width, yaw = _outline(points, base_m, height_m, form)
-    if form.form == "box" and fore.plane is None and width > height_m:
+    if form.form == "box" and segment.plane is None and width > height_m:
         base_m, height_m = base_m + height_m - width, width
     if cut.anywhere and form.form in ("long", "round"):
-        centre, length = _continued(centre, length, yaw, base_m, fore.window, form)
+        centre, length = _continued(centre, length, yaw, base_m, segment.window, form)
     wanted = (length, width)
     if form.form == "round":
         wanted = (length, max(width, height_m))
     if form.form == "box":
         wanted = (_towards(length, height_m), _towards(width, height_m))
-    centre = _completed(centre, (length, width), wanted, yaw, fore.window.p_OC)
+    centre = _completed(centre, (length, width), wanted, yaw, segment.window.p_OC)
     sure = (0.005 + 0.06 * length, 0.004 + 0.05 * length, 0.004 + 0.05 * height_m)
     middle = (float(centre[0]), float(centre[1]), base_m + 0.5 * height_m)
     return Extents(middle, *wanted, height_m, yaw, False, sure)
@@ -308,19 +310,19 @@ def _completed(
     return centre
 
 
-def _flat(fore: Foreground, plane: LevelPlane, form: ClassForm) -> Extents | None:
+def _flat(segment: ObjectSegment, plane: LevelPlane, form: ClassForm) -> Extents | None:
     """A flat thing: where the ray through the middle of its box meets the plane that it lies on."""
-    window = fore.window
+    window = segment.window
     meeting = _on_plane(window, plane, 0.35 * form.width_m[0])
     if meeting is None:
         return None
     left, right, top, bottom, middle = meeting
     spans = (float(np.linalg.norm(right - left)), float(np.linalg.norm(bottom - top)))
     length = min(max(spans), form.length_m[1])
-    points = fore.points_O
+    points = segment.points_O
     yaw, height = 0.0, float(form.width_m[0])
     if len(points) >= 12:
-        _, seen, _, yaw = _outline(points, _base(fore, points), 0.01, form)
+        _, seen, _, yaw = _outline(points, _base(segment, points), 0.01, form)
         length = max(length, min(seen, form.length_m[1]))
     sure = (0.006 + 0.08 * length, 0.004 + 0.06 * length, 0.006)
     x, y, z = (float(value) for value in middle)
@@ -341,9 +343,9 @@ def _on_plane(window: Window, plane: LevelPlane, above_m: float) -> list[FloatAr
     return found
 
 
-def _person(points: FloatArray, fore: Foreground, cut: _Cut) -> Extents:
+def _person(points: FloatArray, segment: ObjectSegment, cut: _Cut) -> Extents:
     """Somebody who stands or sits on the floor."""
-    along, across = _view(points, fore.window.p_OC)
+    along, across = _view(points, segment.window.p_OC)
     sideways = points[:, :2] @ across
     body = points[np.abs(sideways - np.median(sideways)) < _PERSON_HALF_M]
     left, right = np.percentile(body[:, :2] @ across, [2, 98])

@@ -6,8 +6,8 @@ from pydrake.math import RigidTransform
 from table_scene import BLUE, CAMERA, COKE, RED, TABLE, Can, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate, Surface
-from skills.detect.sighting import sightings
-from skills.detect.surface_view import cluster_of, parted, view_surface
+from skills.perception.detection_3d import detections_3d
+from skills.perception.surface_segmentation import cluster_of, parted, view_surface
 from skills.robot import Image
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
@@ -74,16 +74,16 @@ def test_a_grey_picture_has_clusters_without_colour():
 def test_the_cluster_of_a_detection_is_the_one_in_its_box():
     blue = Can(0.95, 0.12, 0.033, 0.115, BLUE)
     image = scene([COKE, blue])
-    (sighting,) = sightings(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
-    cluster = cluster_of(viewed(image).clusters, sighting)
+    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
+    cluster = cluster_of(viewed(image).clusters, detected)
     assert cluster.shape.centre == pytest.approx((blue.x, blue.y), abs=0.008)
 
 
 def test_a_detection_beside_all_clusters_has_none():
     image = scene([COKE, Can(0.95, 0.12, 0.033, 0.115, BLUE)])
-    (sighting,) = sightings(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
+    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
     only_red = tuple(c for c in viewed(image).clusters if c.shape.centre[1] < 0.0)
-    assert cluster_of(only_red, sighting) is None
+    assert cluster_of(only_red, detected) is None
 
 
 def test_a_thing_that_touches_another_is_cut_out_of_their_cluster():
@@ -91,26 +91,26 @@ def test_a_thing_that_touches_another_is_cut_out_of_their_cluster():
     image = scene([COKE, beside])
     view = viewed(image)
     assert len(view.clusters) == 1
-    (sighting,) = sightings(image, PLACE, [seen_as("coke", image)], [TABLE])
-    alone = parted(view, sighting)
+    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image)], [TABLE])
+    alone = parted(view, detected)
     assert len(alone.clusters) == 2
-    assert cluster_of(alone.clusters, sighting).shape.centre == pytest.approx((COKE.x, COKE.y), abs=0.012)
+    assert cluster_of(alone.clusters, detected).shape.centre == pytest.approx((COKE.x, COKE.y), abs=0.012)
 
 
 def test_a_thing_for_itself_stays_whole():
     image = scene([COKE])
-    (sighting,) = sightings(image, PLACE, [seen_as("coke", image)], [TABLE])
+    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image)], [TABLE])
     view = viewed(image)
-    assert parted(view, sighting) is view
+    assert parted(view, detected) is view
 
 
 def test_a_box_that_leaves_out_the_top_of_a_thing_does_not_part_it():
     image = scene([Can(0.95, -0.1, 0.033, 0.24, RED)])
     u0, v0, u1, v1 = seen_as("beer", image).box
     low = Detection("beer", 0.8, (u0, v0 + 0.4 * (v1 - v0), u1, v1))
-    (sighting,) = sightings(image, PLACE, [low], [TABLE])
+    (detected,) = detections_3d(image, PLACE, [low], [TABLE])
     view = viewed(image)
-    assert parted(view, sighting) is view
+    assert parted(view, detected) is view
 
 
 def test_the_camera_is_where_the_scene_has_it():

@@ -6,15 +6,15 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from table_scene import BLUE, CAMERA, COKE, LENS, RED, TABLE, Can, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate, Surface
-from skills.detect.looking import in_plain_view
-from skills.detect.sighting import depth_ahead_m, observation, place_covariance, sightings, surface_below
+from skills.detect.viewpoints import in_plain_view
+from skills.perception.detection_3d import depth_ahead_m, detections_3d, observation, place_covariance, surface_below
 
 SURE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
 COKE_W = np.array([COKE.x, COKE.y, 0.8075])
 
 
 def only(image, place=SURE, surfaces=(TABLE,), name="coke"):
-    (found,) = sightings(image, place, [seen_as(name, image)], surfaces)
+    (found,) = detections_3d(image, place, [seen_as(name, image)], surfaces)
     return found
 
 
@@ -48,11 +48,11 @@ def test_an_uncertain_heading_moves_what_is_far_sideways():
 def test_a_detection_without_depth_or_of_a_class_without_form_is_left_out():
     image = scene([COKE])
     image.depth_m[:] = 0.0
-    assert sightings(image, SURE, [seen_as("coke", image)], [TABLE]) == ()
-    assert sightings(scene([COKE]), SURE, [Detection("unicorn", 0.9, (1.0, 1.0, 9.0, 9.0))], [TABLE]) == ()
+    assert detections_3d(image, SURE, [seen_as("coke", image)], [TABLE]) == ()
+    assert detections_3d(scene([COKE]), SURE, [Detection("unicorn", 0.9, (1.0, 1.0, 9.0, 9.0))], [TABLE]) == ()
 
 
-# class -> whether it can span 0.6 m, where the longest are (forms.yaml) 0.30, 0.36, 0.60 and 1.00 m long
+# class -> whether it can span 0.6 m, where the longest are (class_forms.yaml) 0.30, 0.36, 0.60 and 1.00 m long
 @pytest.mark.parametrize(("name", "possible"), [("coke", False), ("beer", False), ("wrench", True), ("hammer", True)])
 def test_what_spans_far_more_than_such_things_do_is_left_out(name, possible):
     image = scene([COKE])
@@ -60,7 +60,7 @@ def test_what_spans_far_more_than_such_things_do_is_left_out(name, possible):
     half_px = 0.3 * LENS.fx / float(np.linalg.norm(COKE_W - CAMERA))
     middle = 0.5 * (u0 + u1)
     wide = Detection(name, 0.9, (middle - half_px, v0, middle + half_px, v1))
-    assert bool(sightings(image, SURE, [wide], [TABLE])) is possible
+    assert bool(detections_3d(image, SURE, [wide], [TABLE])) is possible
 
 
 SHELF = Surface("shelf", TABLE.polygon_W, 0.40)
@@ -110,7 +110,7 @@ def test_a_long_thing_beside_another_is_not_taken_for_it():
     before = Can(0.94, 0.115, 0.03, 0.10, BLUE)
     image = scene([disk, before])
     found = [seen_as("wrench", image), seen_as("coke", image, BLUE)]
-    wrench, coke = sightings(image, SURE, found, [TABLE])
+    wrench, coke = detections_3d(image, SURE, found, [TABLE])
     assert wrench.position_W[:2] == pytest.approx([disk.x, disk.y], abs=0.03)
     assert wrench.position_W[2] < TABLE.height_m + 0.02
     assert coke.position_W[:2] == pytest.approx([before.x, before.y], abs=0.01)

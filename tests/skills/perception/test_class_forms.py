@@ -1,7 +1,7 @@
 """The forms of the classes."""
 
 from executive.mission.class_ids import CLASS_IDS
-from skills.detect.forms import class_forms
+from skills.perception.class_forms import class_forms
 
 
 def test_every_class_has_a_form_and_the_number_that_all_use():

@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+from made_detections import detected_3d
 from pydrake.math import RigidTransform
-from sighted import sighting
 from table_scene import BLUE, COKE, GREY, TABLE, Can, scene
 
-from skills.detect.attention import unnamed
-from skills.detect.surface_view import view_surface
-from skills.detect.tracks import TrackBook
+from skills.detect.unidentified import unnamed
+from skills.perception.surface_segmentation import view_surface
+from skills.perception.tracker import Tracker
 
 BOX = Can(1.1, 0.25, 0.06, 0.10, GREY)
 
@@ -21,8 +21,8 @@ def clusters(*things):
 
 
 def track_at(x, y, **seen):
-    book = TrackBook(("coke", "beer", "hammer", "wrench", "cube"))
-    return book.update([replace(sighting(**seen), position_W=np.array([x, y, 0.8]))], lambda track: True)
+    tracker = Tracker(("coke", "beer", "hammer", "wrench", "cube"))
+    return tracker.update([replace(detected_3d(**seen), position_W=np.array([x, y, 0.8]))], lambda track: True)
 
 
 def test_what_has_a_track_is_named():

@@ -1,4 +1,4 @@
-"""What the classes of things are like in general: `forms.yaml`."""
+"""What the classes of things are like in general: `class_forms.yaml`."""
 
 from __future__ import annotations
 
@@ -27,5 +27,5 @@ class ClassForm(BaseModel):
 @lru_cache(maxsize=1)
 def class_forms() -> Mapping[str, ClassForm]:
     """The classes by name. Raises pydantic.ValidationError when the file beside this module is malformed."""
-    text = Path(__file__).with_name("forms.yaml").read_text(encoding="utf-8")
+    text = Path(__file__).with_name("class_forms.yaml").read_text(encoding="utf-8")
     return MappingProxyType(TypeAdapter(dict[str, ClassForm]).validate_python(yaml.safe_load(text)))

@@ -177,7 +177,8 @@ class Image:
 
     `colour` is (H, W, 3) uint8 RGB, or None where the camera is grey; `grey` is (H, W) uint8. `depth_m` is float32
     metres along the optical axis, 0 where there is none; it is registered to the picture by `depth_intrinsics`
-    (same pose, perhaps fewer pixels). `frames` is the frame tree at capture time.
+    (same pose, perhaps fewer pixels). `frames` is the frame tree at capture time. Arrays that were not asked for are
+    empty, of shape (0, 0).
     """
 
     stamp_s: float
@@ -288,8 +289,11 @@ class Robot(Protocol):
     def scan(self) -> Scan | None:
         """Latest LiDAR revolution, None before the first."""
 
-    def image(self, source: str) -> Image:
-        """Take a picture now; may block, so call it inside a Worker job. Raises ValueError for an unknown source."""
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
+        """Take a picture with depth now, or only one of the two; may block, so call it inside a Worker job.
+
+        What was not asked for may be empty, see `Image`. Raises ValueError for an unknown source.
+        """
 
     def joints(self) -> Joints:
         """Latest joint state."""

@@ -25,6 +25,7 @@ from skills.robot import (
 )
 
 Check = Callable[[Any], str | None]
+_EMPTY: Final = (0, 0)
 AnswerT = TypeVar("AnswerT")
 
 
@@ -86,9 +87,9 @@ def _scan(it: Scan) -> str | None:
 
 def _image(it: Image) -> str | None:
     lens, depth = it.intrinsics, it.depth_intrinsics
-    if it.grey.shape != (lens.height, lens.width):
+    if it.grey.shape not in ((lens.height, lens.width), _EMPTY):
         return f"a picture of shape {it.grey.shape}, not {(lens.height, lens.width)}"
-    if it.depth_m.shape != (depth.height, depth.width):
+    if it.depth_m.shape not in ((depth.height, depth.width), _EMPTY):
         return f"depth of shape {it.depth_m.shape}, not {(depth.height, depth.width)}"
     return _stamp(it.stamp_s)
 

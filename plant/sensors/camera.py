@@ -5,12 +5,16 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import FrameId, QueryObject
+from pydrake.geometry import ColorRenderCamera, FrameId, QueryObject
 
 from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from plant.sensors.camera_spec import CameraSpec, colour_render_camera, depth_render_camera
 from plant.snapshot.values import State, restore_rng, rng_state
 from skills.robot import FrameTree, Image
+
+_FAINT = 4
+_NO_PICTURE = np.zeros((0, 0), dtype=np.uint8)
+_NO_DEPTH = np.zeros((0, 0), dtype=np.float32)
 
 
 class Camera:
@@ -32,18 +36,28 @@ class Camera:
         picture, depth = spec.intrinsics(), spec.depth_intrinsics()
         self._colour_camera = colour_render_camera(picture, renderer)
         self._depth_camera = depth_render_camera(depth, renderer, spec.depth_range_m)
+        self._faint_camera = colour_render_camera(spec.shrunk(_FAINT * spec.depth_shrink), renderer)
         self._rng = rng
         self._picture = PictureDegrader(
             rng, picture.height, picture.width, picture_noise or PictureNoise(), spec.picture_shrink
         )
         self._depth = DepthDegrader(rng, depth, spec.depth_range_m, depth_noise or DepthNoise())
 
-    def take(self, query_object: QueryObject, stamp_s: float, frames: FrameTree) -> Image:
-        """A picture at the query object's state; `frames` is the robot's frame tree at that instant."""
-        colour = self._picture.colour(self._render_colour(query_object))
-        grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
-        depth_size = (self.spec.depth_intrinsics().width, self.spec.depth_intrinsics().height)
-        small_grey = grey if depth_size == grey.shape[::-1] else cv2.resize(grey, depth_size)
+    def take(
+        self,
+        query_object: QueryObject,
+        stamp_s: float,
+        frames: FrameTree,
+        *,
+        visual: bool = True,
+        depth: bool = True,
+    ) -> Image:
+        """A picture at the query object's state; `frames` is the robot's frame tree at that instant.
+
+        The arrays of what is not asked for are empty.
+        """
+        colour = self._picture.colour(self._render(query_object, self._colour_camera)) if visual else None
+        grey = _NO_PICTURE if colour is None else _grey(colour)
         return Image(
             stamp_s=stamp_s,
             source=self.spec.name,
@@ -52,7 +66,7 @@ class Camera:
             depth_intrinsics=self.spec.depth_intrinsics(),
             colour=colour if self.spec.colour else None,
             grey=grey,
-            depth_m=self._depth.depth(self._render_depth(query_object), np.asarray(small_grey, dtype=np.uint8)),
+            depth_m=self._take_depth(query_object, grey) if depth else _NO_DEPTH,
             frames=frames,
         )
 
@@ -64,12 +78,20 @@ class Camera:
         """Go on from such a state."""
         restore_rng(self._rng, state["rng"])
 
-    def _render_colour(self, query_object: QueryObject) -> NDArray[np.uint8]:
+    def _take_depth(self, query_object: QueryObject, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Noisy depth; where no picture was taken, a small one shows what is too dark or too shiny."""
+        lens = self.spec.depth_intrinsics()
+        seen = grey if grey.size else _grey(self._render(query_object, self._faint_camera))
+        small = seen if seen.shape == (lens.height, lens.width) else cv2.resize(seen, (lens.width, lens.height))
+        image = query_object.RenderDepthImage(self._depth_camera, self._link_frame, self._X_LC)
+        clean_m = np.asarray(image.data[..., 0], dtype=np.float32)  # 0 or infinite out of range
+        return self._depth.depth(clean_m, np.asarray(small, dtype=np.uint8))
+
+    def _render(self, query_object: QueryObject, camera: ColorRenderCamera) -> NDArray[np.uint8]:
         """The clean picture (H, W, 3) RGB."""
-        image = query_object.RenderColorImage(self._colour_camera, self._link_frame, self._X_LC)
+        image = query_object.RenderColorImage(camera, self._link_frame, self._X_LC)
         return np.ascontiguousarray(image.data[..., :3])
 
-    def _render_depth(self, query_object: QueryObject) -> NDArray[np.float32]:
-        """The clean depth (H, W) in metres, 0 or infinite out of range."""
-        image = query_object.RenderDepthImage(self._depth_camera, self._link_frame, self._X_LC)
-        return np.asarray(image.data[..., 0], dtype=np.float32)
+
+def _grey(colour: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)

@@ -64,13 +64,13 @@ class CameraSpec(BaseModel):
 
     def intrinsics(self) -> Intrinsics:
         """Intrinsics of the picture."""
-        return self._shrunk(self.picture_shrink)
+        return self.shrunk(self.picture_shrink)
 
     def depth_intrinsics(self) -> Intrinsics:
         """Intrinsics of the depth."""
-        return self._shrunk(self.depth_shrink)
+        return self.shrunk(self.depth_shrink)
 
-    def _shrunk(self, factor: int) -> Intrinsics:
+    def shrunk(self, factor: int) -> Intrinsics:
         """The same view with 1 / factor of the pixels on each side."""
         return Intrinsics(
             width=self.width // factor,

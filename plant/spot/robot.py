@@ -91,9 +91,9 @@ class SpotRobot:
         """Latest LiDAR revolution, None before the first."""
         return self._sensors.scan()
 
-    def image(self, source: str) -> Image:
-        """Take a picture now. Raises ValueError for an unknown source."""
-        return self._sensors.image(source)
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
+        """Take a picture with depth now, or only one of the two. Raises ValueError for an unknown source."""
+        return self._sensors.image(source, visual=visual, depth=depth)
 
     def joints(self) -> Joints:
         """Latest joint state."""

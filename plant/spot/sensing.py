@@ -173,14 +173,19 @@ class SpotSensors:
         """Latest battery state."""
         return self._battery
 
-    def image(self, source: str) -> Image:
-        """Take a picture now. Raises ValueError for an unknown source, LookupError when nothing is rendered."""
+    def image(self, source: str, *, visual: bool, depth: bool) -> Image:
+        """Render a picture, its depth, or both.
+
+        Raises:
+            ValueError: the source is unknown.
+            LookupError: nothing is rendered.
+        """
         if source not in self._cameras:
             raise ValueError(f"{self._model.name} has no camera {source!r}; it has {', '.join(self._cameras)}")
         if self._scene is None:
             raise LookupError("nothing is rendered: build the Diagram with render=True")
         query = self._scene.query_at(self._model.plant.GetPositions(self._context))
-        return self._cameras[source].take(query, self._now_s, self._frames())
+        return self._cameras[source].take(query, self._now_s, self._frames(), visual=visual, depth=depth)
 
     def _frames(self) -> FrameTree:
         """The frame tree from odometry and joint encoders."""

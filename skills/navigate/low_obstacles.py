@@ -61,7 +61,7 @@ class LowObstacleWatch:
 
     def _look(self, source: str) -> tuple[FloatArray, float]:
         """Low points (N, 3) in odom and the picture's stamp."""
-        image = self._context.robot.image(source)
+        image = self._context.robot.image(source, visual=False)
         return low_points(image, self._options), image.stamp_s
 
 

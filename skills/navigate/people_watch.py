@@ -117,7 +117,7 @@ class PeopleWatch:
 
     def _look(self, sources: Sequence[str], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
         """People in one picture of each camera."""
-        images = [self._context.robot.image(source) for source in sources]
+        images = [self._context.robot.image(source, depth=False) for source in sources]
         found = seen_in_grey(self._context.detector, images)
         pairs = [(image, one) for image, ones in zip(images, found, strict=True) for one in ones]
         seen = [self._placed(image, one, X_WO, here_W) for image, one in pairs]
@@ -127,7 +127,8 @@ class PeopleWatch:
         """Where a detected person is; None for other things, and for people out of the reach of depth."""
         if one.class_name != PERSON or one.score < self._options.least_score:
             return None
-        position = position_of(image, one)
+        depth_m = self._context.robot.image(image.source, visual=False).depth_m
+        position = position_of(replace(image, depth_m=depth_m), one)
         if position is None:
             return None
         p_OC = image.frames.pose(image.camera_frame).translation()

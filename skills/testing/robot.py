@@ -164,8 +164,8 @@ class ScriptedRobot:
             self._scan = sweep(self.blocks, self._X_WB(), self._X_OB(), now_s, self._rng)
         return self._scan
 
-    def image(self, source: str) -> Image:
-        """Take a picture now. Raises ValueError for an unknown source."""
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
+        """Take a picture with depth now, whichever is asked for. Raises ValueError for an unknown source."""
         self.calls.append("image")
         if source not in self._capabilities.camera_sources:
             raise ValueError(f"{self._name} has no camera '{source}'; it has {self._capabilities.camera_sources}")

@@ -190,17 +190,17 @@ class RoomRobot(ScriptedRobot):
         self._degrade = PictureDegrader(rng, lens.height, lens.width, PictureNoise())
         self._degrade_depth = DepthDegrader(rng, lens, self._spec.depth_range_m, DepthNoise())
 
-    def image(self, source: str) -> Image:
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """A rendered picture."""
         edges = {"body": ("odom", self._X_OB()), "hand": ("body", self.arm.X_BH(self.q_rad))}
         frames = FrameTree({**edges, "hand_camera": ("hand", self._spec.X_link_camera())})
         lens = self._spec.intrinsics()
         view = View("hand", self._X_WO @ frames.pose("hand_camera"), lens, False, False)
-        clean, labels, depth = self._stage.seen(view, self._spec.depth_range_m)
+        clean, labels, depth_m = self._stage.seen(view, self._spec.depth_range_m)
         self._boxes.latest = tuple(truth.detection for truth in truths(self._stage, labels, view) if well_seen(truth))
         colour = self._degrade.colour(clean)
         grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
-        stamp_s, noisy = self._clock.now(), self._degrade_depth.depth(depth, grey)
+        stamp_s, noisy = self._clock.now(), self._degrade_depth.depth(depth_m, grey)
         return Image(stamp_s, source, "hand_camera", lens, lens, colour, grey, noisy, frames)
 
 

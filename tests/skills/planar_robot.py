@@ -127,7 +127,7 @@ class PlanarRobot:
     def scan(self) -> Scan | None:
         return self._scan
 
-    def image(self, source: str) -> Image:
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         if source not in self._cameras:
             raise ValueError(f"no camera {source!r}")
         self.images_taken += 1
@@ -135,8 +135,8 @@ class PlanarRobot:
         rays_C = np.stack([(u - LENS.cx) / LENS.fx, (v - LENS.cy) / LENS.fy, np.ones_like(u, dtype=float)], axis=-1)
         X_WC = self.pose.transform(BODY_HEIGHT_M) @ X_BC
         rays_W = rays_C.reshape(-1, 3) @ X_WC.rotation().matrix().T
-        depth = cast_rays(X_WC.translation(), np.ascontiguousarray(rays_W), block_array(self.boxes), 4.0)[0]
-        depth = np.nan_to_num(depth + 0.005 * self._rng.standard_normal(depth.shape), nan=0.0)
+        depth_m = cast_rays(X_WC.translation(), np.ascontiguousarray(rays_W), block_array(self.boxes), 4.0)[0]
+        depth_m = np.nan_to_num(depth_m + 0.005 * self._rng.standard_normal(depth_m.shape), nan=0.0)
         grey = np.zeros((LENS.height, LENS.width), dtype=np.uint8)
         frames = FrameTree({"body": ("odom", self.odometry().X_OB), f"{source}_camera": ("body", X_BC)})
         return Image(
@@ -147,7 +147,7 @@ class PlanarRobot:
             LENS,
             None,
             grey,
-            depth.reshape(grey.shape).astype(np.float32),
+            depth_m.reshape(grey.shape).astype(np.float32),
             frames,
         )
 

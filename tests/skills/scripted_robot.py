@@ -78,7 +78,7 @@ class ScriptedRobot:
     def scan(self):
         return self.scan_now
 
-    def image(self, source):
+    def image(self, source, *, visual=True, depth=True):
         hand = MODEL.X_BH(self.q)
         frames = FrameTree(
             {

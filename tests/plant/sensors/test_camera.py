@@ -202,3 +202,22 @@ def test_broken_yaml_is_refused_with_its_line(tmp_path):
     path.write_text("hand: {link: arm_wr1\nleft: {")
     with pytest.raises(ValueError, match=r"cameras\.yaml:2: not valid YAML"):
         load_cameras(path)
+
+
+def test_only_what_is_asked_for_is_rendered():
+    scene = Scene(BODY_BOX_CENTRES_B["left"])
+    camera = scene.camera("left")
+    visual = camera.take(scene.query, 1.0, FrameTree({}), depth=False)
+    assert (visual.grey.shape, visual.depth_m.shape) == ((240, 320), (0, 0))
+    depth = camera.take(scene.query, 1.0, FrameTree({}), visual=False)
+    assert (depth.grey.shape, depth.colour, depth.depth_m.shape) == ((0, 0), None, (120, 160))
+
+
+def test_depth_alone_is_lost_on_the_same_dark_spots_as_with_a_picture():
+    scene, dark = Scene(BODY_BOX_CENTRES_B["left"]), DepthNoise(sigma_m=0.0, sigma_per_m=0.0, speck=0.0, dark=75.0)
+    camera = scene.camera("left", depth_noise=dark)
+    both = [camera.take(scene.query, 1.0, FrameTree({})).depth_m == 0.0 for _ in range(20)]
+    alone = [camera.take(scene.query, 1.0, FrameTree({}), visual=False).depth_m == 0.0 for _ in range(20)]
+    assert np.mean(np.abs(np.mean(both, axis=0) - np.mean(alone, axis=0)) > 0.4) < 0.02
+    clear = scene.take("left", depth_noise=QUIET).depth_m == 0.0
+    assert np.mean(alone) > 1.02 * np.mean(clear)

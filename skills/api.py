@@ -164,6 +164,14 @@ class ForgettingCostmap(Protocol):
         """Forget all that was seen and not surveyed; the number of cells that were blocked by it."""
 
 
+@runtime_checkable
+class LayeredView(Protocol):
+    """A costmap that tells what is seen and not surveyed."""
+
+    def seen_m(self) -> NDArray[np.float64]:
+        """Centres (N, 2) of the cells that are blocked by something seen that the map does not explain."""
+
+
 class Job(Protocol[ResultT_co]):
     """Work under way in the Worker."""
 

@@ -33,8 +33,6 @@ from skills.robot import Pose2D
 
 UNSURE_SIGMA = (0.5, 0.5, 0.3)
 UNSURE_RADIUS_M = 4.0
-LIFT_KG = 5.0
-"""What Spot's arm lifts continuously at half a metre, by its data sheet."""
 
 
 def simulate(world: World, *, seed: int, robot_name: str, record: bool) -> Simulation:
@@ -114,7 +112,9 @@ def itinerary_of(world: World) -> PlannedWays:
 def abilities_of() -> Abilities:
     """What the robot can lift, and what the things weigh that there are models of."""
     masses = {name: _mass_kg(one.path()) for name, one in load_catalogue().items() if one.file is not None}
-    return Abilities(masses, LIFT_KG, frozenset(shared_detector().class_names), known_attributes())
+    arm = spot_capabilities().arm
+    lift_kg = 0.0 if arm is None else arm.max_payload_kg
+    return Abilities(masses, lift_kg, frozenset(shared_detector().class_names), known_attributes())
 
 
 def _mass_kg(sdf: Path) -> float:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from plant.models.spot.description import LEGS, spot_facts, spot_urdf
+from plant.sensors.camera_spec import CameraSpec, load_cameras
 from plant.spot.model import JAW
-from skills.robot import ArmCapabilities, Capabilities, FloatArray, GripperCapabilities
+from plant.spot.sensing import CAMERAS
+from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities
 
 
 def nominal_footholds() -> FloatArray:
@@ -20,6 +23,7 @@ def nominal_footholds() -> FloatArray:
     return np.array([[sx * x, sy * y] for sx, sy in (signs[leg] for leg in LEGS)], dtype=np.float64)
 
 
+@cache
 def spot_capabilities() -> Capabilities:
     """Spot's capabilities, from the facts."""
     facts = spot_facts()
@@ -32,10 +36,33 @@ def spot_capabilities() -> Capabilities:
         standing_height_m=body["standing_height"],
         height_range_m=tuple(body["height_range"]),
         pitch_range_rad=tuple(body["pitch_range"]),
-        arm=ArmCapabilities(arm_names, body["max_reach"], tuple(facts["stowed"][name] for name in arm_names)),
-        gripper=GripperCapabilities(
-            JAW, gripper["open"], gripper["max_opening"], gripper["max_force"], gripper["depth"]
+        arm=ArmCapabilities(
+            arm_names,
+            body["max_reach"],
+            tuple(facts["stowed"][name] for name in arm_names),
+            body["max_payload"],
         ),
-        camera_sources=("hand", "frontleft", "frontright", "left", "right", "back"),
+        gripper=GripperCapabilities(
+            joint_name=JAW,
+            open_rad=gripper["open"],
+            max_opening_m=gripper["max_opening"],
+            max_force_n=gripper["max_force"],
+            depth_m=gripper["depth"],
+            **{f"{name}_m": value for name, value in gripper["in_hand"].items()},
+        ),
+        cameras=_cameras(),
         description=spot_urdf(),
     )
+
+
+def _cameras() -> tuple[CameraCapabilities, ...]:
+    """All cameras; those on the body with the direction of their optical axes."""
+    return tuple(
+        CameraCapabilities(name, on_hand=spec.link != "body", heading_rad=_heading_rad(spec))
+        for name, spec in load_cameras(CAMERAS).items()
+    )
+
+
+def _heading_rad(spec: CameraSpec) -> float:
+    axis = spec.X_link_camera().rotation().matrix()[:, 2]
+    return float(np.arctan2(axis[1], axis[0])) if spec.link == "body" else 0.0

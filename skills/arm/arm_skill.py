@@ -12,7 +12,7 @@ from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel, arm_model
 from skills.arm.motion import plan_joint_path, plan_line, time_path
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
-from skills.robot import ArmTrajectory, FloatArray, Image
+from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Image
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
 
@@ -20,7 +20,6 @@ PLANNING_LATENCY_S = 0.3
 PICTURE_LATENCY_S = 0.1
 SETTLE_S = 0.15
 OLDEST_PICTURE_S = 0.5
-HAND_CAMERA = "hand"
 LINE_SPEED_RAD_S = 0.6
 JAW_FORCE_N = 20.0
 
@@ -132,11 +131,22 @@ class ArmSkill(RoutineSkill[InputsT]):
         yield from self.move_straight(self.model.X_BH(self.q_rad()).translation() + offset_B, message)
 
     @property
-    def open_rad(self) -> float:
-        """How far the jaw opens."""
+    def gripper(self) -> GripperCapabilities:
+        """The gripper's geometry and limits. Raises SkillFailure with cause PRECONDITION when there is none."""
         gripper = self.context.robot.capabilities().gripper
-        assert gripper is not None
-        return gripper.open_rad
+        if gripper is None:
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no gripper")
+        return gripper
+
+    @property
+    def open_rad(self) -> float:
+        """How far the gripper opens."""
+        return self.gripper.open_rad
+
+    @property
+    def p_HT(self) -> FloatArray:
+        """Where the middle of what the gripper holds is in the hand frame (3,), m."""
+        return np.array([self.gripper.grip_x_m, 0.0, 0.0])
 
     def clear_view(self, message: str) -> Routine[None]:
         """Open an empty jaw, which else stands before the hand camera."""
@@ -160,8 +170,11 @@ class ArmSkill(RoutineSkill[InputsT]):
         """
         yield from self.pause(SETTLE_S, message)
         robot, asked_s = self.context.robot, self.context.clock.now()
+        source = robot.capabilities().hand_camera
+        if source is None:
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on its hand")
         image = yield from self.compute(
-            lambda: robot.image(HAND_CAMERA), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
+            lambda: robot.image(source), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
         )
         if image.stamp_s < asked_s - OLDEST_PICTURE_S:
             age_s = asked_s - image.stamp_s

@@ -14,29 +14,13 @@ import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.robot import FloatArray
+from skills.robot import FloatArray, GripperCapabilities
 
 _ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M = 0.009, 0.006
 _LEAST_GRIP_M = 0.014
 _LEAST_BEYOND_M = 0.004
-
-
-@dataclass(frozen=True)
-class JawGeometry:
-    """The gripper in the hand frame, m: palm at palm_x, fingertips at tip_x, inner face of the fixed jaw at fixed_z.
-
-    The tips are 2 half_breadth wide along y and tip_thickness thick; `clearance` is left beside the fixed jaw,
-    `low_clearance` beside things that lie low, since a jaw that comes down on top of one is stopped by it.
-    """
-
-    palm_x: float = 0.142
-    tip_x: float = 0.250
-    fixed_z: float = -0.038
-    clearance: float = 0.010
-    low_clearance: float = 0.017
-    half_breadth: float = 0.030
-    tip_thickness: float = 0.015
-    max_width: float = 0.115
+_BESIDE_FIXED_M, _BESIDE_FIXED_LOW_M = 0.010, 0.017
+"""Room beside the fixed finger; more beside what lies low, since a finger that comes down on top of it is stopped."""
 
 
 @dataclass(frozen=True)
@@ -83,15 +67,14 @@ class _Placement:
     cost: float
 
 
-def grasp_candidates(target: Target, p_BS: FloatArray, jaw: JawGeometry | None = None) -> list[GraspCandidate]:
+def grasp_candidates(target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
     """Candidates, the best first; empty when the thing is too wide. p_BS is the shoulder."""
-    jaw = jaw or JawGeometry()
     ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
     placements = _round_placements(target, ahead) if target.round else list(_long_placements(target, ahead))
     tried = [
-        _candidate(target, placement, attitude, side, jaw)
+        _candidate(target, placement, attitude, side, gripper)
         for placement, attitude, side in itertools.product(placements, _attitudes(target), (1.0, -1.0))
-        if placement.width_m < jaw.max_width
+        if placement.width_m < gripper.max_grasp_m
     ]
     found = [candidate for candidate in tried if candidate is not None]
     if not target.upright:
@@ -140,7 +123,7 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
 
 
 def _candidate(
-    target: Target, placement: _Placement, attitude: tuple[float, float], side: float, jaw: JawGeometry
+    target: Target, placement: _Placement, attitude: tuple[float, float], side: float, gripper: GripperCapabilities
 ) -> GraspCandidate | None:
     tilt, lean = attitude
     c, s = np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad)
@@ -150,21 +133,21 @@ def _candidate(
     R_BH = RotationMatrix(AngleAxis(lean, np.array([c, s, 0.0]))) @ upright_hand
     if target.upright:
         height = float(np.clip(0.56 * target.height_m, 0.05, 0.095))
-        depth = jaw.palm_x + placement.half_depth_m + 0.008
+        depth = gripper.palm_x_m + placement.half_depth_m + 0.008
         cost = placement.cost + 0.4 * abs(tilt - np.radians(10.0))
     else:
         height = 0.5 * target.height_m
         down = -R_BH.matrix()[2, 0]
         least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
-        room = height - _tip_drop(R_BH, placement.width_m, jaw)
+        room = height - _tip_drop(R_BH, placement.width_m, gripper)
         above = _above_surface(target.height_m, room - least * down)
         beyond = (room - above) / down
         if beyond < least or height + beyond * down < _LEAST_GRIP_M:
             return None
-        depth = jaw.tip_x - beyond
+        depth = gripper.tip_x_m - beyond
         cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
-    clearance = jaw.clearance if target.upright else jaw.low_clearance
-    p_HT = np.array([depth, 0.0, jaw.fixed_z + clearance + 0.5 * placement.width_m])
+    clearance = _BESIDE_FIXED_M if target.upright else _BESIDE_FIXED_LOW_M
+    p_HT = np.array([depth, 0.0, gripper.fixed_z_m + clearance + 0.5 * placement.width_m])
     p_BT = np.array([*placement.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
     return GraspCandidate(X_BH, placement.width_m, float(cost), tilt)
@@ -176,7 +159,7 @@ def _above_surface(height_m: float, spare_m: float) -> float:
     return float(np.clip(spare_m - 1e-6, _LEAST_ABOVE_SURFACE_M, usual))
 
 
-def _tip_drop(R_BH: RotationMatrix, width_m: float, jaw: JawGeometry) -> float:
+def _tip_drop(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities) -> float:
     """How far below the middle of the fingertips their lowest corner lies, for a thing of some width between them."""
-    half = 0.5 * width_m + jaw.low_clearance + jaw.tip_thickness
-    return float(abs(R_BH.matrix()[2, 1]) * jaw.half_breadth + abs(R_BH.matrix()[2, 2]) * half)
+    half = 0.5 * width_m + _BESIDE_FIXED_LOW_M + gripper.tip_thickness_m
+    return float(abs(R_BH.matrix()[2, 1]) * gripper.half_breadth_m + abs(R_BH.matrix()[2, 2]) * half)

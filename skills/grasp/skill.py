@@ -183,7 +183,7 @@ class Grasp(ArmSkill[GraspInputs]):
     def _plan(self, view: CloseView, thing: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         self.boxes = view.boxes
         up_B = view.X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
-        candidates = grasp_candidates(view.target, self.model.p_BS)
+        candidates = grasp_candidates(view.target, self.model.p_BS, self.gripper)
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
             raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the jaw")

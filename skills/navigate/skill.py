@@ -16,8 +16,8 @@ from skills.navigate.low_obstacles import LowObstacleWatch
 from skills.navigate.motion_cost import PlannerOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceKeeper, SpaceOptions, spaced
-from skills.navigate.people_watch import PeopleWatch
 from skills.navigate.planner import PlanningError, problem_of, solve
+from skills.perception.people_watch import PeopleWatch
 from skills.robot import Pose2D
 
 _STILL_THERE_M = 1.0

@@ -21,9 +21,8 @@ from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import free_spots, spots
-from skills.robot import FloatArray, Pose2D
+from skills.robot import FloatArray, GripperCapabilities, Pose2D
 
-HAND_TO_THING_M = 0.185
 ABOVE_M = 0.22
 _SURELY_FREE_M = 0.135
 _LOWEST_M = 0.02
@@ -33,6 +32,8 @@ _RELAX_M = 0.003
 _SEEN_AGAIN_M = 0.12
 _FEEL_S = 0.4
 _OVER_SPOT_M = 0.45
+_TIPS_BEYOND_M = 0.03
+"""The fingertips reach so far below the middle of what is held from above."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ class Place(ArmSkill[PlaceInputs]):
         X_BW = X_WB.inverse()
         tops = [X_BW @ np.array([x, y, view.plane.height_m + ABOVE_M]) for x, y in _by_distance(free, X_WB)]
         self.boxes = [*surface_boxes([surface], X_WB), *cluster_boxes(view.clusters, X_WB)]
-        goal = above_goal(tops, carried)
+        goal = above_goal(tops, carried, self.gripper)
         return (yield from self.move_to(goal, f"bringing the thing over the {surface.name}", speed_rad_s=0.8))
 
     def _lower(self, surface: Surface, q_above_rad: FloatArray) -> Routine[None]:
@@ -209,26 +210,29 @@ class Place(ArmSkill[PlaceInputs]):
 
     def _below_hand_m(self) -> float:
         """Height in B of the thing's middle as it is held."""
-        return float((self.model.X_BH(self.q_rad()) @ np.array([HAND_TO_THING_M, 0.0, 0.0]))[2])
+        return float((self.model.X_BH(self.q_rad()) @ self.p_HT)[2])
 
     def _below_hand_W(self) -> FloatArray:
-        p_BT = self.model.X_BH(self.q_rad()) @ np.array([HAND_TO_THING_M, 0.0, 0.0])
+        p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
         return np.asarray((self.X_WB() @ p_BT)[:2])
 
 
-def above_goal(tops_B: list[FloatArray], carried: RotationMatrix) -> Callable[[ArmScene, FloatArray], FloatArray]:
+def above_goal(
+    tops_B: list[FloatArray], carried: RotationMatrix, gripper: GripperCapabilities
+) -> Callable[[ArmScene, FloatArray], FloatArray]:
     """A goal with the thing above the first of some points that the arm can reach, tilted as fits how it is held.
 
     A thing taken from the side (jaw closing level) keeps its tilt; one taken from above is held below the hand again.
     """
     side = abs(carried.matrix()[2, 2]) < 0.5
+    ahead_m = gripper.grip_x_m if side else gripper.tip_x_m - _TIPS_BEYOND_M
 
     def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
         """Arm angles above the first spot that can be reached and gone down to. Raises PlanningError."""
         for p_BT in tops_B:
             azimuth = math.atan2(p_BT[1] - scene.model.p_BS[1], p_BT[0] - scene.model.p_BS[0])
             for rotation in _side(carried, azimuth) if side else _from_above(azimuth):
-                offset = rotation.matrix() @ np.array([HAND_TO_THING_M if side else 0.22, 0.0, 0.0])
+                offset = rotation.matrix() @ np.array([ahead_m, 0.0, 0.0])
                 for q_above in scene.model.inverse(RigidTransform(rotation, p_BT - offset), margin_rad=0.05):
                     if scene.free(q_above) and _can_lower(scene, q_above):
                         return q_above

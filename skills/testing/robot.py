@@ -14,6 +14,7 @@ from skills.estimate.planar import compose
 from skills.robot import (
     ArmTrajectory,
     Battery,
+    CameraCapabilities,
     Capabilities,
     CommandId,
     CommandState,
@@ -56,7 +57,7 @@ BASE_ONLY = Capabilities(
     pitch_range_rad=(-0.3, 0.3),
     arm=None,
     gripper=None,
-    camera_sources=("frontleft", "frontright"),
+    cameras=(CameraCapabilities("frontleft"), CameraCapabilities("frontright")),
     description="",
 )
 """A body that can go about, with two cameras, and no arm."""

@@ -30,6 +30,7 @@ from skills.testing.detector import PlainColours
 
 CAPABILITIES = spot_capabilities()
 MODEL = arm_model(CAPABILITIES)
+GRIPPER = CAPABILITIES.gripper
 LENS = Intrinsics(64, 48, 55.2, 55.2, 32.0, 24.0)
 
 

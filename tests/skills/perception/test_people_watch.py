@@ -6,14 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar_people import PeopleDetector, person_at
-from planar_robot import Bench
+from planar_robot import Bench, Box
 
-from skills.navigate.people_watch import PeopleOptions, PeopleWatch, SeenPerson, cameras_towards, merged
-from skills.robot import Pose2D
+from skills.perception.people import SeenPerson, merged
+from skills.perception.people_watch import PeopleOptions, PeopleWatch, cameras_towards
+from skills.robot import CameraCapabilities, Pose2D
 
 START = Pose2D(1.5, 5.4, 0.0)
 STILL = np.zeros(3)
-BODY = ("frontleft", "frontright", "left", "right", "back")
+HEADINGS_RAD = {"frontleft": -0.58, "frontright": 0.58, "left": 1.57, "right": -1.57, "back": 3.14}
+BODY = tuple(CameraCapabilities(name, heading_rad=heading) for name, heading in HEADINGS_RAD.items())
 
 
 def watched(*people, detector_changes=None, seconds=2.0, cameras=True):
@@ -39,11 +41,26 @@ def test_a_person_is_placed_in_the_world(distance_m):
     assert np.all(np.linalg.eigvalsh(person.covariance) > 0.0)
 
 
-def test_both_front_cameras_are_looked_through_at_once_about_twice_a_second():
-    bench, detector, _ = watched(seconds=4.0)
+# what stands there    looks in 4 s
+@pytest.mark.parametrize(
+    ("unmapped", "least", "most"),
+    [((), 2, 3), ((Box(4.0, 5.2, 4.3, 5.5, 0.0, 0.8),), 6, 9)],
+    ids=["nothing but what the map explains", "something that the map does not explain"],
+)
+def test_both_front_cameras_are_looked_through_more_often_while_something_unexplained_is_near(unmapped, least, most):
+    bench = Bench(START, unmapped=unmapped)
+    detector = PeopleDetector(bench, [])
+    look(bench, PeopleWatch(replace(bench.context(), detector=detector)), 4.0)
     assert set(detector.pictures) == {2}
-    assert 6 <= len(detector.pictures) <= 9
+    assert least <= len(detector.pictures) <= most
     assert bench.worker.names.count("look for people") == len(detector.pictures)
+
+
+def test_depth_is_asked_for_only_when_somebody_is_seen():
+    bench, detector, _ = watched(seconds=4.0)
+    assert bench.robot.images_taken == sum(detector.pictures)
+    bench, detector, _ = watched(person_at(3.5, 5.5), seconds=4.0)
+    assert bench.robot.images_taken > sum(detector.pictures)
 
 
 def test_a_person_counts_when_seen_twice_and_the_second_look_comes_soon():
@@ -135,7 +152,7 @@ def test_cameras_look_where_the_robot_goes(velocity, expected):
 
 
 def test_cameras_that_are_not_there_are_not_asked():
-    assert cameras_towards(np.array([-0.3, 0.0, 0.0]), ("frontleft",)) == ()
+    assert cameras_towards(np.array([-0.3, 0.0, 0.0]), BODY[:1]) == ()
 
 
 def seen(x, y, stamp_s, looks=1):

@@ -10,14 +10,14 @@ from typing import Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Detection, Job, SkillContext
+from skills.api import Detection, Job, LayeredView, SkillContext
 from skills.detect.seeing import seen_in_grey
 from skills.estimate.planar import relative
+from skills.perception.people import SeenPerson, merged
 from skills.perception.position import position_of
-from skills.robot import FloatArray, Image, Pose2D
+from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
 
-__all__ = ["PEOPLE_TOPIC", "PeopleOptions", "PeopleWatch", "SeenPerson", "cameras_towards"]
-
+__all__ = ["PEOPLE_TOPIC", "PeopleOptions", "PeopleWatch", "cameras_towards"]
 
 PEOPLE_TOPIC: Final = "people"
 PERSON: Final = "person"
@@ -30,14 +30,18 @@ _SAME_YAW_RAD: Final = 0.05
 
 @dataclass(frozen=True)
 class PeopleOptions:
-    """How often is looked (s), how late the answer comes (s), and what counts as a person.
+    """How often the watch looks (s), how late the answer comes (s), and what counts as a person.
 
+    It looks every `period_s` while somebody may be near: the costmap shows something within `near_m` that the map does
+    not explain, or somebody is known. It looks every `idle_s` otherwise.
     A person counts once seen twice within `same_m`, at least `least_score` sure; a second look follows the first after
     `again_s`. Who should be in a picture and is not for `misses` times has gone. Who is out of all pictures is
     remembered for `memory_s`, and for `beside_s` as long as the costmap knows something within `beside_m` of the place.
     """
 
     period_s: float = 0.5
+    idle_s: float = 2.0
+    near_m: float = 5.0
     again_s: float = 0.2
     latency_s: float = 0.15
     least_score: float = 0.5
@@ -47,22 +51,6 @@ class PeopleOptions:
     memory_s: float = 2.0
     beside_s: float = 10.0
     beside_m: float = 0.5
-
-
-@dataclass(frozen=True)
-class SeenPerson:
-    """Somebody seen: the upright axis (x, y) in the world (m), its covariance (2, 2), when last and how often.
-
-    `here_W` is where the robot was then, and `missed` how many looks since then should have shown them.
-    """
-
-    place_W: tuple[float, float]
-    covariance: FloatArray
-    score: float
-    stamp_s: float
-    here_W: Pose2D
-    looks: int = 1
-    missed: int = 0
 
 
 @dataclass(frozen=True)
@@ -90,8 +78,9 @@ class PeopleWatch:
         self._context = context
         self._options = options or PeopleOptions()
         knows = PERSON in context.detector.class_names
-        self._cameras = context.robot.capabilities().camera_sources if knows else ()
-        self._next_s = -math.inf
+        self._cameras = context.robot.capabilities().body_cameras if knows else ()
+        self._looked_s = -math.inf
+        self._soon = False
         self._job: Job[_Look] | None = None
         self._seen: tuple[SeenPerson, ...] = ()
 
@@ -108,12 +97,26 @@ class PeopleWatch:
             return
         now_s = self._context.clock.now()
         sources = cameras_towards(velocity, self._cameras)
-        if sources and now_s >= self._next_s:
-            self._next_s = now_s + self._options.period_s
+        if sources and now_s >= self._looked_s + self._period_s():
+            self._looked_s, self._soon = now_s, False
             X_WO, here_W = self._context.localiser.estimate().X_WO, self._context.pose()
             self._job = self._context.worker.submit(
                 lambda: self._look(sources, X_WO, here_W), latency_s=self._options.latency_s, name="look for people"
             )
+
+    def _period_s(self) -> float:
+        """How long after the last look the next one follows (s)."""
+        options = self._options
+        if self._soon:
+            return options.again_s
+        return options.period_s if self._seen or self._something_near() else options.idle_s
+
+    def _something_near(self) -> bool:
+        """Whether something stands near that the map does not explain; True where the costmap cannot tell."""
+        costmap, here = self._context.costmap, self._context.pose()
+        if not isinstance(costmap, LayeredView):
+            return True
+        return bool(np.any(np.linalg.norm(costmap.seen_m() - (here.x_m, here.y_m), axis=1) < self._options.near_m))
 
     def _look(self, sources: Sequence[str], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
         """People in one picture of each camera."""
@@ -147,8 +150,7 @@ class PeopleWatch:
             self._seen = merged(self._seen, one, self._options.same_m)
         self._seen = tuple(self._missed(one, look, stamp_s) for one in self._seen)
         self._seen = tuple(one for one in self._seen if self._remembered(one))
-        if any(one.looks == 1 for one in self._seen):
-            self._next_s = min(self._next_s, self._context.clock.now() + self._options.again_s)
+        self._soon = any(one.looks == 1 for one in self._seen)
         if look.found or before:
             self._context.publish(PEOPLE_TOPIC, self._message())
 
@@ -192,25 +194,12 @@ def _inside(image: Image, X_WO: RigidTransform, points_W: FloatArray, reach_m: f
     return bool(np.any(inside & (p_C[2] > _NEAREST_M) & (p_C[2] < reach_m)))
 
 
-def merged(known: Sequence[SeenPerson], new: SeenPerson, same_m: float) -> tuple[SeenPerson, ...]:
-    """What is known with somebody seen anew: in the place of the nearest within same_m, or as one more.
-
-    The newer place counts: people walk. Two cameras that see one person at once count as one look.
-    """
-    near = [one for one in known if math.dist(one.place_W, new.place_W) <= same_m]
-    if not near:
-        return (*known, new)
-    old = min(near, key=lambda one: math.dist(one.place_W, new.place_W))
-    again = old.looks + (new.stamp_s > old.stamp_s)
-    return tuple(replace(new, looks=again) if one is old else one for one in known)
-
-
-def cameras_towards(velocity: FloatArray, known: Sequence[str]) -> tuple[str, ...]:
-    """The cameras that look where a body-frame velocity leads; those ahead when the robot stands or turns."""
+def cameras_towards(velocity: FloatArray, known: Sequence[CameraCapabilities]) -> tuple[str, ...]:
+    """The body cameras that look where a body-frame velocity leads; those ahead when the robot stands or turns."""
     vx, vy = float(velocity[0]), float(velocity[1])
-    sources: tuple[str, ...] = ("frontleft", "frontright")
+    heading_rad = 0.0
     if abs(vy) > 2.0 * abs(vx):
-        sources = ("left",) if vy > 0.0 else ("right",)
+        heading_rad = math.copysign(math.pi / 2, vy)
     elif vx < 0.0:
-        sources = ("back",)
-    return tuple(source for source in sources if source in known)
+        heading_rad = math.pi
+    return tuple(camera.source for camera in known if camera.looks_towards(heading_rad))

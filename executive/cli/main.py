@@ -20,9 +20,12 @@ from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Request
 from executive.cli.shown import control_for, show_files, show_run
+from executive.cli.stack_command import STACK
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.language.questions import QuestionPolicy
+from executive.mission.stack_file import load_stack
 from executive.store.missions import MissionStore
+from skills.stack import RobotStack
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]
@@ -52,6 +55,7 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
     store: Store = None,
+    stack: STACK = None,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
     view_port: Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0 takes a free one.")] = 0,
@@ -77,6 +81,7 @@ def run(
             quiet=quiet,
             console=console,
             page=page_of,
+            stack=load_stack(stack),
         )
     if as_json:
         print_json(finished.report.to_json())
@@ -124,7 +129,16 @@ def evaluate(
 
 
 def _run_kept(
-    asked: Asked, seed: int, out: Path, store: Path, *, record: bool, quiet: bool, console: Console, page: PageOf
+    asked: Asked,
+    seed: int,
+    out: Path,
+    store: Path,
+    *,
+    record: bool,
+    quiet: bool,
+    console: Console,
+    page: PageOf,
+    stack: RobotStack,
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
     request = asked.request()
@@ -140,7 +154,15 @@ def _run_kept(
             control = control_for(console, quiet=quiet) if shown is None else shown.control
             durable = new_run(missions, mission)
             start = partial(
-                run_request, request, compiled, seed=seed, out=out, record=record, page=shown, durable=durable
+                run_request,
+                request,
+                compiled,
+                seed=seed,
+                out=out,
+                record=record,
+                page=shown,
+                durable=durable,
+                stack=stack,
             )
             talk = None if shown is None else shown.conversation
             finished = show_run(start, request, compiled, console, control=control, quiet=quiet, conversation=talk)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -16,11 +17,11 @@ from skills.arm.arm_skill import ArmSkill
 from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
-from skills.grasp.candidates import Target, grasp_candidates
+from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.planning import within_reach
 from skills.grasp.posture import body_height_m
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.robot import GripperCapabilities, Pose2D
+from skills.robot import Pose2D
 
 POSITION_TOLERANCE_M = 0.06
 YAW_TOLERANCE_RAD = 0.08
@@ -104,20 +105,24 @@ class Approach(ArmSkill[ApproachInputs]):
 
     def _reach_cost(self, seen: ObjectObservation) -> Callable[[Pose2D], float | None]:
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
-        model, gripper = self.model, self.gripper
+        model = self.model
+        candidates = partial(self.context.stack.grasp_planner.candidates, p_BS=model.p_BS, gripper=self.gripper)
         height_m = body_height_m(base_m, self.context.robot.capabilities())
-        return lambda pose: grasp_cost(model, gripper, pose.transform(height_m), seen)
+        return lambda pose: grasp_cost(model, candidates, pose.transform(height_m), seen)
 
 
 def grasp_cost(
-    model: ArmModel, gripper: GripperCapabilities, X_WB: RigidTransform, seen: ObjectObservation
+    model: ArmModel,
+    candidates_of: Callable[[Target], list[GraspCandidate]],
+    X_WB: RigidTransform,
+    seen: ObjectObservation,
 ) -> float | None:
     """Cost of the best grasp of a thing that the arm reaches with the body at X_WB, beyond the best there is.
 
     None when it reaches no grasp.
     """
     up_B = X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
-    candidates = grasp_candidates(observed_target(seen, X_WB), model.p_BS, gripper)
+    candidates = candidates_of(observed_target(seen, X_WB))
     reached = (candidate.cost for candidate in candidates if within_reach(model, candidate, up_B))
     best = next(reached, None)
     return None if best is None else best - candidates[0].cost

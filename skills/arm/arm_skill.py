@@ -10,7 +10,6 @@ from pydrake.math import RigidTransform
 from skills.api import Cause, InputsT, SkillContext
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel, arm_model
-from skills.arm.motion import plan_joint_path, plan_line, time_path
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Image
 
@@ -96,13 +95,14 @@ class ArmSkill(RoutineSkill[InputsT]):
         self._scene.set_jaw(max(0.0, self.context.robot.gripper().opening_rad))
         return self._scene
 
-    def move_to(self, goal: Goal, message: str, speed_rad_s: float = 1.2) -> Routine[FloatArray]:
+    def move_to(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[FloatArray]:
         """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration."""
 
         def plan() -> tuple[ArmTrajectory, FloatArray]:
             scene, start = self.prepared_scene(), self.q_rad()
-            path = plan_joint_path(scene, start, goal(scene, start), self._rng)
-            return time_path(path, speed_rad_s=speed_rad_s, scene=scene), path[-1]
+            planner = self.context.stack.arm_planner
+            path = planner.path(scene, start, goal(scene, start), self._rng)
+            return planner.timed(path, speed_rad_s=speed_rad_s, scene=scene), path[-1]
 
         trajectory, q_goal_rad = yield from self.compute(
             plan, latency_s=PLANNING_LATENCY_S, name="plan arm motion", message=message
@@ -121,7 +121,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         def plan() -> ArmTrajectory:
             q = self.q_rad() if q_from_rad is None else q_from_rad
             X_BH = RigidTransform(self.model.X_BH(q).rotation(), p_BH)
-            return time_path(plan_line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
+            planner = self.context.stack.arm_planner
+            return planner.timed(planner.line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
 
         trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)
         yield from self.follow(trajectory, message)

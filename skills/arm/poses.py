@@ -8,9 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
+from skills.api import PlanningError
 from skills.arm.collision import ArmScene
 from skills.arm.kinematics import ArmModel
-from skills.arm.routine import PlanningError
 from skills.robot import FloatArray
 
 _UP = np.array([0.0, 0.0, 1.0])

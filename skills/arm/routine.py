@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from skills.api import Cause, Failed, InputsT, Running, Skill, SkillContext, Step, Succeeded
+from skills.api import Cause, Failed, InputsT, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.robot import ArmTrajectory, CommandId, CommandState, FloatArray, Pose2D
 
 ResultT = TypeVar("ResultT")
@@ -36,10 +36,6 @@ class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program er
         self.cause = cause
         self.message = message
         self.outputs: Mapping[str, Any] = outputs or {}
-
-
-class PlanningError(Exception):
-    """No way was found; the message is one plain sentence."""
 
 
 @dataclass(frozen=True)

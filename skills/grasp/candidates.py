@@ -19,8 +19,6 @@ from skills.robot import FloatArray, GripperCapabilities
 _ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M = 0.009, 0.006
 _LEAST_GRIP_M = 0.014
 _LEAST_BEYOND_M = 0.004
-_BESIDE_FIXED_M, _BESIDE_FIXED_LOW_M = 0.010, 0.017
-"""Room beside the fixed finger; more beside what lies low, since a finger that comes down on top of it is stopped."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +65,17 @@ class _Placement:
     cost: float
 
 
-def grasp_candidates(target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
-    """Candidates, the best first; empty when the thing is too wide. p_BS is the shoulder."""
+def grasp_candidates(
+    target: Target, p_BS: FloatArray, gripper: GripperCapabilities, beside_m: tuple[float, float] = (0.010, 0.017)
+) -> list[GraspCandidate]:
+    """Candidates, the best first; empty when the thing is too wide. p_BS is the shoulder.
+
+    `beside_m` is left beside the fixed finger, about what stands and about what lies low.
+    """
     ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
     placements = _round_placements(target, ahead) if target.round else list(_long_placements(target, ahead))
     tried = [
-        _candidate(target, placement, attitude, side, gripper)
+        _candidate(target, placement, attitude, side, gripper, beside_m[0 if target.upright else 1])
         for placement, attitude, side in itertools.product(placements, _attitudes(target), (1.0, -1.0))
         if placement.width_m < gripper.max_grasp_m
     ]
@@ -123,7 +126,12 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
 
 
 def _candidate(
-    target: Target, placement: _Placement, attitude: tuple[float, float], side: float, gripper: GripperCapabilities
+    target: Target,
+    placement: _Placement,
+    attitude: tuple[float, float],
+    side: float,
+    gripper: GripperCapabilities,
+    beside_m: float,
 ) -> GraspCandidate | None:
     tilt, lean = attitude
     c, s = np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad)
@@ -139,15 +147,14 @@ def _candidate(
         height = 0.5 * target.height_m
         down = -R_BH.matrix()[2, 0]
         least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
-        room = height - _tip_drop(R_BH, placement.width_m, gripper)
+        room = height - _tip_drop(R_BH, placement.width_m, gripper, beside_m)
         above = _above_surface(target.height_m, room - least * down)
         beyond = (room - above) / down
         if beyond < least or height + beyond * down < _LEAST_GRIP_M:
             return None
         depth = gripper.tip_x_m - beyond
         cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
-    clearance = _BESIDE_FIXED_M if target.upright else _BESIDE_FIXED_LOW_M
-    p_HT = np.array([depth, 0.0, gripper.fixed_z_m + clearance + 0.5 * placement.width_m])
+    p_HT = np.array([depth, 0.0, gripper.fixed_z_m + beside_m + 0.5 * placement.width_m])
     p_BT = np.array([*placement.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
     return GraspCandidate(X_BH, placement.width_m, float(cost), tilt)
@@ -159,7 +166,7 @@ def _above_surface(height_m: float, spare_m: float) -> float:
     return float(np.clip(spare_m - 1e-6, _LEAST_ABOVE_SURFACE_M, usual))
 
 
-def _tip_drop(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities) -> float:
+def _tip_drop(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities, beside_m: float) -> float:
     """How far below the middle of the fingertips their lowest corner lies, for a thing of some width between them."""
-    half = 0.5 * width_m + _BESIDE_FIXED_LOW_M + gripper.tip_thickness_m
+    half = 0.5 * width_m + beside_m + gripper.tip_thickness_m
     return float(abs(R_BH.matrix()[2, 1]) * gripper.half_breadth_m + abs(R_BH.matrix()[2, 2]) * half)

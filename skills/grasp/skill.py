@@ -17,9 +17,9 @@ from skills.arm.poses import carry_configuration, close_viewpoints, look_configu
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.seeing import DETECTION_LATENCY_S, detections_in
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
-from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, plan_grasp
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.posture import body_height_m
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.surface_segmentation import Cluster, SurfaceView, cluster_of, parted, view_surface
@@ -183,19 +183,20 @@ class Grasp(ArmSkill[GraspInputs]):
     def _plan(self, view: CloseView, thing: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         self.boxes = view.boxes
         up_B = view.X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
-        candidates = grasp_candidates(view.target, self.model.p_BS, self.gripper)
+        candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
             raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the jaw")
         opening = 0.9 * self.open_rad
         yield from self.move_gripper(opening, JAW_FORCE_N, "opening the jaw")
 
+        stack = self.context.stack
+
         def plan() -> GraspPlan:
             scene = self.prepared_scene()
             scene.set_jaw(opening)
-            return plan_grasp(
-                scene, self.q_rad(), candidates, Surroundings(view.boxes, view.target_box, up_B), self._rng
-            )
+            around = Surroundings(view.boxes, view.target_box, up_B)
+            return stack.grasp_planner.plan(scene, self.q_rad(), candidates, around, stack.arm_planner, self._rng)
 
         return (
             yield from self.compute(plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}")

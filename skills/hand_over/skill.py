@@ -11,10 +11,10 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.api import Cause, Running, Succeeded
+from skills.api import Cause, PlanningError, Running, Succeeded
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
-from skills.arm.routine import PlanningError, Routine, SkillFailure
+from skills.arm.routine import Routine, SkillFailure
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.people import SeenPerson, people_in_scan

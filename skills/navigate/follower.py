@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,8 +16,9 @@ from skills.robot import FloatArray, Pose2D
 
 @dataclass(frozen=True)
 class FollowerOptions:
-    """Numbers of the follower: speeds (m/s, rad/s), accelerations (m/s^2, rad/s^2), gain (1/s).
+    """Follows a path with brakes for obstacles: speeds (m/s, rad/s), accelerations (m/s^2, rad/s^2), gain (1/s).
 
+    A mission may ask for less than `max_speed_m_s`, and not for more.
     `lead_s` looks ahead for the base's lag; closer than `touch_m` counts as in the way, looked for `look_m` ahead;
     between `near_m` and `wide_m` of clearance the speed falls from full to near_speed_m_s.
     """
@@ -39,6 +40,10 @@ class FollowerOptions:
     creep_m_s: float = 0.04
     lost_path_m: float = 0.35
     period_s: float = 0.05
+
+    def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> PathFollower:
+        """A follower of one path, at most so fast."""
+        return PathFollower(path, footprint, replace(self, max_speed_m_s=min(self.max_speed_m_s, max_speed_m_s)))
 
 
 @dataclass(frozen=True)

@@ -10,18 +10,18 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.api import Cause, Succeeded, Surface
+from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import COMFORTABLE_M, standing_poses
 from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
 from skills.arm.collision import ArmScene
-from skills.arm.motion import plan_line, time_path
 from skills.arm.poses import look_configuration, overview_viewpoints
-from skills.arm.routine import PlanningError, Routine, SkillFailure
+from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import free_spots, spots
 from skills.robot import FloatArray, GripperCapabilities, Pose2D
+from skills.stack import ArmPlanner
 
 ABOVE_M = 0.22
 _SURELY_FREE_M = 0.135
@@ -151,7 +151,7 @@ class Place(ArmSkill[PlaceInputs]):
         X_BW = X_WB.inverse()
         tops = [X_BW @ np.array([x, y, view.plane.height_m + ABOVE_M]) for x, y in _by_distance(free, X_WB)]
         self.boxes = [*surface_boxes([surface], X_WB), *cluster_boxes(view.clusters, X_WB)]
-        goal = above_goal(tops, carried, self.gripper)
+        goal = above_goal(tops, carried, self.gripper, self.context.stack.arm_planner)
         return (yield from self.move_to(goal, f"bringing the thing over the {surface.name}", speed_rad_s=0.8))
 
     def _lower(self, surface: Surface, q_above_rad: FloatArray) -> Routine[None]:
@@ -168,14 +168,15 @@ class Place(ArmSkill[PlaceInputs]):
         X_BH = self.model.X_BH(q_wanted)
         rest_m = float(X_BH.translation()[2]) - self._hand_z()
         lowest_m = surface.height_m + _LOWEST_M - float(self.X_WB().translation()[2])
+        planner = self.context.stack.arm_planner
         while self._below_hand_m() > lowest_m:
             X_BH = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, _STEP_M])
             try:
-                path = plan_line(self.model, q_wanted, X_BH)
+                path = planner.line(self.model, q_wanted, X_BH)
             except PlanningError as error:
                 raise SkillFailure(Cause.PLANNING, str(error)) from error
             q_wanted = path[-1]
-            yield from self.follow(time_path(path, speed_rad_s=0.3), message)
+            yield from self.follow(planner.timed(path, speed_rad_s=0.3), message)
             if self._hand_z() - float(X_BH.translation()[2]) + rest_m > _CONTACT_M:
                 yield from self.try_shift_hand(np.array([0.0, 0.0, _RELAX_M]), message)
                 return
@@ -218,7 +219,7 @@ class Place(ArmSkill[PlaceInputs]):
 
 
 def above_goal(
-    tops_B: list[FloatArray], carried: RotationMatrix, gripper: GripperCapabilities
+    tops_B: list[FloatArray], carried: RotationMatrix, gripper: GripperCapabilities, planner: ArmPlanner
 ) -> Callable[[ArmScene, FloatArray], FloatArray]:
     """A goal with the thing above the first of some points that the arm can reach, tilted as fits how it is held.
 
@@ -234,18 +235,18 @@ def above_goal(
             for rotation in _side(carried, azimuth) if side else _from_above(azimuth):
                 offset = rotation.matrix() @ np.array([ahead_m, 0.0, 0.0])
                 for q_above in scene.model.inverse(RigidTransform(rotation, p_BT - offset), margin_rad=0.05):
-                    if scene.free(q_above) and _can_lower(scene, q_above):
+                    if scene.free(q_above) and _can_lower(scene, q_above, planner):
                         return q_above
         raise PlanningError("no free spot is within the arm's reach")
 
     return goal
 
 
-def _can_lower(scene: ArmScene, q_rad: FloatArray) -> bool:
+def _can_lower(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner) -> bool:
     X_BH = scene.model.X_BH(q_rad)
     lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M - 0.03])
     try:
-        plan_line(scene.model, q_rad, lowered)
+        planner.line(scene.model, q_rad, lowered)
     except PlanningError:
         return False
     return True

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from executive.tree.behaviours.board import Board
 from skills.api import Ask, Costmap, Detector, Localiser, Publish, SkillContext, Worker, nobody_to_ask
 from skills.detection import NO_DETECTOR
 from skills.robot import Clock, Lease, Robot
+from skills.stack import RobotStack, default_stack
 
 
 def leaf_seed(run_seed: int, path_id: str) -> int:
@@ -42,6 +43,7 @@ class RunContext:
     ask: Ask = nobody_to_ask
     detector: Detector = NO_DETECTOR
     stop_pressed: Callable[[], str | None] = never_pressed
+    stack: RobotStack = field(default_factory=default_stack)
 
     def for_skill(self, path_id: str) -> SkillContext:
         """The part of it that a skill may touch."""
@@ -56,4 +58,5 @@ class RunContext:
             seed=leaf_seed(self.seed, path_id),
             ask=self.ask,
             detector=self.detector,
+            stack=self.stack,
         )

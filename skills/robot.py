@@ -108,14 +108,17 @@ class GripperCapabilities:
 
 @dataclass(frozen=True)
 class CameraCapabilities:
-    """One camera: the source that `image` takes, and what carries it, the body or the hand.
-
-    A camera on the body looks `heading_rad` to the left of ahead.
-    """
+    """One camera: the source that `image` takes, what carries it, the body or the hand, and its pose X_FC there."""
 
     source: str
+    X_FC: RigidTransform
     on_hand: bool = False
-    heading_rad: float = 0.0
+
+    @property
+    def heading_rad(self) -> float:
+        """How far to the left of ahead its optical axis points in the frame that carries it."""
+        axis = self.X_FC.rotation().matrix()[:, 2]
+        return math.atan2(axis[1], axis[0])
 
     def looks_towards(self, heading_rad: float, within_rad: float = math.pi / 4) -> bool:
         """Whether the optical axis lies so near to a direction in the body frame."""
@@ -154,9 +157,9 @@ class Capabilities:
         return tuple(camera for camera in self.cameras if not camera.on_hand)
 
     @property
-    def hand_camera(self) -> str | None:
-        """The source of the camera on the hand, None when there is none."""
-        return next((camera.source for camera in self.cameras if camera.on_hand), None)
+    def hand_camera(self) -> CameraCapabilities | None:
+        """The camera on the hand, None when there is none."""
+        return next((camera for camera in self.cameras if camera.on_hand), None)
 
 
 @dataclass(frozen=True)

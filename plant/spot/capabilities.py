@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plant.models.spot.description import LEGS, spot_facts, spot_urdf
-from plant.sensors.camera_spec import CameraSpec, load_cameras
+from plant.sensors.camera_spec import load_cameras
 from plant.spot.model import JAW
 from plant.spot.sensing import CAMERAS
 from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities
@@ -56,13 +56,5 @@ def spot_capabilities() -> Capabilities:
 
 
 def _cameras() -> tuple[CameraCapabilities, ...]:
-    """All cameras; those on the body with the direction of their optical axes."""
-    return tuple(
-        CameraCapabilities(name, on_hand=spec.link != "body", heading_rad=_heading_rad(spec))
-        for name, spec in load_cameras(CAMERAS).items()
-    )
-
-
-def _heading_rad(spec: CameraSpec) -> float:
-    axis = spec.X_link_camera().rotation().matrix()[:, 2]
-    return float(np.arctan2(axis[1], axis[0])) if spec.link == "body" else 0.0
+    cameras = load_cameras(CAMERAS).items()
+    return tuple(CameraCapabilities(name, spec.X_link_camera(), spec.link != "body") for name, spec in cameras)

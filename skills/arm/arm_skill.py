@@ -11,7 +11,7 @@ from skills.api import Cause, InputsT, SkillContext
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel, arm_model
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
-from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Image
+from skills.robot import ArmTrajectory, CameraCapabilities, FloatArray, GripperCapabilities, Image
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
 
@@ -140,6 +140,14 @@ class ArmSkill(RoutineSkill[InputsT]):
         return gripper
 
     @property
+    def hand_camera(self) -> CameraCapabilities:
+        """The camera on the hand. Raises SkillFailure with cause PRECONDITION when there is none."""
+        camera = self.context.robot.capabilities().hand_camera
+        if camera is None:
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on its hand")
+        return camera
+
+    @property
     def open_rad(self) -> float:
         """How far the gripper opens."""
         return self.gripper.open_rad
@@ -171,9 +179,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         """
         yield from self.pause(SETTLE_S, message)
         robot, asked_s = self.context.robot, self.context.clock.now()
-        source = robot.capabilities().hand_camera
-        if source is None:
-            raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on its hand")
+        source = self.hand_camera.source
         image = yield from self.compute(
             lambda: robot.image(source), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
         )
@@ -188,8 +194,3 @@ class ArmSkill(RoutineSkill[InputsT]):
             yield from self.stow("stowing the arm after the failure")
         except SkillFailure:
             return
-
-
-def hand_camera_in_hand(image: Image) -> RigidTransform:
-    """X_HC from a picture's frame tree."""
-    return image.frames.pose(image.camera_frame, "hand")

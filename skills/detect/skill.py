@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, Detection, LocalisationEstimate, ObjectObservation, Running, Succeeded, Surface
-from skills.arm.arm_skill import ArmSkill, hand_camera_in_hand
+from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene
 from skills.arm.poses import close_viewpoints, look_configuration, overview_viewpoints, viewpoints_beside
 from skills.arm.routine import Routine, SkillFailure
@@ -106,16 +106,15 @@ class Detect(ArmSkill[DetectInputs]):
         self._tracker, self._coverage = Tracker(self.context.detector.class_names), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
         self._clusters: list[Cluster] = []
-        X_HC = hand_camera_in_hand((yield from self.picture("looking")))
         blocked: list[SkillFailure] = []
         for k, target in enumerate(targets):
-            yield from self._look_and_confirm(inputs, X_HC, target, blocked)
+            yield from self._look_and_confirm(inputs, target, blocked)
             if self._has_enough(inputs):
                 break
             yield Running(f"looking for {wanted(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
-        yield from self._look_closer(inputs, X_HC)
-        yield from self._look_around(inputs, X_HC)
-        yield from self._refresh(inputs, X_HC)
+        yield from self._look_closer(inputs)
+        yield from self._look_around(inputs)
+        yield from self._refresh(inputs)
         self.context.publish("surfaces_seen", coverage_message(self.context, self._coverage.shares()))
         return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
 
@@ -139,12 +138,12 @@ class Detect(ArmSkill[DetectInputs]):
     def _has_enough(self, inputs: DetectInputs) -> bool:
         return 0 < inputs.count <= len(self._found(inputs))
 
-    def _look_closer(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
+    def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
         """Look from near where the thing is expected, or at what was not named and may be what is wanted."""
         if inputs.expected_W is not None:
             if not self._has_enough(inputs):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
-                yield from self._look_and_confirm(inputs, X_HC, p_BT, [], close=True)
+                yield from self._look_and_confirm(inputs, p_BT, [], close=True)
             return
         for _ in range(_CLOSER_LOOKS):
             left = unnamed(self._clusters, self._tracker.snapshot(), inputs.classes)
@@ -154,27 +153,27 @@ class Detect(ArmSkill[DetectInputs]):
             self._clusters = [c for c in self._clusters if _apart(c.shape.centre, shape.centre) > _LOOKED_AT_M]
             p_BT = self.X_WB().inverse() @ np.array([*shape.centre, base_m + 0.5 * shape.height_m])
             kept, self._clusters = self._clusters, []
-            yield from self._look_and_confirm(inputs, X_HC, p_BT, [], close=True)
+            yield from self._look_and_confirm(inputs, p_BT, [], close=True)
             self._clusters = kept
 
-    def _look_around(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
+    def _look_around(self, inputs: DetectInputs) -> Routine[None]:
         """Look from either side at what something hides."""
         for p_W in self._coverage.hidden_middle_W().values() if inputs.expected_W is None else ():
             for shift_rad in _AROUND_RAD:
                 if self._has_enough(inputs):
                     return
                 p_BT = self.X_WB().inverse() @ p_W
-                yield from self._look_and_confirm(inputs, X_HC, p_BT, [], shift_rad=shift_rad)
+                yield from self._look_and_confirm(inputs, p_BT, [], shift_rad=shift_rad)
 
-    def _refresh(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
+    def _refresh(self, inputs: DetectInputs) -> Routine[None]:
         """Look once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""
         if (track := self._seen_a_while_ago(inputs)) is not None:
-            yield from self._look_and_confirm(inputs, X_HC, self.X_WB().inverse() @ track.position_W, [])
+            yield from self._look_and_confirm(inputs, self.X_WB().inverse() @ track.position_W, [])
         if (track := self._seen_a_while_ago(inputs)) is not None:  # from there it did not show: from where it did
             X_BW = self.X_WB().inverse()
             p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
             viewpoints = [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
-            yield from self._look_if_possible(inputs, X_HC, p_BO, viewpoints)
+            yield from self._look_if_possible(inputs, p_BO, viewpoints)
 
     def _seen_a_while_ago(self, inputs: DetectInputs) -> Track | None:
         """What was found and seen last, unless it was seen just now."""
@@ -184,7 +183,6 @@ class Detect(ArmSkill[DetectInputs]):
     def _look_and_confirm(
         self,
         inputs: DetectInputs,
-        X_HC: RigidTransform,
         p_BT: FloatArray,
         blocked: list[SkillFailure],
         *,
@@ -193,7 +191,7 @@ class Detect(ArmSkill[DetectInputs]):
     ) -> Routine[None]:
         """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
         try:
-            yield from self.look(inputs, X_HC, p_BT, self._viewpoints(p_BT, shift_rad, close=close))
+            yield from self.look(inputs, p_BT, self._viewpoints(p_BT, shift_rad, close=close))
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -202,14 +200,14 @@ class Detect(ArmSkill[DetectInputs]):
         while (track := self._candidate(inputs)) is not None:
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
             p_BO = self.X_WB().inverse() @ track.position_W
-            yield from self._look_if_possible(inputs, X_HC, p_BO, self._confirming(track, tries, close=close))
+            yield from self._look_if_possible(inputs, p_BO, self._confirming(track, tries, close=close))
 
     def _look_if_possible(
-        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray]
+        self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray]
     ) -> Routine[None]:
         """Look at a point, unless the arm cannot."""
         try:
-            yield from self.look(inputs, X_HC, p_BT, viewpoints_B)
+            yield from self.look(inputs, p_BT, viewpoints_B)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -265,7 +263,6 @@ class Detect(ArmSkill[DetectInputs]):
     def look(
         self,
         inputs: DetectInputs,
-        X_HC: RigidTransform,
         p_BT: FloatArray,
         viewpoints_B: Sequence[FloatArray],
     ) -> Routine[Look]:
@@ -273,7 +270,7 @@ class Detect(ArmSkill[DetectInputs]):
         message = f"looking for {wanted(inputs.classes, inputs.attributes)}"
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return look_configuration(scene, X_HC, viewpoints_B, p_BT, q)
+            return look_configuration(scene, self.hand_camera.X_FC, viewpoints_B, p_BT, q)
 
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)

@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, LocalisationEstimate, ObjectObservation, Succeeded, Surface
-from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
+from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.poses import carry_configuration, close_viewpoints, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
@@ -158,7 +158,7 @@ class Grasp(ArmSkill[GraspInputs]):
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
         surface = _square(seen.position_W, base_m, seen.surface or "surface")
         self.boxes = surface_boxes([_square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
-        X_HC = hand_camera_in_hand((yield from self.picture(message)))
+        X_HC = self.hand_camera.X_FC
         p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import COMFORTABLE_M, standing_poses
-from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
+from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene
 from skills.arm.poses import look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
@@ -124,7 +124,7 @@ class Place(ArmSkill[PlaceInputs]):
         message = f"looking for a free spot on the {surface.name}"
         X_WB = self.X_WB()
         self.boxes = surface_boxes([surface], X_WB)
-        X_HC = hand_camera_in_hand((yield from self.picture(message)))
+        X_HC = self.hand_camera.X_FC
         p_BT = X_WB.inverse() @ np.array([spot_W[0], spot_W[1], surface.height_m])
         low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
 

@@ -14,7 +14,6 @@ from skills.estimate.planar import compose
 from skills.robot import (
     ArmTrajectory,
     Battery,
-    CameraCapabilities,
     Capabilities,
     CommandId,
     CommandState,
@@ -34,7 +33,7 @@ from skills.robot import (
 from skills.testing.blocks import Block, can_at
 from skills.testing.clock import VirtualClock
 from skills.testing.commands import Commands
-from skills.testing.sensing import CAMERAS, picture, sweep
+from skills.testing.sensing import FRONT_CAMERAS, mount_of, picture, sweep
 
 _ACCELERATION_M_S2 = 2.5
 _BRAKING_M_S2 = 8.0
@@ -57,7 +56,7 @@ BASE_ONLY = Capabilities(
     pitch_range_rad=(-0.3, 0.3),
     arm=None,
     gripper=None,
-    cameras=(CameraCapabilities("frontleft"), CameraCapabilities("frontright")),
+    cameras=FRONT_CAMERAS,
     description="",
 )
 """A body that can go about, with two cameras, and no arm."""
@@ -168,9 +167,10 @@ class ScriptedRobot:
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Take a picture with depth now, whichever is asked for. Raises ValueError for an unknown source."""
         self.calls.append("image")
-        if source not in self._capabilities.camera_sources:
+        camera = next((each for each in self._capabilities.cameras if each.source == source), None)
+        if camera is None:
             raise ValueError(f"{self._name} has no camera '{source}'; it has {self._capabilities.camera_sources}")
-        mount = CAMERAS[source]
+        mount = mount_of(camera)
         X_BF = self.arm.X_BH(self.q_rad) if mount.frame == "hand" else RigidTransform()
         edges = {"body": ("odom", self._X_OB())}
         if self._capabilities.arm is not None:

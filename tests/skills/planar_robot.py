@@ -105,7 +105,7 @@ class PlanarRobot:
         self.scale_drift, self.yaw_drift_rad_per_m = 1.01, math.radians(0.3)
         self._rng = np.random.default_rng(seed)
         self._azimuths = np.linspace(-math.pi, math.pi, azimuths, endpoint=False)
-        self._cameras = (CameraCapabilities("frontleft"), CameraCapabilities("frontright")) if cameras else ()
+        self._cameras = tuple(CameraCapabilities(name, X_BC) for name in ("frontleft", "frontright")) if cameras else ()
         self._scan: Scan | None = None
         self._lease = Lease(self.name, "", 0)
         self._commands: dict[CommandId, CommandStatus] = {}

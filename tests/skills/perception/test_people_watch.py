@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from planar_people import PeopleDetector, person_at
 from planar_robot import Bench, Box
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.perception.people import SeenPerson, merged
 from skills.perception.people_watch import PeopleOptions, PeopleWatch, cameras_towards
@@ -14,8 +15,16 @@ from skills.robot import CameraCapabilities, Pose2D
 
 START = Pose2D(1.5, 5.4, 0.0)
 STILL = np.zeros(3)
+
+
+def looking(heading_rad):
+    """A level camera that looks that far to the left of ahead."""
+    ahead = RotationMatrix(RollPitchYaw(-math.pi / 2, 0.0, -math.pi / 2))
+    return RigidTransform(RotationMatrix.MakeZRotation(heading_rad) @ ahead)
+
+
 HEADINGS_RAD = {"frontleft": -0.58, "frontright": 0.58, "left": 1.57, "right": -1.57, "back": 3.14}
-BODY = tuple(CameraCapabilities(name, heading_rad=heading) for name, heading in HEADINGS_RAD.items())
+BODY = tuple(CameraCapabilities(name, looking(heading)) for name, heading in HEADINGS_RAD.items())
 
 
 def watched(*people, detector_changes=None, seconds=2.0, cameras=True):

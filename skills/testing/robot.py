@@ -44,7 +44,6 @@ _SCAN_PERIOD_S = 0.1
 _TRAJECTORY_START_RAD = 0.25
 _BATTERY_RUNTIME_S = 5400.0
 _CHARGING_S = 600.0
-_HAND_TO_THING_M = 0.185
 _FINGER_M = 0.03
 
 BASE_ONLY = Capabilities(
@@ -369,8 +368,9 @@ class ScriptedRobot:
             self._commands.finish("set_gripper", CommandState.DONE)
 
     def _between_fingers_W(self) -> FloatArray:
-        X_WH = self._X_WB() @ self.arm.X_BH(self.q_rad)
-        return np.asarray(X_WH @ np.array([_HAND_TO_THING_M, 0.0, 0.0]))
+        gripper = self._capabilities.gripper
+        grip_m = 0.0 if gripper is None else gripper.grip_x_m
+        return np.asarray(self._X_WB() @ self.arm.X_BH(self.q_rad) @ np.array([grip_m, 0.0, 0.0]))
 
     def _feel(self) -> None:
         """A closing jaw takes the loose block between its fingers, if there is one."""

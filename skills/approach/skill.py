@@ -23,11 +23,6 @@ from skills.grasp.posture import body_height_m
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 
-POSITION_TOLERANCE_M = 0.06
-YAW_TOLERANCE_RAD = 0.08
-SPEED_M_S = 0.5
-_MOST_TRIES = 3
-_GOOD_GRASP = 0.1
 _STILL_BEFORE_M = 1.3
 
 
@@ -39,11 +34,28 @@ class ApproachInputs:
     surfaces: tuple[Surface, ...]
 
 
+@dataclass(frozen=True)
+class ApproachOptions:
+    """How exactly and how fast the robot goes before the object.
+
+    It goes to the first of `tries` places to which a path leads. Where the best grasp from here costs no more than
+    `good_grasp` above the best there is, it stays.
+    """
+
+    position_tolerance_m: float = 0.06
+    yaw_tolerance_rad: float = 0.08
+    speed_m_s: float = 0.5
+    tries: int = 3
+    good_grasp: float = 0.1
+
+
 class Approach(ArmSkill[ApproachInputs]):
     """Drives with the arm stowed, at low speed; the observation that comes out is fresh."""
 
     name = "approach"
     Inputs = ApproachInputs
+    Options: ClassVar[type] = ApproachOptions
+    options: ApproachOptions
     outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PLANNING: "no free place to stand is near enough to the thing, or no way leads there",
@@ -59,7 +71,7 @@ class Approach(ArmSkill[ApproachInputs]):
         point_W = (seen.position_W[0], seen.position_W[1])
         here = self.context.pose()
         from_here = self._reach_cost(seen)(here) if is_comfortable(here, point_W) else None
-        if from_here is None or from_here > _GOOD_GRASP:
+        if from_here is None or from_here > self.options.good_grasp:
             places = yield from self.compute(
                 lambda: self._places(seen), latency_s=0.2, name="choose a place", message="choosing where to stand"
             )
@@ -68,7 +80,7 @@ class Approach(ArmSkill[ApproachInputs]):
                     Cause.PLANNING, f"there is no free place to stand from which the {seen.thing} is within reach"
                 )
             yield from self.stow()
-            yield from self.go_to_one([place.pose for place in places[:_MOST_TRIES]])
+            yield from self.go_to_one([place.pose for place in places[: self.options.tries]])
         return (yield from self._look_again(inputs))
 
     def undone(self, inputs: ApproachInputs) -> str | None:
@@ -80,7 +92,9 @@ class Approach(ArmSkill[ApproachInputs]):
     def go_to_one(self, poses: list[Pose2D]) -> Routine[None]:
         """Drive to the first of some poses to which there is a way."""
         for k, pose in enumerate(poses):
-            goal = NavigateInputs(pose, POSITION_TOLERANCE_M, YAW_TOLERANCE_RAD, SPEED_M_S)
+            goal = NavigateInputs(
+                pose, self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s
+            )
             try:
                 yield from self.perform(Navigate(self.context), goal)
                 return

@@ -34,15 +34,8 @@ from skills.perception.surface_segmentation import Cluster, view_surface
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.robot import FloatArray, Image
 
-_CONFIRM_SHIFTS_RAD = (0.25, -0.3)
-_CANDIDATES = 3
-_EXPECTED_WITHIN_M = 0.35
-_FLOOR_WITHIN_M = 2.2
 _LEAST_SEEN = 0.02
-_CLOSER_LOOKS = 3
 _LOOKED_AT_M = 0.08
-_FRESH_S = 1.5
-_AROUND_RAD = (0.7, -0.7)
 
 
 @dataclass(frozen=True)
@@ -76,11 +69,32 @@ class Look:
     clusters: tuple[Cluster, ...]
 
 
+@dataclass(frozen=True)
+class DetectOptions:
+    """How long the skill looks on.
+
+    What may be meant is looked at again from aside, turned by `confirm_shifts_rad` about the shoulder; `candidates` of
+    them more than are asked for. What has no name yet is looked at from near, `closer_looks` at most; what something
+    hides is looked at from `around_rad`. An answer rests on a picture no older than `fresh_s`. A thing counts within
+    `expected_within_m` of where it is expected, and on the floor within `floor_within_m` of the robot.
+    """
+
+    confirm_shifts_rad: tuple[float, ...] = (0.25, -0.3)
+    candidates: int = 3
+    expected_within_m: float = 0.35
+    floor_within_m: float = 2.2
+    closer_looks: int = 3
+    fresh_s: float = 1.5
+    around_rad: tuple[float, ...] = (0.7, -0.7)
+
+
 class Detect(ArmSkill[DetectInputs]):
     """Looks from where the robot stands; the arm stays raised on success and is stowed when nothing was found."""
 
     name = "detect"
     Inputs = DetectInputs
+    Options: ClassVar[type] = DetectOptions
+    options: DetectOptions
     outputs: ClassVar[Mapping[str, type]] = {
         "observation": ObjectObservation,
         "observations": tuple[ObjectObservation, ...],
@@ -145,7 +159,7 @@ class Detect(ArmSkill[DetectInputs]):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
                 yield from self._look_and_confirm(inputs, p_BT, [], close=True)
             return
-        for _ in range(_CLOSER_LOOKS):
+        for _ in range(self.options.closer_looks):
             left = unnamed(self._clusters, self._tracker.snapshot(), inputs.classes)
             if self._has_enough(inputs) or not left:
                 return
@@ -159,7 +173,7 @@ class Detect(ArmSkill[DetectInputs]):
     def _look_around(self, inputs: DetectInputs) -> Routine[None]:
         """Look from either side at what something hides."""
         for p_W in self._coverage.hidden_middle_W().values() if inputs.expected_W is None else ():
-            for shift_rad in _AROUND_RAD:
+            for shift_rad in self.options.around_rad:
                 if self._has_enough(inputs):
                     return
                 p_BT = self.X_WB().inverse() @ p_W
@@ -178,7 +192,11 @@ class Detect(ArmSkill[DetectInputs]):
     def _seen_a_while_ago(self, inputs: DetectInputs) -> Track | None:
         """What was found and seen last, unless it was seen just now."""
         newest = next(iter(self._found(inputs)), None)
-        return newest if newest is not None and self.context.clock.now() - newest.last_seen_s > _FRESH_S else None
+        return (
+            newest
+            if newest is not None and self.context.clock.now() - newest.last_seen_s > self.options.fresh_s
+            else None
+        )
 
     def _look_and_confirm(
         self,
@@ -215,7 +233,7 @@ class Detect(ArmSkill[DetectInputs]):
     def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
         """Camera places p_BC to look from at p_BT, turned by shift_rad about the shoulder; near ones first if close."""
         far = overview_viewpoints(self.model, p_BT, shift_rad)
-        if abs(shift_rad) >= max(_AROUND_RAD):
+        if abs(shift_rad) >= max(map(abs, self.options.around_rad)):
             far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
         return [*close_viewpoints(self.model.p_BS, p_BT, shift_rad), *far] if close else far
 
@@ -226,19 +244,23 @@ class Detect(ArmSkill[DetectInputs]):
         """
         X_BW = self.X_WB().inverse()
         p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
-        if tries > len(_CONFIRM_SHIFTS_RAD):
+        if tries > len(self.options.confirm_shifts_rad):
             return [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
         seen_rad, bearing = _bearing(eye_B - self.model.p_BS), _bearing(p_BO - self.model.p_BS)
-        off = {shift: abs(math.remainder(bearing + shift - seen_rad, math.tau)) for shift in _CONFIRM_SHIFTS_RAD}
-        shifts_rad = sorted(_CONFIRM_SHIFTS_RAD, key=lambda shift: -off[shift])
+        off = {
+            shift: abs(math.remainder(bearing + shift - seen_rad, math.tau))
+            for shift in self.options.confirm_shifts_rad
+        }
+        shifts_rad = sorted(self.options.confirm_shifts_rad, key=lambda shift: -off[shift])
         return self._viewpoints(p_BO, shifts_rad[tries - 1], close=close)
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
         """The likeliest track that may be what is looked for and is to be looked at again."""
-        if self._has_enough(inputs) or len(self._tried) > _CANDIDATES + inputs.count:
+        if self._has_enough(inputs) or len(self._tried) > self.options.candidates + inputs.count:
             return None
+        shifts = len(self.options.confirm_shifts_rad)
         open_ones = (t for t in self._matching(inputs) if not t.confirmed)
-        return next((t for t in open_ones if self._tried.get(t.number, 0) < _tries_for(t)), None)
+        return next((t for t in open_ones if self._tried.get(t.number, 0) < _tries_for(t, shifts)), None)
 
     def _found(self, inputs: DetectInputs) -> list[Track]:
         """The confirmed ones, those seen last first."""
@@ -252,12 +274,14 @@ class Detect(ArmSkill[DetectInputs]):
         if inputs.expected_W is None:
             return sorted(fitting, key=lambda t: -t.belief * t.best.detection.score)
         off = {t.number: _apart(t.position_W, inputs.expected_W) for t in fitting}
-        return sorted((t for t in fitting if off[t.number] < _EXPECTED_WITHIN_M), key=lambda t: off[t.number])
+        return sorted(
+            (t for t in fitting if off[t.number] < self.options.expected_within_m), key=lambda t: off[t.number]
+        )
 
     def _in_place(self, inputs: DetectInputs, track: Track) -> bool:
         if track.latest.surface in {surface.name for surface in inputs.surfaces}:
             return True
-        near = _apart(track.position_W, self.X_WB().translation()) < _FLOOR_WITHIN_M
+        near = _apart(track.position_W, self.X_WB().translation()) < self.options.floor_within_m
         return inputs.floor and track.latest.surface == FLOOR and near
 
     def look(
@@ -332,9 +356,9 @@ def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
     return observation(replace(track.latest, position_W=track.position_W), attributes)
 
 
-def _tries_for(track: Track) -> int:
+def _tries_for(track: Track, shifts: int) -> int:
     """How often to look at a track again: once more from nearby where neither side showed its place."""
-    return len(_CONFIRM_SHIFTS_RAD) + (track.views == 1 and track.missed == 0)
+    return shifts + (track.views == 1 and track.missed == 0)
 
 
 def _bearing(p_B: FloatArray) -> float:

@@ -25,12 +25,8 @@ from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.surface_segmentation import Cluster, SurfaceView, cluster_of, parted, view_surface
 from skills.robot import FloatArray, Image
 
-GRASP_FORCE_N = 80.0
 _LOOK_HALF_SIDE_M = 0.4
-_SAME_THING_M = 0.12
 _CLOSED_RAD = 0.06
-_SLIP_RAD = 0.12
-_PULL_BACK_M = 0.12
 _SURFACE_AROUND_M = 0.2
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
@@ -55,6 +51,20 @@ class CloseView:
     X_WB: RigidTransform
 
 
+@dataclass(frozen=True)
+class GraspOptions:
+    """How firmly is gripped (N), and when the object counts as lost.
+
+    The object is looked for within `same_object_m` of where it was seen. A gripper that opens or closes by `slip_rad`
+    while it lifts has lost it. After lifting the hand draws back by `pull_back_m`.
+    """
+
+    force_n: float = 80.0
+    same_object_m: float = 0.12
+    slip_rad: float = 0.12
+    pull_back_m: float = 0.12
+
+
 class Grasp(ArmSkill[GraspInputs]):
     """Ends with the thing held near the body; on failure the jaw is opened and the arm stowed.
 
@@ -63,6 +73,8 @@ class Grasp(ArmSkill[GraspInputs]):
 
     name = "grasp"
     Inputs = GraspInputs
+    Options: ClassVar[type] = GraspOptions
+    options: GraspOptions
     outputs: ClassVar[Mapping[str, type]] = {"tried": tuple[TriedGrasp, ...]}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the thing is not where it was seen, the jaw holds something already, or there is no arm",
@@ -129,13 +141,13 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _take_along(self, seen: ObjectObservation, at_thing: bool) -> Routine[None]:
         """Clamp, lift and draw back what the jaw has hold of, hold it near the body, and make sure that it is held."""
-        yield from self.move_gripper(0.0, GRASP_FORCE_N, f"closing on the {seen.thing}")
+        yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {seen.thing}")
         yield from self.pause(_FEEL_S, f"closing on the {seen.thing}")
         message, opening = f"carrying the {seen.thing}", self._check_held(str(seen.thing), None)
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         if at_thing:
             yield from self._lift_again(f"lifting the {seen.thing}")
-            yield from self.try_shift_hand(-_PULL_BACK_M * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
+            yield from self.try_shift_hand(-self.options.pull_back_m * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
         yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
         self._check_held(str(seen.thing), opening)
@@ -173,7 +185,8 @@ class Grasp(ArmSkill[GraspInputs]):
         def examine() -> CloseView | None:
             found = detections_in(detector, image)
             same_class = [each for each in found if each.class_name == seen.thing.name]
-            return _examine(image, X_WB, surface, seen, place, detections_3d(image, place, same_class, [surface]))
+            placed = detections_3d(image, place, same_class, [surface])
+            return _examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
 
         view = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message)
         if view is None:
@@ -206,7 +219,7 @@ class Grasp(ArmSkill[GraspInputs]):
         """Reach, close, lift; raises SkillFailure with cause POSTCONDITION when it is not held then."""
         yield from self.follow(plan.to_pregrasp, f"reaching for the {thing}")
         yield from self.follow(plan.to_grasp, f"reaching for the {thing}")
-        yield from self.move_gripper(0.0, GRASP_FORCE_N, f"closing on the {thing}")
+        yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
         yield from self._lift(plan.lift_B, f"lifting the {thing}")
@@ -230,7 +243,7 @@ class Grasp(ArmSkill[GraspInputs]):
         gripper = self.context.robot.gripper()
         if gripper.opening_rad < _CLOSED_RAD or not gripper.holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the jaw closed on nothing where the {thing} was seen")
-        if opening_before_rad is not None and abs(gripper.opening_rad - opening_before_rad) > _SLIP_RAD:
+        if opening_before_rad is not None and abs(gripper.opening_rad - opening_before_rad) > self.options.slip_rad:
             raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the jaw while it was lifted")
         return gripper.opening_rad
 
@@ -242,7 +255,7 @@ class Grasp(ArmSkill[GraspInputs]):
         message = f"carrying the {thing}"
         ahead = grasp.X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
         try:
-            yield from self.shift_hand(-_PULL_BACK_M * ahead + 0.02 * self._up_B(), message)
+            yield from self.shift_hand(-self.options.pull_back_m * ahead + 0.02 * self._up_B(), message)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -298,12 +311,13 @@ def _examine(
     seen: ObjectObservation,
     place: LocalisationEstimate,
     found: tuple[Detection3D, ...],
+    within_m: float,
 ) -> CloseView | None:
     view = view_surface(image, place.X_WO, surface, margin_m=0.0)
     if view is None:
         return None
     view = reduce(parted, found, view)
-    cluster = _same_thing(view, seen, found)
+    cluster = _same_thing(view, seen, found, within_m)
     if cluster is None:
         return None
     others = [each for each in view.clusters if each is not cluster]
@@ -324,7 +338,9 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
     return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), view.plane.height_m)
 
 
-def _same_thing(view: SurfaceView, seen: ObjectObservation, found: tuple[Detection3D, ...]) -> Cluster | None:
+def _same_thing(
+    view: SurfaceView, seen: ObjectObservation, found: tuple[Detection3D, ...], within_m: float
+) -> Cluster | None:
     """The cluster that is the thing: detected as of its class and nearest, else nearest of all; None: all are far."""
     expected = np.array(seen.position_W[:2])
 
@@ -333,7 +349,7 @@ def _same_thing(view: SurfaceView, seen: ObjectObservation, found: tuple[Detecti
 
     classed = [cluster for each in found if (cluster := cluster_of(view.clusters, each)) is not None]
     for clusters in (classed, view.clusters):
-        near = [cluster for cluster in clusters if off(cluster) < _SAME_THING_M]
+        near = [cluster for cluster in clusters if off(cluster) < within_m]
         if near:
             return min(near, key=off)
     return None

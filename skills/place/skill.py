@@ -26,10 +26,7 @@ from skills.stack import ArmPlanner
 ABOVE_M = 0.22
 _SURELY_FREE_M = 0.135
 _LOWEST_M = 0.02
-_STEP_M = 0.008
-_CONTACT_M = 0.005
 _RELAX_M = 0.003
-_SEEN_AGAIN_M = 0.12
 _FEEL_S = 0.4
 _OVER_SPOT_M = 0.45
 _TIPS_BEYOND_M = 0.03
@@ -43,11 +40,25 @@ class PlaceInputs:
     surface: Surface
 
 
+@dataclass(frozen=True)
+class PlaceOptions:
+    """How an object is put down.
+
+    It is lowered in steps of `step_m` until the arm lags by `contact_m`. It must be seen again within `seen_again_m`.
+    """
+
+    step_m: float = 0.008
+    contact_m: float = 0.005
+    seen_again_m: float = 0.12
+
+
 class Place(ArmSkill[PlaceInputs]):
     """Goes nearer when no spot is within reach. Ends with the jaw empty and the arm stowed."""
 
     name = "place"
     Inputs = PlaceInputs
+    Options: ClassVar[type] = PlaceOptions
+    options: PlaceOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held",
         Cause.PLANNING: "no free spot is seen within reach, or the arm finds no way to it",
@@ -170,14 +181,14 @@ class Place(ArmSkill[PlaceInputs]):
         lowest_m = surface.height_m + _LOWEST_M - float(self.X_WB().translation()[2])
         planner = self.context.stack.arm_planner
         while self._below_hand_m() > lowest_m:
-            X_BH = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, _STEP_M])
+            X_BH = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, self.options.step_m])
             try:
                 path = planner.line(self.model, q_wanted, X_BH)
             except PlanningError as error:
                 raise SkillFailure(Cause.PLANNING, str(error)) from error
             q_wanted = path[-1]
             yield from self.follow(planner.timed(path, speed_rad_s=0.3), message)
-            if self._hand_z() - float(X_BH.translation()[2]) + rest_m > _CONTACT_M:
+            if self._hand_z() - float(X_BH.translation()[2]) + rest_m > self.options.contact_m:
                 yield from self.try_shift_hand(np.array([0.0, 0.0, _RELAX_M]), message)
                 return
 
@@ -200,7 +211,7 @@ class Place(ArmSkill[PlaceInputs]):
         self.boxes = surface_boxes([surface], self.X_WB())
         view = yield from self._look(surface, spot_W)
         off = [float(np.min(np.linalg.norm(c.points.p_W[:, :2] - spot_W, axis=1))) for c in view.clusters]
-        if not off or min(off) > _SEEN_AGAIN_M:
+        if not off or min(off) > self.options.seen_again_m:
             yield from self.try_stow()
             raise SkillFailure(
                 Cause.POSTCONDITION, f"the thing is not seen on the {surface.name} where it was put down"

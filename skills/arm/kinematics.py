@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
+from skills.geometry import wrap
 from skills.robot import Capabilities, FloatArray, InverseKinematics
 
 _EXPECTED_AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0))
@@ -91,7 +92,7 @@ class ArmModel:
         for q_arm in self._arm_branches(X_BH.translation() - self.p_BS):
             R_BE = _axis_rotation((0, 0, 1), q_arm[0]) @ _axis_rotation((0, 1, 0), q_arm[1] + q_arm[2])
             for q_wrist in _wrist_branches(R_BE.T @ X_BH.rotation().matrix()):
-                solutions.append(_wrapped(np.array([*q_arm, *q_wrist])))
+                solutions.append(wrap(np.array([*q_arm, *q_wrist])))
         return solutions
 
     def nearest_inverse(
@@ -143,11 +144,6 @@ def _wrist_branches(R: NDArray[np.float64]) -> list[tuple[float, float, float]]:
         )
         for sign in (1.0, -1.0)
     ]
-
-
-def _wrapped(q_rad: FloatArray) -> FloatArray:
-    """Angles brought into [-pi, pi)."""
-    return np.asarray((q_rad + math.pi) % (2 * math.pi) - math.pi)
 
 
 def _floats(text: str) -> tuple[float, float, float]:

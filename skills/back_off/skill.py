@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step, Succeeded
-from skills.estimate.planar import compose, relative
+from skills.geometry import compose, relative
 from skills.navigate.base import Base
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.robot import Pose2D

@@ -26,6 +26,7 @@ from skills.detect.seeing import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.detect.unidentified import unnamed
 from skills.detect.viewpoints import in_plain_view, look_targets, surface_boxes
 from skills.detect.words import counted, describe, surface_names, wanted
+from skills.geometry import wrap
 from skills.perception.attributes import known_attributes, shows
 from skills.perception.class_forms import class_forms
 from skills.perception.coverage import Coverage
@@ -247,10 +248,7 @@ class Detect(ArmSkill[DetectInputs]):
         if tries > len(self.options.confirm_shifts_rad):
             return [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
         seen_rad, bearing = _bearing(eye_B - self.model.p_BS), _bearing(p_BO - self.model.p_BS)
-        off = {
-            shift: abs(math.remainder(bearing + shift - seen_rad, math.tau))
-            for shift in self.options.confirm_shifts_rad
-        }
+        off = {shift: abs(wrap(bearing + shift - seen_rad)) for shift in self.options.confirm_shifts_rad}
         shifts_rad = sorted(self.options.confirm_shifts_rad, key=lambda shift: -off[shift])
         return self._viewpoints(p_BO, shifts_rad[tries - 1], close=close)
 

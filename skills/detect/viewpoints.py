@@ -11,8 +11,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Surface
 from skills.arm.collision import Box
+from skills.geometry import inside_polygon
 from skills.perception.detection_3d import depth_ahead_m
-from skills.perception.point_cloud import inside_polygon
 from skills.perception.surface_segmentation import Cluster
 from skills.robot import FloatArray, Image
 

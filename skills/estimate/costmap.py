@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from skills.api import LocalisationEstimate
 from skills.estimate.compiled import distances
 from skills.estimate.grid_map import GridMap
-from skills.estimate.planar import compose
 from skills.estimate.scan_points import scan_points, sensor_pose
 from skills.estimate.seen_layer import Beams, clear_cells, mark_cells
 from skills.estimate.self_filter import SelfFilter, in_body_axes
+from skills.geometry import compose
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
 from skills.estimate.matching import Match, MatchOptions, match, score_poses
-from skills.estimate.planar import compose, inverse, relative
 from skills.estimate.scan_points import scan_points
+from skills.geometry import compose, inverse, relative
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 _HEIGHTS_M = (0.7, 1.3)

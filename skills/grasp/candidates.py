@@ -14,6 +14,7 @@ import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
+from skills.geometry import wrap
 from skills.robot import FloatArray, GripperCapabilities
 
 _ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M = 0.009, 0.006
@@ -121,7 +122,7 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
             xy = np.array(target.centre_B) + (0.0 if square else middle + shift) * along + 0.5 * (low + high) * across
             half_depth = 0.5 * (target.length_m if turn == 0.0 else target.width_m) if target.upright else 0.02
             for azimuth in (yaw, yaw + np.pi):
-                off = abs((azimuth - ahead_rad + np.pi) % (2 * np.pi) - np.pi)
+                off = abs(wrap(azimuth - ahead_rad))
                 yield _Placement(xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 0.15 * off)
 
 

@@ -15,6 +15,7 @@ from skills.api import Cause, PlanningError, Running, Succeeded
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.routine import Routine, SkillFailure
+from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.people import SeenPerson, people_in_scan
@@ -143,7 +144,7 @@ def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float,
     for k in range(count):
         yaw = math.atan2(point_W[1] - here.y_m, point_W[0] - here.x_m) + 2 * math.pi * k / count
         x, y = point_W[0] - stand_off_m * math.cos(yaw), point_W[1] - stand_off_m * math.sin(yaw)
-        poses.append(Pose2D(x, y, (yaw + math.pi) % (2 * math.pi) - math.pi))
+        poses.append(Pose2D(x, y, wrap(yaw)))
     return sorted(poses, key=lambda pose: math.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skills.api import Costmap
-from skills.estimate.planar import wrap
+from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m
 from skills.navigate.path import TURN_M_PER_RAD, Path
 from skills.robot import FloatArray, Pose2D
@@ -105,7 +105,7 @@ class PathFollower:
         """Move the index to the nearest pose of the path a little behind or ahead; returns the distance to it (m)."""
         first, last = max(0, self._index - 3), min(len(self._progress), self._index + 25)
         delta = self._path.poses[first:last] - here
-        turns = (delta[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+        turns = wrap(delta[:, 2])
         off = np.sqrt(delta[:, 0] ** 2 + delta[:, 1] ** 2 + (TURN_M_PER_RAD * turns) ** 2)
         best = int(np.argmin(off))
         self._index = first + best

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import Costmap, PlanningError
-from skills.estimate.planar import wrap
+from skills.geometry import wrap
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, clearance_at
 from skills.navigate.lattice import Lattice, Needs, Space, cost_to_go, lattice_moves, search
 from skills.navigate.motion_cost import Weights, segment_cost

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from skills.api import Cause, Costmap, Failed, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
-from skills.estimate.planar import relative
+from skills.geometry import relative
 from skills.navigate.base import Base
 from skills.navigate.footprint import Footprint
 from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Surface
+from skills.geometry import inside_polygon
 from skills.perception.detection_3d import depth_ahead_m
-from skills.perception.point_cloud import inside_polygon
 from skills.robot import FloatArray, Image
 
 _CELL_M = 0.05

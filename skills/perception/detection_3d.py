@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from skills.api import Detection, LocalisationEstimate, ObjectObservation, Surface, Thing
+from skills.geometry import inside_polygon
 from skills.perception.class_forms import class_forms
-from skills.perception.point_cloud import camera_pose_W, inside_polygon
+from skills.perception.point_cloud import camera_pose_W
 from skills.perception.position import Position, position_of
 from skills.robot import FloatArray, Image
 

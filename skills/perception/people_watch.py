@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 
 from skills.api import Detection, Job, LayeredView, SkillContext
 from skills.detect.seeing import seen_in_grey
-from skills.estimate.planar import relative
+from skills.geometry import relative
 from skills.perception.people import SeenPerson, merged
 from skills.perception.position import position_of
 from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D

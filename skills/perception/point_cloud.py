@@ -54,18 +54,3 @@ def _colour_pixels(image: Image, rays: FloatArray) -> NDArray[np.int64]:
     u = np.clip(np.rint(rays[:, 0] * lens.fx + lens.cx), 0, lens.width - 1)
     v = np.clip(np.rint(rays[:, 1] * lens.fy + lens.cy), 0, lens.height - 1)
     return np.stack([u, v], axis=1).astype(np.int64)
-
-
-def inside_polygon(
-    xy: FloatArray, polygon: tuple[tuple[float, float], ...], margin_m: float = 0.0
-) -> NDArray[np.bool_]:
-    """Which rows of xy (N, 2) lie in a convex polygon grown by margin_m; corners in either order."""
-    corners = np.asarray(polygon, dtype=float)
-    edges = np.roll(corners, -1, axis=0) - corners
-    area = float(np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - np.roll(corners[:, 0], -1) * corners[:, 1]))
-    lengths = np.linalg.norm(edges, axis=1)
-    keep = np.ones(len(xy), dtype=bool)
-    for corner, edge, length in zip(corners, edges, lengths, strict=True):
-        offset = edge[0] * (xy[:, 1] - corner[1]) - edge[1] * (xy[:, 0] - corner[0])
-        keep &= np.sign(area) * offset / max(float(length), 1e-9) > -margin_m
-    return keep

@@ -11,9 +11,10 @@ from pydrake.math import RigidTransform
 
 from skills.api import Surface
 from skills.detection import box_overlap
+from skills.geometry import inside_polygon
 from skills.perception.detection_3d import Detection3D
 from skills.perception.plane import LevelPlane
-from skills.perception.point_cloud import PointCloud, camera_pose_W, cloud_from_image, inside_polygon
+from skills.perception.point_cloud import PointCloud, camera_pose_W, cloud_from_image
 from skills.perception.shape import SeenShape, measure
 from skills.robot import FloatArray, Image
 

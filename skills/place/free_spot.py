@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from skills.api import Surface
-from skills.perception.point_cloud import inside_polygon
+from skills.geometry import inside_polygon
 from skills.perception.surface_segmentation import SurfaceView
 from skills.robot import FloatArray
 

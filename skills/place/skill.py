@@ -17,6 +17,7 @@ from skills.arm.collision import ArmScene
 from skills.arm.poses import look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
+from skills.geometry import wrap
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import free_spots, spots
@@ -121,7 +122,7 @@ class Place(ArmSkill[PlaceInputs]):
         spot = _nearest_spot(surface, self.X_WB())
         pose = self.context.pose()
         offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
-        bearing = (math.atan2(offset[1], offset[0]) - pose.yaw_rad + math.pi) % (2 * math.pi) - math.pi
+        bearing = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
         if np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6:
             return
         context = self.context

@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from skills.arm.kinematics import ArmModel, arm_model
-from skills.estimate.planar import compose
+from skills.geometry import compose
 from skills.robot import (
     ArmTrajectory,
     Battery,

@@ -43,7 +43,7 @@ from skills.detect.skill import Detect, DetectInputs
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
-from skills.perception.point_cloud import inside_polygon
+from skills.geometry import inside_polygon
 from skills.robot import FrameTree, Image, Pose2D
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace

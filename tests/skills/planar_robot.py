@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from skills.api import SkillContext
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.localiser import ScanMatchingLocaliser
-from skills.estimate.planar import compose, inverse
+from skills.geometry import compose, inverse
 from skills.robot import (
     CameraCapabilities,
     Capabilities,

@@ -18,16 +18,17 @@ from pydrake.geometry import (
     SceneGraph,
 )
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import LoadModelDirectives, Parser, ProcessModelDirectives
+from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.locomotion.carrier import CarrierLimits
 from plant.scene import Scene
+from plant.scenery import add_model, add_scenery
 from plant.spot.model import SpotModel
 
-TIME_STEP_S = 0.005
+TIME_STEP_S = 0.01
 PACKAGE = "errand"
 FLOOR_TOP_M = 0.01
 
@@ -46,7 +47,8 @@ class LooseModel:
 class WorldDiagram:
     """The finished Diagram and handles to its parts.
 
-    `scene` renders it, where that was wanted; `rebuild` makes the same once more, shown in a Meshcat.
+    `scenery` names the model that each collision shape of the world body comes from. `scene` renders it, where that
+    was wanted; `rebuild` makes the same once more, shown in a Meshcat.
     """
 
     diagram: Diagram
@@ -54,6 +56,7 @@ class WorldDiagram:
     scene_graph: SceneGraph
     robots: Mapping[str, SpotModel]
     models: Mapping[str, ModelInstanceIndex]
+    scenery: Mapping[GeometryId, str]
     scene: Scene | None
     rebuild: Callable[[Meshcat], WorldDiagram]
 
@@ -73,7 +76,8 @@ def build_diagram(
 ) -> WorldDiagram:
     """A Diagram of the directives' world (or an empty one) with models and robots.
 
-    SAP contact at `time_step_s`; positions of the models are defaults of the plant, the robots' are set by the caller.
+    SAP contact at `time_step_s`; sampled outputs, which would double the cost of a step, are off, so that evaluating
+    contact results solves once more. Positions of the models are defaults, the robots' are set by the caller.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
     `looks` draws Spot with meshes where they are installed; `render` makes the scene for cameras. `locomotion` limits
     what bears the robots.
@@ -90,13 +94,12 @@ def build_diagram(
         time_step_s=time_step_s,
     )
     builder = DiagramBuilder()
-    config = MultibodyPlantConfig(time_step=time_step_s, discrete_contact_approximation="sap")
+    config = MultibodyPlantConfig(
+        time_step=time_step_s, discrete_contact_approximation="sap", use_sampled_output_ports=False
+    )
     plant, scene_graph = AddMultibodyPlant(config, builder)
-    parser = Parser(plant)
-    parser.SetAutoRenaming(True)
-    parser.package_map().Add(PACKAGE, Path(__file__).parent)
-    if directives is not None:
-        ProcessModelDirectives(LoadModelDirectives(directives), parser)
+    parser = parser_of(plant)
+    scenery = {} if directives is None else add_scenery(plant, directives, parser_of)
     instances = {model.name: _add_model(plant, parser, model) for model in models}
     robots = {
         name: SpotModel(plant, name, looks=looks, carried=carried, limits=locomotion) for name in sorted(robot_names)
@@ -115,13 +118,20 @@ def build_diagram(
     diagram = builder.Build()
     scene = Scene(diagram, plant, scene_graph, renderer_parameters) if render else None
     return WorldDiagram(
-        diagram, plant, scene_graph, robots, instances, scene, lambda shown_in: rebuild(meshcat=shown_in)
+        diagram, plant, scene_graph, robots, instances, scenery, scene, lambda shown_in: rebuild(meshcat=shown_in)
     )
 
 
+def parser_of(plant: MultibodyPlant) -> Parser:
+    """A parser that knows the package of the worlds and models."""
+    parser = Parser(plant)
+    parser.SetAutoRenaming(True)
+    parser.package_map().Add(PACKAGE, Path(__file__).parent)
+    return parser
+
+
 def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> ModelInstanceIndex:
-    instance: ModelInstanceIndex
-    (instance,) = parser.AddModels(str(model.path))
+    instance = add_model(parser, model.path)
     plant.RenameModelInstance(instance, model.name)
     if model.fixed:
         (body,) = plant.GetBodyIndices(instance)[:1]

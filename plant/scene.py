@@ -31,12 +31,17 @@ class Scene:
         self._context = plant.GetMyMutableContextFromRoot(self._root_context)
         self._geometry_context = scene_graph.GetMyMutableContextFromRoot(self._root_context)
         self._query_port = scene_graph.get_query_output_port()
-        scene_graph.AddRenderer(
-            self._geometry_context, RENDERER, MakeRenderEngineVtk(parameters or RenderEngineVtkParams())
-        )
+        self._scene_graph, self._parameters = scene_graph, parameters or RenderEngineVtkParams()
+        self._rendering = False
 
     def query_at(self, positions: NDArray[np.float64]) -> QueryObject:
-        """The scene with the plant at `positions` (as many as the plant has); it holds until the next call."""
+        """The scene with the plant at `positions` (as many as the plant has); it holds until the next call.
+
+        The renderer is made at the first call, since it loads all meshes.
+        """
+        if not self._rendering:
+            self._rendering = True
+            self._scene_graph.AddRenderer(self._geometry_context, RENDERER, MakeRenderEngineVtk(self._parameters))
         self._plant.SetPositions(self._context, positions)
         query = self._query_port.Eval(self._geometry_context)
         assert isinstance(query, QueryObject)

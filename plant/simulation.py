@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from plant.live_scene import LiveScene
 from plant.locomotion.carrier import CarrierLimits
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
+from plant.sleeping import Sleepers
 from plant.snapshot.file import read_snapshot
 from plant.snapshot.keeper import SnapshotKeeper, restore
 from plant.snapshot.values import State
@@ -28,7 +30,8 @@ from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 
 CONTROL_PERIOD_S = 0.01
-REFEREE_PERIOD_STEPS = 2
+SLEEP_PERIOD_STEPS = 2
+REFEREE_PERIOD_STEPS = 5
 SETTLING_S = 1.5
 
 
@@ -54,10 +57,12 @@ class Engine:
         self.context: Context = world.plant.GetMyMutableContextFromRoot(self.root_context)
         for name, pose in starts.items():
             world.robots[name].place(self.context, pose)
+        self.work: Counter[str] = Counter()
         self._spots = {
             name: SpotRobot(model, self._sensors(model, seed), self.context)
             for name, model in sorted(world.robots.items())
         }
+        self._sleepers = Sleepers(world, self.root_context)
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
         self._after_advance: list[Callable[[], None]] = []
@@ -73,12 +78,18 @@ class Engine:
             scene=self.world.scene,
             dock=self._dock,
             charge=self._charge,
+            work=self.work,
         )
 
     @property
     def robots(self) -> Mapping[str, Robot]:
         """The robots by name."""
         return self._spots
+
+    @property
+    def asleep(self) -> frozenset[str]:
+        """Loose objects at rest, which do not move until something comes near."""
+        return self._sleepers.asleep
 
     def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
         """Call `observer(now_s)` after every control period, or every so many."""
@@ -91,9 +102,12 @@ class Engine:
     def advance(self, dt_s: float) -> None:
         """Step the plant by dt_s, rounded to whole control periods (at least one)."""
         for _ in range(max(1, round(dt_s / CONTROL_PERIOD_S))):
+            if self._steps % SLEEP_PERIOD_STEPS == 0:
+                self._sleepers.update(self.now())
             self._command_robots()
             self._steps += 1
             self._simulator.AdvanceTo(self.now())
+            self.work["plant_steps"] += round(CONTROL_PERIOD_S / self.world.plant.time_step())
             for every, observer in self._observers:
                 if self._steps % every == 0:
                     observer(self.now())
@@ -123,6 +137,7 @@ class Engine:
         """
         if set(world) != set(self.world_state()):
             raise ValueError("the parts of the world are others")
+        self._sleepers.wake_all()
         self._steps = state["steps"]
         self.root_context.SetTime(self.now())
         for group, values in world.items():
@@ -174,7 +189,11 @@ class Simulation:
         )
         self.engine = Engine(built, _starts(world.start, robot_names), seed=seed, dock=world.dock, charge=charge)
         self.referee = Referee(
-            built.plant, [*things, *people], robots=sorted(robot_names), persons=[each.name for each in people]
+            built.plant,
+            [*things, *people],
+            robots=sorted(robot_names),
+            persons=[each.name for each in people],
+            scenery=built.scenery,
         )
         self.recorder = Recorder(built, self.engine.context) if record else None
         self._watch()
@@ -186,7 +205,7 @@ class Simulation:
             self.engine.observe(self.recorder)
 
     def _referee_looks(self, now_s: float) -> None:
-        self.referee.observe(self.engine.context, now_s)
+        self.referee.observe(self.engine.context, now_s, asleep=self.engine.asleep)
 
     @property
     def clock(self) -> Engine:
@@ -197,6 +216,10 @@ class Simulation:
     def robots(self) -> Mapping[str, Robot]:
         """The robots by name."""
         return self.engine.robots
+
+    def work(self) -> Mapping[str, int]:
+        """What this process has had to do so far, by name: counts that the same run repeats, whatever the machine."""
+        return {**self.engine.work, "contact_points": self.referee.contact_points}
 
     def keep_in(self, path: Path, *, label: str = "") -> None:
         """Write the whole state to a file now and after every advance of the clock; `label` says what it is for."""

@@ -19,11 +19,11 @@ from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError
-from skills.detect.network_file import ModelFileError
 from skills.detection import Detector
 from skills.estimate.grid_map import MapError, load_grid_map
 from skills.navigate.footprint import Footprint
 from skills.perception.attributes import known_attributes
+from skills.perception.detector.network_file import ModelFileError
 from skills.robot import Pose2D
 from skills.stack import DetectorComponent, RobotStack, default_stack
 

@@ -18,8 +18,8 @@ from executive.cli.detector_choice import detector_of, drawn
 from executive.cli.output import BAD_INPUT, console_for, print_json, refusals
 from executive.cli.picture_files import read_picture, write_picture
 from executive.mission.errors import InputError
-from skills.detect.onnx_detector import DetectorOptions
 from skills.detection import Detection, Detector
+from skills.perception.detector.onnx_detector import DetectorOptions
 
 __all__ = ["detect"]
 

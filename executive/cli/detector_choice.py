@@ -9,10 +9,10 @@ from typing import Final
 import cv2
 
 from executive.mission.errors import InputError
-from skills.detect.detector_file import MODEL_FILE
-from skills.detect.network_file import ModelFileError
-from skills.detect.onnx_detector import DetectorOptions, OnnxDetector, load_detector
 from skills.detection import Detection
+from skills.perception.detector.cascade_files import MODEL_FILE
+from skills.perception.detector.network_file import ModelFileError
+from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector, load_detector
 from skills.robot import Picture
 
 __all__ = ["FOUND_COLOUR", "detector_of", "draw_box", "drawn"]

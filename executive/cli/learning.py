@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -12,15 +12,15 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from executive.cli.output import print_json
 from executive.mission.errors import InputError
-from skills.detect.training.labels import TrainingDataError, read_split
-from skills.detect.training.schedule import Budget
+from skills.perception.training.labels import TrainingDataError, read_split
+from skills.perception.training.schedule import Budget
 
 if TYPE_CHECKING:
-    from skills.detect.training.together import Report, Told
+    from skills.perception.training.parallel import Report, Told
 
 __all__ = ["budget_of", "check_folders", "check_libraries", "check_time", "learnt", "tell_learnt"]
 
-NEEDED: Final = ("torch", "onnx")
+NEEDED: Final = ("torch", "onnx", "pycocotools")
 RENDER: Final = "make one: errand dataset render --out DIR --images 8000"
 
 
@@ -39,11 +39,11 @@ def check_time(minutes: float | None, epochs: int | None) -> None:
         raise InputError("--minutes and --epochs are both given", mend="give one of them")
 
 
-def check_libraries() -> None:
+def check_libraries(needed: Sequence[str] = NEEDED, work: str = "training") -> None:
     """Raises InputError."""
-    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    missing = [name for name in needed if importlib.util.find_spec(name) is None]
     if missing:
-        raise InputError(f"training needs {' and '.join(missing)}", mend="pip install '.[train]'")
+        raise InputError(f"{work} needs {' and '.join(missing)}", mend="pip install '.[train]'")
 
 
 def budget_of(data: Path, minutes: float | None, epochs: int | None, *, unless_said_minutes: float) -> Budget:

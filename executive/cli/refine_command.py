@@ -1,4 +1,4 @@
-"""`errand dataset refine`: a second or third network learns to judge what those before it find."""
+"""`errand dataset refine`: a refinement or classifier network learns to judge what those before it find."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from rich.console import Console
 from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, learnt, tell_learnt
 from executive.cli.output import console_for, refusals
 from executive.mission.errors import InputError
-from skills.detect.detector_file import MODEL_FILE
-from skills.detect.training.options import RefineOptions
-from skills.detect.training.schedule import REGIONS_RATE, Schedule
+from skills.perception.detector.cascade_files import MODEL_FILE
+from skills.perception.training.options import RefineOptions
+from skills.perception.training.schedule import REFINEMENT_RATE, Schedule
 
 __all__ = ["refine_command"]
 
@@ -24,20 +24,21 @@ UNLESS_SAID_MINUTES: Final = 90.0
 
 def refine_command(
     data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
-    out: Annotated[Path, typer.Option(help="Folder for checkpoints, curves and the ONNX files.")],
+    out: Annotated[Path, typer.Option(help="Folder for checkpoints, figures and the ONNX files.")],
     model: Annotated[
-        Path | None, typer.Option(help="The first network's file; else the one of Errand.", show_default=False)
+        Path | None, typer.Option(help="The proposal network's file; else the one of Errand.", show_default=False)
     ] = None,
-    third: Annotated[
-        bool, typer.Option("--third", help="Learn the third network, which judges what the second one sees.")
+    classifier: Annotated[
+        bool,
+        typer.Option("--classifier", help="The classifier network, which judges what the refinement network sees."),
     ] = False,
     minutes: Annotated[
         float | None,
         typer.Option(min=0.01, help="How long to learn; an hour and a half unless said.", show_default=False),
     ] = None,
-    epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how many chips for each picture.")] = None,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how many crops for each picture.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all that is drawn by chance.")] = 1,
-    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = REGIONS_RATE,
+    rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = REFINEMENT_RATE,
     jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
     start: Annotated[
@@ -46,7 +47,7 @@ def refine_command(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Train the second network, which looks again at each place that the first one finds, or the third; export it."""
+    """Train the refinement network, which sees each proposal anew, or the classifier network; export it."""
     console = console_for(as_json)
     with refusals():
         check_folders(data, out, resume)
@@ -58,7 +59,7 @@ def refine_command(
             first,
             out,
             budget_of(data, minutes, epochs, unless_said_minutes=UNLESS_SAID_MINUTES),
-            third=third,
+            classifier=classifier,
             seed=seed,
             processes=jobs or os.cpu_count() or 1,
             resume=resume,
@@ -79,6 +80,6 @@ def _first(model: Path | None) -> Path:
 
 def _refined(options: RefineOptions, console: Console) -> tuple[Path, dict[str, float]]:
     """The ONNX file and its figures. Raises InputError."""
-    from skills.detect.training.refine import refine
+    from skills.perception.training.refine import refine
 
     return learnt(partial(refine, options), options.out, console)

@@ -15,17 +15,18 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from executive.cli.detector_choice import detector_of
+from executive.cli.learning import check_libraries
 from executive.cli.output import console_for, print_json, refusals
 from executive.cli.picture_files import read_picture, write_picture
-from executive.cli.score_report import score_json, show_score
+from executive.cli.score_report import scores_json, show_scores
 from executive.cli.worst_sheet import Shown, contact_sheet
 from executive.mission.errors import InputError
-from skills.detect.careful_detector import CarefulDetector
-from skills.detect.onnx_detector import DetectorOptions, OnnxDetector
-from skills.detect.scoring import judged, picture_errors, score
-from skills.detect.scoring_labels import LabelledPicture, pictures_of_coco
-from skills.detect.upside_down import turned, turned_back
 from skills.detection import Detection
+from skills.perception.detector.augmentation import AugmentedDetector
+from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector
+from skills.perception.detector.upright import turned, turned_back
+from skills.perception.training.scoring import BODY, BODY_CLASSES, by_camera, judged, picture_errors, score
+from skills.perception.training.scoring_labels import LabelledPicture, pictures_of_coco
 from skills.robot import Picture
 
 __all__ = ["score_command"]
@@ -45,7 +46,7 @@ class _Work:
     pictures: tuple[LabelledPicture, ...]
     files: tuple[Path, ...]
     detector: OnnxDetector
-    careful: bool
+    views: bool
 
 
 def score_command(
@@ -55,34 +56,37 @@ def score_command(
     limit: Annotated[int | None, typer.Option(min=1, help="Only so many pictures, the first.")] = None,
     worst: Annotated[int | None, typer.Option(min=1, help="How many of the worst pictures to name.")] = None,
     sheet: Annotated[Path | None, typer.Option(help="Draw the worst pictures, 20 unless said, into this PNG.")] = None,
-    careful: Annotated[
-        bool, typer.Option("--careful", help="Look several times at each picture, as the detect skill does.")
+    views: Annotated[
+        bool, typer.Option("--views", help="With test-time augmentation, as the detect skill uses it.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
     """Judge the detector by labelled pictures: average precision as COCO has it, precision, recall, speed."""
     console = console_for(as_json)
     with refusals():
+        check_libraries(("pycocotools",), "scoring")
         drawing = _png(sheet)
         detector = detector_of(model, DetectorOptions(threshold=LEAST_SCORE))
-        work = _work(data, pictures or data.parent, limit, detector, careful)
+        work = _work(data, pictures or data.parent, limit, detector, views)
         found = _all_found(work, console)
         names = work.detector.class_names
-        told = score(work.pictures, found, names)
+        told = {"all": score(work.pictures, found, names)}
+        for camera, (shown, seen) in by_camera(work.pictures, found).items():
+            told[camera] = score(shown, seen, BODY_CLASSES if camera == BODY else names)
         speed = _pictures_per_second(work)
         order = _worst_first(work, found)[: worst or (WORST if drawing else 0)]
         if drawing is not None:
             write_picture(drawing, contact_sheet([_shown(work, found, k) for k in order]))
     named = [{"file": work.pictures[k].file, "error": round(_error(work, found, k), 3)} for k in order]
     if as_json:
-        print_json({"data": str(data), **score_json(told, speed), **({"worst": named} if named else {})})
+        print_json({"data": str(data), **scores_json(told, speed), **({"worst": named} if named else {})})
     else:
-        show_score(console, told, speed)
+        show_scores(console, told, speed)
         for one in named:
             console.print(f"{one['error']:7.3f}  {one['file']}", markup=False)
 
 
-def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, careful: bool) -> _Work:
+def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, views: bool) -> _Work:
     """Read the labels, and see that all pictures are there. Raises InputError."""
     try:
         labelled = pictures_of_coco(_document(data), detector.class_names)[:limit]
@@ -95,7 +99,7 @@ def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, c
         raise InputError(what, mend="name the folder from which their names count with --pictures", file=missing[0])
     if not files:
         raise InputError("it names no pictures", mend="name a COCO file with pictures with --data", file=data)
-    return _Work(labelled, files, detector, careful)
+    return _Work(labelled, files, detector, views)
 
 
 def _document(data: Path) -> Any:
@@ -126,15 +130,15 @@ def _found(work: _Work, group: range) -> list[Found]:
     """What is in some pictures. Those that stand on their heads are turned first, as on the robot."""
     taken, told = [_read(work, k) for k in group], [work.pictures[k] for k in group]
     upright = [turned(picture) if one.on_its_head else picture for picture, one in zip(taken, told, strict=True)]
-    seen = zip(_looked(work.detector, upright, work.careful), taken, told, strict=True)
+    seen = zip(_looked(work.detector, upright, work.views), taken, told, strict=True)
     return [turned_back(found, *picture.shape[1::-1]) if one.on_its_head else found for found, picture, one in seen]
 
 
-def _looked(detector: OnnxDetector, pictures: Sequence[Picture], careful: bool) -> list[Found]:
+def _looked(detector: OnnxDetector, pictures: Sequence[Picture], views: bool) -> list[Found]:
     """What is in some pictures."""
-    if not careful:
+    if not views:
         return detector.detect(pictures)
-    return [CarefulDetector(detector).detect_carefully(picture) for picture in pictures]
+    return [AugmentedDetector(detector).detect_in_views(picture) for picture in pictures]
 
 
 def _groups(count: int) -> list[range]:
@@ -159,7 +163,7 @@ def _pictures_per_second(work: _Work) -> float:
     for group in _groups(min(len(work.files), TIMED_PICTURES)):
         pictures = [_read(work, k) for k in group]
         begun = time.perf_counter()
-        _looked(detector, pictures, work.careful)
+        _looked(detector, pictures, work.views)
         times_s.append((time.perf_counter() - begun) / len(pictures))
     return 1.0 / statistics.median(times_s)
 

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from skills.detect.scoring import Bin, ClassScore, Score
+from skills.perception.training.scoring import Bin, ClassScore, Score
 
-__all__ = ["score_json", "show_score"]
+__all__ = ["scores_json", "show_scores"]
 
 
-def score_json(told: Score, pictures_per_second: float) -> dict[str, Any]:
-    """All figures as JSON values; null where there are none."""
+def scores_json(told: Mapping[str, Score], pictures_per_second: float) -> dict[str, Any]:
+    """All figures as JSON values: of all pictures, and by camera where the data set tells of cameras."""
+    cameras = {name: _json(one) for name, one in told.items() if name != "all"}
+    return {**_json(told["all"]), "frames_per_second": round(pictures_per_second, 1), "by_camera": cameras}
+
+
+def _json(told: Score) -> dict[str, Any]:
+    """The figures of some pictures; null where there are none."""
     return {
         "pictures": told.pictures,
         "mAP50": _rounded(told.map50),
@@ -25,7 +31,6 @@ def score_json(told: Score, pictures_per_second: float) -> dict[str, Any]:
         "per_class": {one.name: _class_json(one) for one in told.classes},
         "distractor_pictures": told.distractor_pictures,
         "false_per_100_distractor_pictures": _rounded(told.false_per_100_distractor_pictures),
-        "frames_per_second": round(pictures_per_second, 1),
         "by_size_px": _bins_json(told.by_size_px),
         "by_distance_m": _bins_json(told.by_distance_m),
         "by_visibility": _bins_json(told.by_visibility),
@@ -54,8 +59,18 @@ def _bins_json(bins: Sequence[Bin]) -> list[dict[str, Any]]:
     ]
 
 
-def show_score(console: Console, told: Score, pictures_per_second: float) -> None:
+def show_scores(console: Console, told: Mapping[str, Score], pictures_per_second: float) -> None:
+    """Print the tables of each camera, or of all pictures, and the speed."""
+    for name, one in told.items():
+        if name != "all" or len(told) == 1:
+            _show(console, name, one)
+    console.print(f"{pictures_per_second:.0f} pictures a second")
+
+
+def _show(console: Console, camera: str, told: Score) -> None:
     """Print tables and a line on the rest."""
+    if camera != "all":
+        console.print(f"{camera} camera" if camera == "hand" else f"{camera} cameras")
     table = Table("class", "labels", "AP50", "AP50-95", "precision", "recall")
     for one in told.classes:
         figures = (one.ap50, one.ap50_95, one.precision, one.recall)
@@ -74,7 +89,7 @@ def show_score(console: Console, told: Score, pictures_per_second: float) -> Non
     false = _shown(told.false_per_100_distractor_pictures, digits=1)
     console.print(
         f"{told.pictures} pictures, {told.distractor_pictures} of them with nothing to find: {false} false detections "
-        f"in a hundred of those; {pictures_per_second:.0f} pictures a second"
+        "in a hundred of those"
     )
 
 

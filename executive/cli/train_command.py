@@ -12,8 +12,8 @@ from rich.console import Console
 
 from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, learnt, tell_learnt
 from executive.cli.output import console_for, refusals
-from skills.detect.training.options import TrainOptions
-from skills.detect.training.schedule import HIGHEST_RATE, REFINING_RATE, Schedule
+from skills.perception.training.options import TrainOptions
+from skills.perception.training.schedule import HIGHEST_RATE, REFINING_RATE, Schedule
 
 __all__ = ["train_command"]
 
@@ -22,7 +22,7 @@ UNLESS_SAID_MINUTES: Final = 240.0
 
 def train_command(
     data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
-    out: Annotated[Path, typer.Option(help="Folder for checkpoints, curves and the ONNX file.")],
+    out: Annotated[Path, typer.Option(help="Folder for checkpoints, figures and the ONNX file.")],
     minutes: Annotated[
         float | None, typer.Option(min=0.01, help="How long to learn; four hours unless said.", show_default=False)
     ] = None,
@@ -43,12 +43,9 @@ def train_command(
         Path | None,
         typer.Option(help="A checkpoint or a detector's ONNX file whose weights are taken over, and refined."),
     ] = None,
-    keep_early: Annotated[
-        bool, typer.Option("--keep-early", help="Leave the first layers as they are: more steps in the same time.")
-    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Train the detector and export it, with checkpoints and curves on the way."""
+    """Train the detector and export it, with checkpoints and figures on the way."""
     console = console_for(as_json)
     with refusals():
         check_folders(data, out, resume)
@@ -62,7 +59,6 @@ def train_command(
             processes=jobs or os.cpu_count() or 1,
             resume=resume,
             start=start,
-            keep_early=keep_early,
             schedule=Schedule.refining(rate or REFINING_RATE) if start else Schedule(rate or HIGHEST_RATE),
         )
         model, figures = _trained(options, console)
@@ -71,6 +67,6 @@ def train_command(
 
 def _trained(options: TrainOptions, console: Console) -> tuple[Path, dict[str, float]]:
     """The ONNX file and its figures. Raises InputError."""
-    from skills.detect.training.train import train
+    from skills.perception.training.train import train
 
     return learnt(partial(train, options), options.out, console)

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from executive.cli.detector_choice import FOUND_COLOUR, draw_box
-from skills.detect.scoring import Judged
+from skills.perception.training.scoring import Judged
 from skills.robot import Picture
 
 __all__ = ["Shown", "contact_sheet"]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -26,7 +27,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from plant.snapshot.values import State, array_of
+from plant.snapshot.values import State
 from skills.robot import FloatArray, Pose2D
 
 
@@ -72,8 +73,8 @@ class Carrier:
         self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_carrier")
         self._joints = self._add_joints(name, body)
         self._velocity = Velocity()
-        self._target = np.zeros(5)
-        self._posture = np.zeros(2)
+        self._target = [0.0] * 5
+        self._posture = (0.0, 0.0)
 
     def _add_joints(self, name: str, body: RigidBody) -> Sequence[Joint]:
         directions = {"x": (1, 0, 0), "y": (0, 1, 0), "yaw": (0, 0, 1), "height": (0, 0, 1), "pitch": (0, 1, 0)}
@@ -120,26 +121,32 @@ class Carrier:
     @property
     def posture(self) -> tuple[float, float]:
         """The height and pitch that are being commanded now, on the way to those wanted."""
-        return float(self._posture[0]), float(self._posture[1])
+        return self._posture
+
+    def state(self, positions: FloatArray) -> list[float]:
+        """(x, y, yaw, height, pitch) out of the plant's positions."""
+        values: list[float] = positions[self._places].tolist()
+        return values
+
+    @cached_property
+    def _places(self) -> list[int]:
+        """Where the joints stand in the plant's positions; after Finalize."""
+        return [joint.position_start() for joint in self._joints]
 
     def place(self, context: Context, pose: Pose2D, height_m: float) -> None:
         """Set the body's pose at the beginning of a run."""
         values = (pose.x_m, pose.y_m, pose.yaw_rad, height_m, 0.0)
         positions = self._plant.GetPositions(context)
-        for joint, value in zip(self._joints, values, strict=True):
-            positions[joint.position_start()] = value
+        positions[self._places] = values
         self._plant.SetPositions(context, positions)
-        self._target = np.array(values)
-        self._posture = np.array([height_m, 0.0])
-
-    def state(self, positions: FloatArray) -> FloatArray:
-        """(x, y, yaw, height, pitch) out of the plant's positions."""
-        return np.array([positions[joint.position_start()] for joint in self._joints])
+        self._plant.get_actuation_input_port(self.instance).FixValue(context, np.zeros(len(_AXES)))
+        self._target = [*values]
+        self._posture = (height_m, 0.0)
 
     def control(
         self,
         context: Context,
-        state: FloatArray,
+        state: Sequence[float],
         wanted: Velocity,
         posture: Sequence[float],
         dt_s: float,
@@ -148,52 +155,49 @@ class Carrier:
     ) -> None:
         """Command the joints for the next dt_s: ramp to `wanted` (body frame) and to the posture (height, pitch).
 
-        A robot that is `stopping` brakes harder than it otherwise changes its speed.
+        `state` is (x, y, yaw, height, pitch). A robot that is `stopping` brakes harder than it otherwise changes speed.
         """
-        self._velocity = self._ramp(wanted, dt_s, stopping=stopping)
-        yaw = state[2]
-        c, s = math.cos(yaw), math.sin(yaw)
-        v = self._velocity
-        rates = np.array([c * v.vx - s * v.vy, s * v.vx + c * v.vy, v.wz])
-        lead = np.array([self._limits.lead_m, self._limits.lead_m, self._limits.lead_m])
-        self._target[:3] = np.clip(self._target[:3] + rates * dt_s, state[:3] - lead, state[:3] + lead)
-        steps = np.array([self._limits.posture_speed_m_s, self._limits.pitch_rate_rad_s]) * dt_s
-        move = np.clip(np.asarray(posture) - self._posture, -steps, steps)
-        self._posture = self._posture + move
-        self._target[3:] = self._posture
-        desired = np.concatenate([self._target, rates, move / dt_s])
+        limits = self._limits
+        v = self._velocity = self._ramp(wanted, dt_s, stopping=stopping)
+        c, s = math.cos(state[2]), math.sin(state[2])
+        rates = (c * v.vx - s * v.vy, s * v.vx + c * v.vy, v.wz)
+        planar = zip(self._target[:3], rates, state[:3], strict=True)
+        ahead = [now + _clip(target + rate * dt_s - now, limits.lead_m) for target, rate, now in planar]
+        most = (limits.posture_speed_m_s * dt_s, limits.pitch_rate_rad_s * dt_s)
+        move = [_clip(goal - now, step) for goal, now, step in zip(posture, self._posture, most, strict=True)]
+        self._posture = (self._posture[0] + move[0], self._posture[1] + move[1])
+        self._target = [*ahead, *self._posture]
+        desired = np.array([*self._target, *rates, move[0] / dt_s, move[1] / dt_s])
         self._plant.get_desired_state_input_port(self.instance).FixValue(context, desired)
-        self._plant.get_actuation_input_port(self.instance).FixValue(context, np.zeros(5))
 
     def state_kept(self) -> State:
         """What it asks of its joints."""
         v = self._velocity
         return {
             "velocity": [v.vx, v.vy, v.wz],
-            "target": self._target.tolist(),
-            "posture": np.asarray(self._posture).tolist(),
+            "target": [*self._target],
+            "posture": [*self._posture],
         }
 
     def restore(self, state: State) -> None:
         """Go on from such a state."""
         self._velocity = Velocity(*state["velocity"])
-        self._target, self._posture = array_of(state["target"]), array_of(state["posture"])
+        self._target = [*state["target"]]
+        self._posture = (state["posture"][0], state["posture"][1])
 
     def _ramp(self, wanted: Velocity, dt_s: float, *, stopping: bool) -> Velocity:
         limits, now = self._limits, self._velocity
-        goal = np.array([wanted.vx, wanted.vy])
-        speed = float(np.linalg.norm(goal))
-        if speed > limits.speed_m_s:
-            goal *= limits.speed_m_s / speed
-        change = goal - [now.vx, now.vy]
-        size, most = (
-            float(np.linalg.norm(change)),
-            (limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2) * dt_s,
-        )
-        if size > most:
-            change *= most / size
-        turn_goal = float(np.clip(wanted.wz, -limits.turn_rate_rad_s, limits.turn_rate_rad_s))
+        speed = math.hypot(wanted.vx, wanted.vy)
+        scale = min(1.0, limits.speed_m_s / speed) if speed else 1.0
+        change_x, change_y = scale * wanted.vx - now.vx, scale * wanted.vy - now.vy
+        size = math.hypot(change_x, change_y)
+        most = (limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2) * dt_s
+        share = min(1.0, most / size) if size else 0.0
         turn_rate = limits.stop_turn_deceleration_rad_s2 if stopping else limits.turn_acceleration_rad_s2
-        turn_most = turn_rate * dt_s
-        turn = float(np.clip(turn_goal - now.wz, -turn_most, turn_most))
-        return Velocity(now.vx + float(change[0]), now.vy + float(change[1]), now.wz + turn)
+        turn = _clip(_clip(wanted.wz, limits.turn_rate_rad_s) - now.wz, turn_rate * dt_s)
+        return Velocity(now.vx + share * change_x, now.vy + share * change_y, now.wz + turn)
+
+
+def _clip(value: float, most: float) -> float:
+    """The value, cut to [-most, most]."""
+    return min(max(value, -most), most)

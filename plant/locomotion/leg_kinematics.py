@@ -6,6 +6,7 @@ A leg is hip x, hip y and knee; the foot's centre is a point of the lower leg. A
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,12 +56,12 @@ class LegKinematics:
         c, s = math.cos(hx_rad), math.sin(hx_rad)
         return np.array([x, c * y - s * z, s * y + c * z]) + self.p_BHip
 
-    def joints(self, p_BFoot: FloatArray) -> tuple[float, float, float]:
+    def joints(self, p_BFoot: Sequence[float]) -> tuple[float, float, float]:
         """Joint angles (hip x, hip y, knee; rad) that put the foot there, knee bent backwards.
 
         Raises UnreachableFootError when the foot would lie beyond the stretched leg or inside its smallest fold.
         """
-        x, y, z = (float(a - b) for a, b in zip(p_BFoot, self.p_BHip, strict=True))
+        x, y, z = p_BFoot[0] - self.p_BHip[0], p_BFoot[1] - self.p_BHip[1], p_BFoot[2] - self.p_BHip[2]
         drop_squared = y * y + z * z - self.side_m**2
         if drop_squared <= 0.0:
             raise UnreachableFootError(f"foot at {p_BFoot} lies beside the hip")

@@ -92,10 +92,10 @@ class Trot:
         self._progress_s = state["progress_s"]
 
     def _maybe_lift(self, motion: BodyMotion) -> None:
-        offsets = np.linalg.norm((self._feet_W - self._places(motion, 0.0, 0.0))[:, :2], axis=1)
         moving = math.hypot(motion.vx, motion.vy) > 0.02 or abs(motion.wz) > 0.05
         if not moving:
-            worst = [max(offsets[foot] for foot in pair) for pair in _PAIRS]
+            offsets = self._feet_W - self._places(motion, 0.0, 0.0)
+            worst = [max(math.hypot(*offsets[foot, :2]) for foot in pair) for pair in _PAIRS]
             if max(worst) < self._parameters.rest_tolerance_m:
                 return
             self._next_pair = int(np.argmax(worst))
@@ -121,5 +121,6 @@ class Trot:
         """Resting places under the body as it will be in the middle of the next stance, (4, 3)."""
         x, y, yaw = motion.ahead(until_landing_s + half_stance_s)
         c, s = math.cos(yaw), math.sin(yaw)
-        rotated = self._nominal_B @ np.array([[c, s], [-s, c]])
-        return np.column_stack([rotated + [x, y], np.full(len(LEGS), self._parameters.foot_radius_m)])
+        turned_to_W = np.array([[c, s, 0.0], [-s, c, 0.0]])
+        places: FloatArray = self._nominal_B @ turned_to_W + (x, y, self._parameters.foot_radius_m)
+        return places

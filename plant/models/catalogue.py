@@ -31,4 +31,4 @@ class ModelClass(BaseModel):
 def load_catalogue() -> dict[str, ModelClass]:
     """All classes by name."""
     text = (MODELS_FOLDER / "catalogue.yaml").read_text(encoding="utf-8")
-    return {name: ModelClass.model_validate(entry) for name, entry in yaml.safe_load(text).items()}
+    return {name: ModelClass.model_validate(entry) for name, entry in yaml.load(text, Loader=yaml.CSafeLoader).items()}

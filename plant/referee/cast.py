@@ -70,10 +70,13 @@ class LinkNames:
 
 @dataclass(frozen=True)
 class Cast:
-    """All actors by body index, and the bodies whose motion is watched."""
+    """All actors by number, the actor of each collision shape, and the bodies whose motion is watched.
+
+    A body's actor has its index; pieces of the scenery have the numbers after those.
+    """
 
     actors: Mapping[int, Actor]
-    body_of_geometry: Mapping[GeometryId, int]
+    actor_of_geometry: Mapping[GeometryId, int]
     objects: Mapping[str, RigidBody]
     classes: Mapping[str, str]
     persons: Mapping[str, RigidBody]
@@ -87,8 +90,12 @@ class Cast:
         robots: Sequence[str],
         persons: Sequence[str],
         links: LinkNames,
+        scenery: Mapping[GeometryId, str],
     ) -> Cast:
-        """Read the cast off a finalized plant. Raises ValueError that names what is not there."""
+        """Read the cast off a finalized plant. Raises ValueError that names what is not there.
+
+        `scenery` names the pieces of furniture whose shapes belong to the world body.
+        """
         things = [placed for placed in placements if placed.name not in persons]
         objects = {placed.name: _first_body(plant, placed.name) for placed in things}
         roles = {int(body.index()): Actor(Kind.OBJECT, name, f"the {name}") for name, body in objects.items()}
@@ -99,9 +106,11 @@ class Cast:
             for body in _bodies(plant, name):
                 kind = links.kind(body.name())
                 actors[int(body.index())] = Actor(kind, name, f"{name}'s {kind.value} ({body.name()})")
+        pieces = {name: plant.num_bodies() + number for number, name in enumerate(sorted({*scenery.values()}))}
+        actors |= {number: Actor(Kind.SCENERY, name, f"the {name}") for name, number in pieces.items()}
         return Cast(
             actors=actors,
-            body_of_geometry=_geometry_owners(plant),
+            actor_of_geometry=_geometry_owners(plant) | {each: pieces[name] for each, name in scenery.items()},
             objects=objects,
             classes={placed.name: placed.class_name for placed in things},
             persons={name: _first_body(plant, name) for name in persons},

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pydrake.geometry import GeometryId
-from pydrake.multibody.plant import ContactResults
+from pydrake.geometry import GeometryId, PenetrationAsPointPair
 
 from plant.referee.cast import ROBOT_KINDS, Actor, Kind
 from plant.snapshot.values import State
@@ -16,16 +15,14 @@ Pair = tuple[int, int]
 FLOOR_Z_M = 0.04
 
 
-def touching(results: ContactResults, body_of_geometry: Mapping[GeometryId, int]) -> dict[Pair, float]:
-    """Pairs of body indices (lower first) in contact, and the height of their lowest contact point (m)."""
+def touching(
+    penetrations: Sequence[PenetrationAsPointPair], actor_of_geometry: Mapping[GeometryId, int]
+) -> dict[Pair, float]:
+    """Pairs of actors' numbers (lower first) in contact, and the height of their lowest contact point (m)."""
     lowest: dict[Pair, float] = {}
-    for i in range(results.num_point_pair_contacts()):
-        info = results.point_pair_contact_info(i)
-        _lower(lowest, int(info.bodyA_index()), int(info.bodyB_index()), float(info.contact_point()[2]))
-    for i in range(results.num_hydroelastic_contacts()):
-        surface = results.hydroelastic_contact_info(i).contact_surface()
-        a, b = body_of_geometry[surface.id_M()], body_of_geometry[surface.id_N()]
-        _lower(lowest, a, b, float(surface.centroid()[2]))
+    for each in penetrations:
+        a, b = actor_of_geometry[each.id_A], actor_of_geometry[each.id_B]
+        _lower(lowest, a, b, float(each.p_WCa[2] + each.p_WCb[2]) / 2.0)
     return lowest
 
 

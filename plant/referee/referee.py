@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
+from pydrake.geometry import GeometryId
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
@@ -31,18 +34,20 @@ class Referee:
         robots: Sequence[str],
         persons: Sequence[str] = (),
         links: LinkNames | None = None,
+        scenery: Mapping[GeometryId, str] = MappingProxyType({}),
     ) -> None:
-        """Build for a finalized plant.
+        """Build for a finalized plant; `scenery` names the pieces of furniture whose shapes are the world body's.
 
         `placements` are the loose objects; those named in `persons` are people. `robots` are the model instances of the
         robots. Raises ValueError that names what the plant does not have.
         """
-        self._plant, self._results = plant, plant.get_contact_results_output_port()
-        self._cast = Cast.of(plant, placements, robots, persons, links or LinkNames())
+        self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
+        self._cast = Cast.of(plant, placements, robots, persons, links or LinkNames(), scenery)
         self._counter = CollisionCounter(self._cast.actors)
         self._stories = {name: ObjectStory(name, self._cast.classes[name]) for name in self._cast.objects}
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
         self._offers: dict[tuple[str, str], float] = {}
+        self.contact_points = 0
         self._bases: dict[str, FloatArray] = {}
         self._persons: dict[str, FloatArray] = {}
 
@@ -71,9 +76,11 @@ class Referee:
         """The way of a robot's body so far, (N, 3) in the world, a point every few centimetres. Raises KeyError."""
         return np.array(self._paths[robot], dtype=np.float64).reshape(-1, 3)
 
-    def observe(self, plant_context: Context, time_s: float) -> None:
-        """Look at the plant's state at time_s."""
-        pairs = touching(self._results.Eval(plant_context), self._cast.body_of_geometry)
+    def observe(self, plant_context: Context, time_s: float, *, asleep: Collection[str] = ()) -> None:
+        """Look at the plant's state at time_s; objects that are `asleep` are as they were at the last look."""
+        penetrations = self._geometry.Eval(plant_context).ComputePointPairPenetration()
+        self.contact_points += len(penetrations)
+        pairs = touching(penetrations, self._cast.actor_of_geometry)
         self._counter.update(time_s, pairs)
         self._bases = {name: self._position(plant_context, body) for name, body in self._cast.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._cast.persons.items()}
@@ -81,8 +88,11 @@ class Referee:
             _extend(self._paths[name], p_WB)
         neighbours = self._neighbours(pairs)
         for name, body in self._cast.objects.items():
-            touches = neighbours.get(int(body.index()), {})
-            self._stories[name].take(self._look(plant_context, time_s, self._position(plant_context, body), touches))
+            story, touches = self._stories[name], neighbours.get(int(body.index()), {})
+            if name in asleep:
+                story.take(replace(story.last, time_s=time_s))
+            else:
+                story.take(self._look(plant_context, time_s, self._position(plant_context, body), touches))
         self._note_offers(time_s)
 
     def judge(self, promises: Sequence[Promise]) -> Verdict:

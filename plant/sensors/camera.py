@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +29,15 @@ class Camera:
         rng: np.random.Generator,
         *,
         renderer: str = "vtk",
+        work: Counter[str] | None = None,
         picture_noise: PictureNoise | None = None,
         depth_noise: DepthNoise | None = None,
     ) -> None:
-        """`link_frame` is the geometry frame of the link (`MultibodyPlant.GetBodyFrameIdOrThrow`)."""
+        """`link_frame` is the geometry frame of the link (`MultibodyPlant.GetBodyFrameIdOrThrow`).
+
+        What is rendered is counted in `work`, by size.
+        """
+        self._work = Counter() if work is None else work
         self.spec = spec
         self._link_frame, self._X_LC = link_frame, spec.X_link_camera()
         picture, depth = spec.intrinsics(), spec.depth_intrinsics()
@@ -83,12 +90,15 @@ class Camera:
         lens = self.spec.depth_intrinsics()
         seen = grey if grey.size else _grey(self._render(query_object, self._faint_camera))
         small = seen if seen.shape == (lens.height, lens.width) else cv2.resize(seen, (lens.width, lens.height))
+        self._work[f"depth_pictures_{lens.width}x{lens.height}"] += 1
         image = query_object.RenderDepthImage(self._depth_camera, self._link_frame, self._X_LC)
         clean_m = np.asarray(image.data[..., 0], dtype=np.float32)  # 0 or infinite out of range
         return self._depth.depth(clean_m, np.asarray(small, dtype=np.uint8))
 
     def _render(self, query_object: QueryObject, camera: ColorRenderCamera) -> NDArray[np.uint8]:
         """The clean picture (H, W, 3) RGB."""
+        info = camera.core().intrinsics()
+        self._work[f"pictures_{info.width()}x{info.height()}"] += 1
         image = query_object.RenderColorImage(camera, self._link_frame, self._X_LC)
         return np.ascontiguousarray(image.data[..., :3])
 

@@ -86,7 +86,8 @@ def load_cameras(path: Path) -> dict[str, CameraSpec]:
     """Camera specs by name, in the file's order. Raises ValueError that names file, line, camera and field."""
     text = path.read_text(encoding="utf-8")
     try:
-        entries, tree = yaml.safe_load(text), yaml.compose(text, Loader=yaml.SafeLoader)
+        tree = yaml.compose(text, Loader=yaml.CSafeLoader)
+        entries = yaml.load(text, Loader=yaml.CSafeLoader)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise ValueError(f"{path}:{line}: not valid YAML: {error.problem}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -21,14 +22,14 @@ from skills.robot import Scan
 
 @dataclass(frozen=True)
 class LidarSpec:
-    """Beams and noise. The defaults are those of a Velodyne VLP-16.
+    """Beams and noise. The defaults are those of a Velodyne VLP-16 at 20 revolutions a second.
 
     Elevations run evenly over +- `half_fov_rad`; `dropout` is the share of returns lost at random.
     """
 
     rings: int = 16
     half_fov_rad: float = float(np.radians(15.0))
-    azimuth_step_rad: float = float(np.radians(0.2))
+    azimuth_step_rad: float = float(np.radians(0.4))
     min_range_m: float = 0.5
     max_range_m: float = 100.0
     sigma_m: float = 0.03
@@ -57,11 +58,14 @@ class Lidar:
         *,
         unseen: Collection[ModelInstanceIndex] | None = None,
         spec: LidarSpec | None = None,
+        work: Counter[str] | None = None,
     ) -> None:
         """Build for a finalized plant.
 
         `unseen` are the model instances that the beams pass through, by default the one that carries the lidar.
+        The rays cast are counted in `work`.
         """
+        self._work = Counter() if work is None else work
         self.spec = spec or LidarSpec()
         self._plant, self._body, self._X_BL, self._rng = plant, body, X_BL, rng
         self._scene = RayScene(plant, inspector, (body.model_instance(),) if unseen is None else unseen)
@@ -89,6 +93,7 @@ class Lidar:
 
     def true_ranges(self, plant_context: Context, X_WL: RigidTransform) -> NDArray[np.float32]:
         """Ranges (rings, azimuths) without noise from a pose, `NO_RETURN_M` where nothing is hit."""
+        self._work["lidar_rays"] += len(self._elevations) * len(self._azimuths)
         shapes = self._scene.world_shapes(plant_context)
         ranges = cast_rays(
             shapes.kinds,

@@ -93,7 +93,7 @@ class RayScene:
             body = plant.GetBodyFromFrameId(inspector.GetFrameId(geometry))
             if body is None or int(body.model_instance()) in excluded:
                 continue
-            row = _row(inspector, geometry)
+            row = shape_row(inspector, geometry)
             if plant.IsAnchored(body):
                 X_WF = plant.EvalBodyPoseInWorld(default_context, body)
                 anchored.append((row[0], row[1], X_WF @ row[2]))
@@ -134,7 +134,7 @@ class RayScene:
         return matrices[:, :, :3], matrices[:, :, 3]
 
 
-def _row(inspector: SceneGraphInspector, geometry: GeometryId) -> Row:
+def shape_row(inspector: SceneGraphInspector, geometry: GeometryId) -> Row:
     """(kind, half extents, X_FG) of one geometry in its frame F. Raises ValueError for an unbounded shape."""
     shape, X_FG = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
     maker = _MAKERS.get(type(shape))

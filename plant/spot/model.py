@@ -21,7 +21,7 @@ from plant.models.spot.description import (
     spot_urdf,
 )
 from plant.models.spot.looks import looks_folder
-from skills.robot import Pose2D
+from skills.robot import FloatArray, Pose2D
 
 JAW = "arm_f1x"
 _LEG_GAINS = (600.0, 12.0)
@@ -112,7 +112,11 @@ class SpotModel:
 
 
 class JointIndex:
-    """Index arrays of a Spot's joints: into the plant's positions and velocities, in the order of its actuators."""
+    """Index arrays of a Spot's joints: into the plant's positions and velocities, in the order of its actuators.
+
+    `arm`, `jaw` and `legs` stand for positions in the desired state of the actuators, `arm_rates` and `leg_rates` for
+    velocities there.
+    """
 
     def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
         actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices(instance)]
@@ -123,7 +127,20 @@ class JointIndex:
         self.efforts = np.array([actuator.effort_limit() for actuator in actuators])
         self.lower = np.array([joint.position_lower_limits()[0] for joint in joints])
         self.upper = np.array([joint.position_upper_limits()[0] for joint in joints])
+        gains = [actuator.get_controller_gains() for actuator in actuators]
+        self._stiffness = np.array([each.p for each in gains])
+        self._damping = np.array([each.d for each in gains])
         self.arm = np.array([self.names.index(name) for name in arm_joint_names()])
         self.jaw = self.names.index(JAW)
         self.legs = np.array([[self.names.index(joint) for joint in leg_joint_names(leg)] for leg in LEGS])
+        self.arm_rates, self.leg_rates = len(joints) + self.arm, len(joints) + self.legs
         self.jaw_gain = _ARM_GAINS[JAW][0]
+
+    def efforts_of(
+        self, desired: FloatArray, feed_forward: FloatArray, positions: FloatArray, rates: FloatArray
+    ) -> FloatArray:
+        """Efforts of the actuators in a state, for a desired state and feed-forward efforts."""
+        goals, goal_rates = np.split(desired, 2)
+        wanted = self._stiffness * (goals - positions) + self._damping * (goal_rates - rates) + feed_forward
+        efforts: FloatArray = np.clip(wanted, -self.efforts, self.efforts)
+        return efforts

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
-from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
 from plant.locomotion.carrier import Velocity
@@ -65,8 +65,9 @@ class SpotRobot:
         self._posture = (float(spot_facts()["capabilities"]["standing_height"]), 0.0)
         self._leg_servos = LegServos(self._index, joints[self._index.legs])
         self._trot = Trot(nominal_footholds())
-        self._trot.reset(self._motion())
+        self._trot.reset(self._motion(self._base(positions)))
         self._capabilities = spot_capabilities()
+        self._tip_radius_m = float(spot_facts()["gripper"]["tip_radius"])
 
     # -- know and sense -------------------------------------------------------------------------------------------
 
@@ -198,25 +199,19 @@ class SpotRobot:
         """Command all servos for the next dt_s of simulated time."""
         self._now_s = now_s
         self._expire()
-        plant, positions = self._model.plant, self._positions()
-        joints = positions[self._index.positions]
-        rates = plant.GetVelocities(self._context)[self._index.velocities]
-        self._follow_up(joints, rates, dt_s)
-        desired, desired_rates = joints.copy(), np.zeros(len(joints))
-        desired[self._index.arm], desired_rates[self._index.arm] = self._arm_hold, self._arm_rate
-        desired[self._index.jaw] = jaw_set_point(
-            self._jaw_goal,
-            float(joints[self._index.jaw]),
-            self._index.jaw_gain,
-            spot_facts()["gripper"]["tip_radius"],
-        )
-        self._drive_body(positions, dt_s)
-        legs, leg_rates = self._legs(dt_s)
-        desired[self._index.legs], desired_rates[self._index.legs] = legs, leg_rates
-        gravity = -plant.CalcGravityGeneralizedForces(self._context)[self._index.velocities]
+        plant, index, positions = self._model.plant, self._index, self._positions()
+        joints, base = positions[index.positions], self._base(positions)
+        rates = plant.GetVelocities(self._context)[index.velocities]
+        self._follow_up(joints, rates, base, dt_s)
+        desired = np.concatenate([joints, np.zeros(len(joints))])
+        desired[index.arm], desired[index.arm_rates] = self._arm_hold, self._arm_rate
+        desired[index.jaw] = jaw_set_point(self._jaw_goal, float(joints[index.jaw]), index.jaw_gain, self._tip_radius_m)
+        self._drive_body(base, dt_s)
+        desired[index.legs], desired[index.leg_rates] = self._legs(base, dt_s)
+        gravity = plant.CalcGravityGeneralizedForces(self._context)[index.velocities]
         instance = self._model.instance
-        plant.get_desired_state_input_port(instance).FixValue(self._context, np.concatenate([desired, desired_rates]))
-        feed_forward = np.clip(gravity, -self._index.efforts, self._index.efforts)
+        plant.get_desired_state_input_port(instance).FixValue(self._context, desired)
+        feed_forward = np.minimum(np.maximum(-gravity, -index.efforts), index.efforts)
         plant.get_actuation_input_port(instance).FixValue(self._context, feed_forward)
 
     def sense(self, now_s: float) -> None:
@@ -317,13 +312,13 @@ class SpotRobot:
             else:
                 self._halt(part, "expired before it was done")
 
-    def _follow_up(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> None:
+    def _follow_up(self, joints: FloatArray, rates: FloatArray, base: Sequence[float], dt_s: float) -> None:
         self._follow_arm(joints, rates)
         self._follow_jaw(joints, rates, dt_s)
         posture = self._book.running(Part.POSTURE)
         if posture is not None and isinstance(posture.payload, tuple):
             self._posture = posture.payload
-            height, pitch = self._carrier_state()[3:]
+            height, pitch = base[3:]
             if abs(height - self._posture[0]) < 0.01 and abs(pitch - self._posture[1]) < 0.02:
                 self._book.finish(Part.POSTURE, CommandState.DONE)
 
@@ -349,48 +344,42 @@ class SpotRobot:
         if arrived or self._jaw_still_s > _JAW_STALL_S:
             self._book.finish(Part.GRIPPER, CommandState.DONE, "" if arrived else "stopped by a thing in the jaw")
 
-    def _drive_body(self, positions: FloatArray, dt_s: float) -> None:
+    def _drive_body(self, base: Sequence[float], dt_s: float) -> None:
         carrier = self._model.carrier
         if carrier is None:
             return
         active = self._book.running(Part.VELOCITY)
         wanted = active.payload if active is not None and isinstance(active.payload, Velocity) else Velocity()
-        stopping = active is None
-        carrier.control(self._context, carrier.state(positions), wanted, self._posture, dt_s, stopping=stopping)
+        carrier.control(self._context, base, wanted, self._posture, dt_s, stopping=active is None)
 
-    def _legs(self, dt_s: float) -> tuple[FloatArray, FloatArray]:
+    def _legs(self, base: Sequence[float], dt_s: float) -> tuple[FloatArray, FloatArray]:
         if self._model.carrier is None:
             return self._leg_servos.rest_rad, np.zeros_like(self._leg_servos.rest_rad)
-        motion = self._motion()
+        motion = self._motion(base)
         feet_W = self._trot.step(motion, dt_s)
-        x, y, yaw = motion.ahead(dt_s)
-        X_WB = self._model.plant.EvalBodyPoseInWorld(self._context, self._model.body)
-        ahead = BodyMotion(x, y, yaw, 0.0, 0.0, 0.0)
-        X_WB_ahead = _moved(X_WB, motion, ahead)
-        return self._leg_servos.set_points(X_WB_ahead, feet_W, dt_s)
+        X_WB = self._model.plant.EvalBodyPoseInWorld(self._context, self._model.body).GetAsMatrix34()
+        return self._leg_servos.set_points(_feet_ahead(feet_W, motion, X_WB, dt_s), dt_s)
 
-    def _motion(self) -> BodyMotion:
-        x, y, yaw = self._carrier_state()[:3]
+    def _motion(self, base: Sequence[float]) -> BodyMotion:
         carrier = self._model.carrier
         velocity = carrier.velocity if carrier is not None else Velocity()
-        return BodyMotion(float(x), float(y), float(yaw), velocity.vx, velocity.vy, velocity.wz)
+        return BodyMotion(base[0], base[1], base[2], velocity.vx, velocity.vy, velocity.wz)
 
-    def _carrier_state(self) -> FloatArray:
+    def _base(self, positions: FloatArray) -> Sequence[float]:
+        """The carrier's (x, y, yaw, height, pitch)."""
         carrier = self._model.carrier
-        return carrier.state(self._positions()) if carrier is not None else np.zeros(5)
+        return (0.0,) * 5 if carrier is None else carrier.state(positions)
 
     def _positions(self) -> FloatArray:
         positions: FloatArray = self._model.plant.GetPositions(self._context)
         return positions
 
 
-def _moved(X_WB: RigidTransform, before: BodyMotion, after: BodyMotion) -> RigidTransform:
-    """The body's pose after the planar motion from `before` to `after`, at the same height and tilt."""
-    X_WP = RigidTransform(_planar(before))
-    X_WQ = RigidTransform(_planar(after))
-    return X_WQ @ X_WP.inverse() @ X_WB
-
-
-def _planar(motion: BodyMotion) -> RigidTransform:
-    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-    return RigidTransform(np.array([[c, -s, 0, motion.x_m], [s, c, 0, motion.y_m], [0, 0, 1, 0], [0, 0, 0, 1]]))
+def _feet_ahead(feet_W: FloatArray, motion: BodyMotion, X_WB: FloatArray, dt_s: float) -> FloatArray:
+    """Feet (4, 3) in the frame of a body that, from X_WB (3, 4), moves on for dt_s at the same height and tilt."""
+    x, y, yaw = motion.ahead(dt_s)
+    c, s = math.cos(yaw - motion.yaw_rad), math.sin(yaw - motion.yaw_rad)
+    turned_back = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    feet_now_W = (feet_W - (x, y, 0.0)) @ turned_back + (motion.x_m, motion.y_m, 0.0)
+    feet_B: FloatArray = (feet_now_W - X_WB[:, 3]) @ X_WB[:, :3]
+    return feet_B

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Protocol
@@ -59,10 +60,12 @@ class SpotSensors:
         scene: Scene | None = None,
         dock: Pose2D | None = None,
         charge: float = 1.0,
+        work: Counter[str] | None = None,
     ) -> None:
         """`context` is the plant's. The seed and the robot's name give the noise. Without a scene, cameras are blind.
 
-        The battery begins at `charge` (0 to 1) and charges while the body stands still at `dock`.
+        The battery begins at `charge` (0 to 1) and charges while the body stands still at `dock`. `work` counts rays
+        cast and pictures rendered.
         """
         self._model, self._scene_graph, self._dock = model, scene_graph, dock
         self._scene, self._context = scene, context
@@ -75,18 +78,18 @@ class SpotSensors:
         self._joint_model = JointModel(next(rngs), self._index.names)
         self._gripper_model = GripperModel(next(rngs))
         self._battery_model = BatteryModel(next(rngs), charge, BatterySpec(runtime_s=body["runtime"]))
-        self._lidar = self._make_lidar(next(rngs))
+        self._lidar = self._make_lidar(next(rngs), work)
         self._cameras = {
-            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER)
+            name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER, work=work)
             for name, spec in load_cameras(CAMERAS).items()
         }
         self._scan: Scan | None = None
         self.update(0.0)
 
-    def _make_lidar(self, rng: np.random.Generator) -> Lidar:
+    def _make_lidar(self, rng: np.random.Generator, work: Counter[str] | None) -> Lidar:
         plant, X_BL = self._model.plant, RigidTransform(spot_facts()["lidar"]["xyz"])
         inspector = self._scene_graph.model_inspector()
-        return Lidar(plant, inspector, self._model.body, X_BL, rng, unseen=self._model.instances())
+        return Lidar(plant, inspector, self._model.body, X_BL, rng, unseen=self._model.instances(), work=work)
 
     def _link_frame(self, link: str) -> FrameId:
         plant = self._model.plant
@@ -103,7 +106,7 @@ class SpotSensors:
         self._imu = self._imu_model.update(now_s, X_WB, w_WB, v_WB)
         positions = _array(plant.GetPositions(self._context)[index.positions])
         rates = _array(plant.GetVelocities(self._context)[index.velocities])
-        efforts = _array(plant.get_net_actuation_output_port(self._model.instance).Eval(self._context))
+        efforts = self._efforts(positions, rates)
         self._joints = self._joint_model.update(now_s, positions, rates, efforts)
         self._gripper = self._gripper_model.update(
             now_s, -float(positions[index.jaw]), self._clamp_force_n(rates, efforts)
@@ -112,6 +115,16 @@ class SpotSensors:
         self._battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
         if self._scan is None or now_s - self._scan.stamp_s >= _LIDAR_PERIOD_S - 1e-6:
             self._scan = self._lidar.scan(self._context, now_s, self._odometry.X_OB)
+
+    def _efforts(self, positions: FloatArray, rates: FloatArray) -> FloatArray:
+        """What the motors do: the servos' law with limits, as the plant's solver has it at the end of a step."""
+        plant, instance = self._model.plant, self._model.instance
+        servos = plant.get_desired_state_input_port(instance)
+        if not servos.HasValue(self._context):
+            return np.zeros(len(positions))
+        desired = _array(servos.Eval(self._context))
+        feed_forward = _array(plant.get_actuation_input_port(instance).Eval(self._context))
+        return self._index.efforts_of(desired, feed_forward, positions, rates)
 
     def _docked(self, X_WB: RigidTransform, v_WB: FloatArray) -> bool:
         """Whether the body stands still at the dock."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from plant.locomotion.leg_kinematics import LegKinematics, UnreachableFootError
 from plant.models.spot.description import LEGS
 from plant.snapshot.values import State, array_of
 from plant.spot.model import JointIndex
 from skills.robot import ArmTrajectory, FloatArray
+
+_MAX_LEG_RATE_RAD_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ def arm_set_point(trajectory: ArmTrajectory, elapsed_s: float) -> tuple[FloatArr
 def jaw_set_point(goal: JawGoal, jaw_rad: float, gain_nm_rad: float, tip_radius_m: float) -> float:
     """Jaw joint position (rad, negative open) that makes the servo push with no more than the goal's force."""
     lead = goal.force_n * tip_radius_m / gain_nm_rad
-    return float(np.clip(-goal.opening_rad, jaw_rad - lead, jaw_rad + lead))
+    return min(max(-goal.opening_rad, jaw_rad - lead), jaw_rad + lead)
 
 
 class LegServos:
@@ -45,17 +47,19 @@ class LegServos:
 
     def __init__(self, index: JointIndex, rest_rad: FloatArray) -> None:
         """`rest_rad`: (4, 3) joint angles at the beginning."""
-        self._index = index
+        self._lower, self._upper = index.lower[index.legs], index.upper[index.legs]
         self._kinematics = [LegKinematics.of(leg) for leg in LEGS]
         self.rest_rad = rest_rad.copy()
         self._last = rest_rad.copy()
 
-    def set_points(self, X_WB: RigidTransform, feet_W: FloatArray, dt_s: float) -> tuple[FloatArray, FloatArray]:
-        """Positions and velocities (4, 3) of the leg joints; a foot out of reach keeps its leg as it was."""
-        feet_B = (feet_W - X_WB.translation()) @ X_WB.rotation().matrix()
-        lower, upper = self._index.lower[self._index.legs], self._index.upper[self._index.legs]
-        joints = np.clip([self._solve(foot, feet_B[foot]) for foot in range(len(LEGS))], lower, upper)
-        rates = np.clip((joints - self._last) / dt_s, -20.0, 20.0)
+    def set_points(self, feet_B: FloatArray, dt_s: float) -> tuple[FloatArray, FloatArray]:
+        """Positions and velocities (4, 3) of the leg joints for feet (4, 3) in the body frame.
+
+        A foot out of reach keeps its leg as it was.
+        """
+        solved = [self._solve(foot, p_BFoot) for foot, p_BFoot in enumerate(feet_B.tolist())]
+        joints = np.minimum(np.maximum(solved, self._lower), self._upper)
+        rates = np.minimum(np.maximum((joints - self._last) / dt_s, -_MAX_LEG_RATE_RAD_S), _MAX_LEG_RATE_RAD_S)
         self._last = joints
         return joints, rates
 
@@ -67,7 +71,7 @@ class LegServos:
         """Go on from such a state."""
         self._last = array_of(state["last"])
 
-    def _solve(self, foot: int, p_BFoot: FloatArray) -> tuple[float, float, float]:
+    def _solve(self, foot: int, p_BFoot: Sequence[float]) -> tuple[float, float, float]:
         try:
             return self._kinematics[foot].joints(p_BFoot)
         except UnreachableFootError:

@@ -72,8 +72,8 @@ def _place(
         surface = world.surfaces[name]
         for centre, yaw in _candidates(world, surface, rng):
             outline = outline_W(model, centre, yaw)
-            clear = all(polygon_distance(outline, other) >= rules.clear_m for other in obstacles)
-            if clear and _inside(outline, surface.polygon_W, rules.rim_m):
+            inside = _inside(outline, surface.polygon_W, rules.rim_m)
+            if inside and all(polygon_distance(outline, other) >= rules.clear_m for other in obstacles):
                 z = surface.height_m + model.rest_height_m + rules.drop_m
                 X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z], dtype=np.float64))
                 return Placement(rule.name, rule.model, model.path(), X_WO, name), outline

@@ -189,8 +189,8 @@ def _read(path: Path, schema: type[ModelT]) -> ModelT:
     """Read and check a YAML file; every error names the file, the line and the key."""
     try:
         text = path.read_text(encoding="utf-8")
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-        return schema.model_validate(yaml.safe_load(text))
+        root = yaml.compose(text, Loader=yaml.CSafeLoader)
+        return schema.model_validate(yaml.load(text, Loader=yaml.CSafeLoader))
     except OSError as error:
         raise WorldError(f"{path}: cannot be read ({error.strerror}); every world needs this file") from error
     except yaml.MarkedYAMLError as error:

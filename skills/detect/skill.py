@@ -22,7 +22,6 @@ from skills.detect.messages import (
     object_to_detect_message,
     tracks_message,
 )
-from skills.detect.seeing import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.detect.unidentified import unnamed
 from skills.detect.viewpoints import in_plain_view, look_targets, surface_boxes
 from skills.detect.words import counted, describe, surface_names, wanted
@@ -31,6 +30,7 @@ from skills.perception.attributes import known_attributes, shows
 from skills.perception.class_forms import class_forms
 from skills.perception.coverage import Coverage
 from skills.perception.detection_3d import FLOOR, Detection3D, detections_3d, observation
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.perception.surface_segmentation import Cluster, view_surface
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.robot import FloatArray, Image

@@ -14,7 +14,7 @@ __all__ = ["Cascade"]
 class Cascade:
     """Networks of an ONNX `file`; those that come with Errand unless one is named.
 
-    With `views` a picture of the hand camera is also looked through mirrored, smaller and in parts.
+    With `views` a picture of the hand camera that leaves doubt is looked through in several views.
     """
 
     file: str | None = None
@@ -22,9 +22,9 @@ class Cascade:
 
     def build(self) -> Detector:
         """The detector, loaded. Raises ModelFileError when its file cannot be used."""
-        from skills.detect.careful_detector import CarefulDetector
-        from skills.detect.detector_file import MODEL_FILE
-        from skills.detect.onnx_detector import load_detector
+        from skills.perception.detector.augmentation import AugmentedDetector
+        from skills.perception.detector.cascade_files import MODEL_FILE
+        from skills.perception.detector.onnx_detector import load_detector
 
         single = load_detector(MODEL_FILE if self.file is None else Path(self.file))
-        return CarefulDetector(single) if self.views else single
+        return AugmentedDetector(single) if self.views else single

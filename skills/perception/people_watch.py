@@ -11,8 +11,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Detection, Job, LayeredView, SkillContext
-from skills.detect.seeing import seen_in_grey
 from skills.geometry import relative
+from skills.perception.detector.camera_images import found_in_grey
 from skills.perception.people import SeenPerson, merged
 from skills.perception.position import position_of
 from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
@@ -121,7 +121,7 @@ class PeopleWatch:
     def _look(self, sources: Sequence[str], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
         """People in one picture of each camera."""
         images = [self._context.robot.image(source, depth=False) for source in sources]
-        found = seen_in_grey(self._context.detector, images)
+        found = found_in_grey(self._context.detector, images, PERSON)
         pairs = [(image, one) for image, ones in zip(images, found, strict=True) for one in ones]
         seen = [self._placed(image, one, X_WO, here_W) for image, one in pairs]
         return _Look(tuple(one for one in seen if one is not None), tuple(images), X_WO, here_W)

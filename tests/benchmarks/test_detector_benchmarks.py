@@ -11,8 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from skills.detect.network_file import THREADS
-from skills.detect.onnx_detector import load_detector
+from skills.perception.detector.onnx_detector import THREADS, load_detector
 
 PICTURES_PER_SECOND = 60
 LOADING_S = 0.5
@@ -63,7 +62,7 @@ def test_pictures_per_second(benchmark, pictures):
 
 def test_the_model_loads_in_a_fresh_process(benchmark):
     program = (
-        "import time; from skills.detect.onnx_detector import load_detector\n"
+        "import time; from skills.perception.detector.onnx_detector import load_detector\n"
         "begun = time.process_time(); load_detector(); print(time.process_time() - begun)"
     )
 

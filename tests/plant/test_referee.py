@@ -400,7 +400,7 @@ def test_region_with_a_notch_knows_its_inside():
 
 def test_a_look_is_cheap():
     stage = Stage().lift()
-    stage.plant.get_contact_results_output_port().Eval(stage.context)
+    stage.watch(0.05)
     times = []
     for _ in range(20):
         start = time.perf_counter()

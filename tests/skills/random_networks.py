@@ -1,16 +1,16 @@
-"""First networks of random weights, as learning may meet them in a file."""
+"""Proposal networks of random weights, as learning may meet them in a file."""
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from skills.detect.training.network import DetectorNetwork
+    from skills.perception.training.network import DetectorNetwork
 
 
 def random_network(seed: int, classes: int) -> "DetectorNetwork":
     """One whose normalisation has statistics unlike the first ones, and whose scores are not all alike. Needs torch."""
     import torch
 
-    from skills.detect.training.network import DetectorNetwork
+    from skills.perception.training.network import DetectorNetwork
 
     torch.manual_seed(seed)
     network = DetectorNetwork(classes)

@@ -84,14 +84,14 @@ def picture_of(*things, size=(480, 640), classes=CLASSES):
     return picture
 
 
-def second_bytes(
+def refinement_bytes(
     first: bytes, *, classes=CLASSES, form="errand-regions-1", key="first", told=None, size=128, left_only=False
 ) -> bytes:
-    """A second network: boxes a tenth smaller than the regions; the first class's score is the share of red.
+    """A refinement network: boxes a tenth smaller than the regions; the first class's score is the share of red.
 
     It tells as `key` the digest of the file of the one before it.
 
-    With `left_only` it looks at the left half of the chip alone.
+    With `left_only` it looks at the left half of the crop alone.
     """
     rows = ["N", len(classes)]
     nodes = [
@@ -136,19 +136,19 @@ def second_bytes(
 
 
 def write_pair(file: Path, **changes) -> Path:
-    """Both networks, beside each other; `changes` are the second one's."""
+    """Both networks, beside each other; `changes` are the refinement network's."""
     write_model(file)
-    file.with_name(f"{file.stem}_regions.onnx").write_bytes(second_bytes(file.read_bytes(), **changes))
+    file.with_name(f"{file.stem}_refinement.onnx").write_bytes(refinement_bytes(file.read_bytes(), **changes))
     return file
 
 
-def third_bytes(second: bytes, **changes) -> bytes:
-    """A third network that sees and tells what such a second one does."""
-    return second_bytes(second, **{"form": "errand-third-1", "key": "second", **changes})
+def classifier_bytes(second: bytes, **changes) -> bytes:
+    """A classifier network that sees and tells what such a second one does."""
+    return refinement_bytes(second, **{"form": "errand-third-1", "key": "second", **changes})
 
 
-def write_three(file: Path, **changes) -> Path:
-    """All three networks, beside each other; `changes` are the third one's."""
-    second = write_pair(file).with_name(f"{file.stem}_regions.onnx")
-    file.with_name(f"{file.stem}_third.onnx").write_bytes(third_bytes(second.read_bytes(), **changes))
+def write_cascade(file: Path, **changes) -> Path:
+    """All three networks, beside each other; `changes` are the classifier network's."""
+    second = write_pair(file).with_name(f"{file.stem}_refinement.onnx")
+    file.with_name(f"{file.stem}_classifier.onnx").write_bytes(classifier_bytes(second.read_bytes(), **changes))
     return file

@@ -22,7 +22,7 @@ _MESH_PREFIX = {"fl": "front_left", "fr": "front_right", "hl": "rear_left", "hr"
 @cache
 def spot_facts() -> Mapping[str, Any]:
     """The facts in `spot.yaml`."""
-    facts: Mapping[str, Any] = yaml.safe_load(Path(__file__).with_name("spot.yaml").read_text())
+    facts: Mapping[str, Any] = yaml.load(Path(__file__).with_name("spot.yaml").read_text(), Loader=yaml.CSafeLoader)
     return facts
 
 

@@ -20,10 +20,10 @@ from pathlib import Path
 
 import cv2
 
-from skills.detect.onnx_detector import DetectorOptions, load_detector
-from skills.detect.scoring import score
-from skills.detect.scoring_labels import pictures_of_coco
 from skills.detection import Detection
+from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
+from skills.perception.training.scoring import score
+from skills.perception.training.scoring_labels import pictures_of_coco
 
 GENERAL = Path(__file__).parent / "detect.mjs"
 CLASSES = ("person", "bottle")

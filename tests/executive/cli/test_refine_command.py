@@ -11,7 +11,7 @@ def run(*words: str) -> Result:
     return CliRunner().invoke(app, ["dataset", "refine", *words])
 
 
-def test_a_first_network_that_is_not_there_is_named(
+def test_a_proposal_network_that_is_not_there_is_named(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(learning.importlib.util, "find_spec", lambda _name: object())

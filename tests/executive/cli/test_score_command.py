@@ -1,5 +1,6 @@
 """`errand dataset score` with a small network whose pictures tell what it sees."""
 
+import importlib.util
 import json
 
 import cv2
@@ -9,7 +10,7 @@ from tiny_detector import picture_of, write_model
 from typer.testing import CliRunner
 
 from executive.cli.entry import app
-from skills.detect.careful_detector import CarefulDetector
+from skills.perception.detector.augmentation import AugmentedDetector
 
 HAMMER, BEER, STRAY = (
     ("hammer", 0.9, (100, 50, 200, 80)),
@@ -93,6 +94,25 @@ def test_all_figures_are_told(score, data):
     assert figures["by_size_px"][-1]["to"] is None
 
 
+def test_without_pycocotools_the_command_says_what_to_install(score, data, monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    result = score("--data", data)
+    assert result.exit_code == 2
+    assert "scoring needs pycocotools; pip install '.[train]'" in result.stderr
+
+
+def test_figures_are_told_by_camera(score, data):
+    document = json.loads(data.read_text())
+    for image, camera in zip(document["images"], ("hand", "left", "left"), strict=True):
+        image["camera"] = camera
+    figures = told(score("--data", written(data, document), "--json"))
+    assert figures["by_camera"]["hand"]["recall"] == 1.0
+    # the tiny network knows no people, so nothing counts on the body cameras
+    assert (figures["by_camera"]["body"]["pictures"], figures["by_camera"]["body"]["mAP50"]) == (2, None)
+    assert figures["recall"] == pytest.approx(3 / 4)
+    assert "body cameras" in score("--data", data).stdout
+
+
 def test_people_get_tables(score, data):
     result = score("--data", data)
     assert result.exit_code == 0
@@ -109,9 +129,9 @@ def test_a_plain_coco_file_has_no_figures_by_distance(score, data):
     assert figures["recall"] == pytest.approx(3 / 4)
 
 
-def test_what_careful_looks_find_is_judged_when_asked_for(score, data, monkeypatch):
-    monkeypatch.setattr(CarefulDetector, "detect_carefully", lambda self, picture: ())
-    assert told(score("--data", data, "--careful", "--json"))["recall"] == 0.0
+def test_test_time_augmentation_is_judged_when_asked_for(score, data, monkeypatch):
+    monkeypatch.setattr(AugmentedDetector, "detect_in_views", lambda self, picture: ())
+    assert told(score("--data", data, "--views", "--json"))["recall"] == 0.0
     assert told(score("--data", data, "--json"))["recall"] == pytest.approx(3 / 4)
 
 

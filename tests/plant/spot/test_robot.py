@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pydrake.multibody.plant import MultibodyPlantConfig
 
 from plant.diagram import build_diagram
 from plant.simulation import Engine
@@ -27,7 +28,7 @@ def lease(spot):
 def truth(engine):
     """(x, y, yaw, height, pitch) of the carrier."""
     model = engine.world.robots["Alice"]
-    return model.carrier.state(engine.world.plant.GetPositions(engine.context))
+    return np.array(model.carrier.state(engine.world.plant.GetPositions(engine.context)))
 
 
 def arm_to(spot, offset_rad, seconds):
@@ -165,3 +166,22 @@ def test_a_stopped_robot_stands_within_a_fifth_of_a_second(engine, spot, lease):
     before = truth(engine)
     engine.advance(0.5)
     assert np.abs(truth(engine) - before).max() < 0.01
+
+
+def test_efforts_of_joints_are_those_that_the_solver_applies(monkeypatch):
+    sensed, solved = [], []
+    for sampled in (False, True):
+        monkeypatch.setattr(
+            "plant.diagram.MultibodyPlantConfig",
+            lambda sampled=sampled, **given: MultibodyPlantConfig(**{**given, "use_sampled_output_ports": sampled}),
+        )
+        world = build_diagram(directives=None, models=[], robot_names=["Alice"], looks=False, render=False)
+        engine = Engine(world, {"Alice": Pose2D(0.0, 0.0, 0.0)})
+        spot, model = engine.robots["Alice"], world.robots["Alice"]
+        spot.drive(0.4, 0.0, 0.3, until_s=2.0, lease=spot.acquire_lease("test"))
+        engine.advance(0.7)
+        sensed.append([*spot.joints().effort_nm.values()])
+        solved.append(world.plant.get_net_actuation_output_port(model.instance).Eval(engine.context))
+    assert np.abs(solved[1]).max() > 5.0
+    np.testing.assert_allclose(sensed[0], solved[1], atol=2.0)  # noise of 0.3 Nm
+    np.testing.assert_allclose(sensed[0], sensed[1])

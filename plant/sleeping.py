@@ -1,0 +1,191 @@
+"""Loose objects at rest sleep: they float where they are, without weight and contacts, until something comes near.
+
+A sleeping object costs the solver nothing. It wakes when a link, or an object that moves, is about to reach it; when it
+is put elsewhere; and when an object beside it wakes, on which it may lie. All this is read off positions, so the same
+run sleeps and wakes at the same times. Joints are not locked for this: beside a locked joint, Drake's SAP
+crashes on any other body's contact with the world body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, SceneGraphInspector
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex, RigidBody
+from pydrake.systems.framework import Context
+
+from plant.diagram import WorldDiagram
+from plant.sensors.ray_shapes import shape_row
+from skills.robot import FloatArray
+
+_EXACT = 1e-9
+_REACH_M = 2.0
+"""Farther from its body than any link of a robot gets, with an object's own size and the margin."""
+
+
+@dataclass(frozen=True)
+class SleepLimits:
+    """When an object falls asleep and when it wakes.
+
+    It is still while its pose (metres, quaternion) changes by less than `still` per second, and falls asleep after
+    `still_s`. It wakes when bounding spheres come closer than `margin_m`, which nothing crosses between two updates.
+    Objects whose spheres are closer than `beside_m` sleep and wake together.
+    """
+
+    still: float = 0.004
+    still_s: float = 0.5
+    margin_m: float = 0.12
+    beside_m: float = 0.01
+
+
+@dataclass(frozen=True)
+class _Object:
+    """A loose object of one body, its collision shapes, and where it stands in the plant's velocities."""
+
+    name: str
+    body: RigidBody
+    shapes: GeometrySet
+    velocities: slice
+
+
+class _Spheres:
+    """One bounding sphere of the collision shapes of each of some bodies; bodies without shapes have none."""
+
+    def __init__(self, plant: MultibodyPlant, inspector: SceneGraphInspector, bodies: Sequence[RigidBody]) -> None:
+        self._plant = plant
+        found = [(body, _bound(inspector, plant.GetCollisionGeometriesForBody(body))) for body in bodies]
+        bounds = [(body, bound) for body, bound in found if bound is not None]
+        self._bodies = [body for body, _ in bounds]
+        self._centres_B = np.array([[*centre, 1.0] for _, (centre, _) in bounds]).reshape(-1, 4)
+        self.radii_m = np.array([radius for _, (_, radius) in bounds])
+
+    def centres_W(self, context: Context) -> FloatArray:
+        """The spheres' centres (N, 3) in the world."""
+        X_WB = [self._plant.EvalBodyPoseInWorld(context, body).GetAsMatrix34() for body in self._bodies]
+        centres: FloatArray = np.einsum("nij,nj->ni", np.array(X_WB).reshape(-1, 3, 4), self._centres_B)
+        return centres
+
+
+class Sleepers:
+    """Puts the loose objects of one plant to sleep and wakes them; call `update` regularly, before the plant steps."""
+
+    def __init__(self, world: WorldDiagram, root_context: Context, limits: SleepLimits | None = None) -> None:
+        """All objects are awake at first."""
+        plant, inspector = world.plant, world.scene_graph.model_inspector()
+        self._plant, self._limits = plant, limits or SleepLimits()
+        self._context = plant.GetMyMutableContextFromRoot(root_context)
+        geometry_context = world.scene_graph.GetMyMutableContextFromRoot(root_context)
+        self._filters = world.scene_graph.collision_filter_manager(geometry_context)
+        self._all_shapes = GeometrySet([*_all_shapes(plant)])
+        self._objects = tuple(_objects(plant, world.models))
+        own = {int(each.body.index()) for each in self._objects}
+        others = [body for body in _moving_bodies(plant) if int(body.index()) not in own]
+        self._links = _Spheres(plant, inspector, others)
+        of_robots = {int(instance) for robot in world.robots.values() for instance in robot.instances()}
+        self._only_robots_move = all(int(body.model_instance()) in of_robots for body in others)
+        self._robots = [robot.body for robot in world.robots.values()]
+        self._bounds = _Spheres(plant, inspector, [each.body for each in self._objects])
+        starts = [each.body.floating_positions_start() for each in self._objects]
+        self._places = np.array([range(start, start + 7) for start in starts], dtype=np.int64).reshape(-1, 7)
+        self._asleep = np.zeros(len(self._objects), dtype=bool)
+        self._lift = np.zeros(plant.num_velocities())
+        self._still_s = np.zeros(len(self._objects))
+        self._last: tuple[float, FloatArray, FloatArray] | None = None
+
+    @property
+    def asleep(self) -> frozenset[str]:
+        """Names of the objects that sleep."""
+        return frozenset(each.name for each, asleep in zip(self._objects, self._asleep, strict=True) if asleep)
+
+    def update(self, now_s: float) -> None:
+        """Wake whom something is about to reach, and put to sleep who has been still for long enough."""
+        if not self._objects:
+            return
+        poses = self._plant.GetPositions(self._context)[self._places]
+        last_s, last_poses, last_centres_W = self._last or (now_s, poses, self._bounds.centres_W(self._context))
+        elapsed_s, change = now_s - last_s, np.abs(poses - last_poses).max(axis=1)
+        moved = change > self._limits.still * elapsed_s
+        centres_W = self._bounds.centres_W(self._context) if change.max() > _EXACT else last_centres_W
+        self._last = (now_s, poses, centres_W)
+        radii_m, margin_m = self._bounds.radii_m, self._limits.margin_m
+        disturbed = moved | self._reached(centres_W)
+        for places_W in (last_centres_W, centres_W) if moved.any() else ():
+            disturbed |= self._near(centres_W, places_W[moved], radii_m[moved], margin_m)
+        for _ in range(len(self._objects) - 1) if disturbed.any() else ():
+            disturbed |= self._near(centres_W, centres_W[disturbed], radii_m[disturbed], self._limits.beside_m)
+        self._still_s = np.where(disturbed, 0.0, self._still_s + elapsed_s)
+        tired = self._still_s > self._limits.still_s
+        for number in np.flatnonzero((self._asleep & disturbed) | (~self._asleep & tired)):
+            self._turn(int(number))
+
+    def wake_all(self) -> None:
+        """Wake all objects, as when the plant's state is replaced."""
+        for number in np.flatnonzero(self._asleep):
+            self._turn(int(number))
+        self._still_s = np.zeros(len(self._objects))
+        self._last = None
+
+    def _reached(self, centres_W: FloatArray) -> NDArray[np.bool_]:
+        """For each object, whether a link is about to reach it."""
+        bases = [self._plant.EvalBodyPoseInWorld(self._context, body).translation() for body in self._robots]
+        if self._only_robots_move and all(np.abs(centres_W - p_WB).max(axis=1).min() > _REACH_M for p_WB in bases):
+            return np.zeros(len(centres_W), dtype=bool)
+        links_W = self._links.centres_W(self._context)
+        return self._near(centres_W, links_W, self._links.radii_m, self._limits.margin_m)
+
+    def _near(
+        self, centres_W: FloatArray, others_W: FloatArray, radii_m: FloatArray, margin_m: float
+    ) -> NDArray[np.bool_]:
+        """For each object, whether any of some spheres (M, 3) comes within a margin of its own."""
+        apart_m = np.linalg.norm(centres_W[:, None] - others_W[None], axis=-1)
+        near: NDArray[np.bool_] = (apart_m < self._bounds.radii_m[:, None] + radii_m + margin_m).any(axis=1)
+        return near
+
+    def _turn(self, number: int) -> None:
+        """Wake a sleeper, or put to sleep who is awake."""
+        each, filtering, plant = self._objects[number], CollisionFilterDeclaration(), self._plant
+        if self._asleep[number]:
+            self._filters.Apply(filtering.AllowBetween(each.shapes, self._all_shapes))
+            self._lift[each.velocities] = 0.0
+        else:
+            self._filters.Apply(filtering.ExcludeBetween(each.shapes, self._all_shapes))
+            self._lift[each.velocities] = -plant.CalcGravityGeneralizedForces(self._context)[each.velocities]
+            velocities = plant.GetVelocities(self._context)
+            velocities[each.velocities] = 0.0
+            plant.SetVelocities(self._context, velocities)
+        plant.get_applied_generalized_force_input_port().FixValue(self._context, self._lift)
+        self._asleep[number] = not self._asleep[number]
+
+
+def _objects(plant: MultibodyPlant, models: Mapping[str, ModelInstanceIndex]) -> Iterator[_Object]:
+    """The loose objects of one body each; models with parts that move against each other stay awake."""
+    for name, instance in models.items():
+        bodies = [plant.get_body(index) for index in plant.GetBodyIndices(instance)]
+        if len(bodies) == 1 and bodies[0].is_floating_base_body():
+            shapes = GeometrySet(plant.GetCollisionGeometriesForBody(bodies[0]))
+            start = bodies[0].floating_velocities_start_in_v()
+            yield _Object(name, bodies[0], shapes, slice(start, start + 6))
+
+
+def _all_shapes(plant: MultibodyPlant) -> Iterator[GeometryId]:
+    for index in range(plant.num_bodies()):
+        yield from plant.GetCollisionGeometriesForBody(plant.get_body(BodyIndex(index)))
+
+
+def _moving_bodies(plant: MultibodyPlant) -> Iterator[RigidBody]:
+    bodies = (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies()))
+    return (body for body in bodies if not plant.IsAnchored(body))
+
+
+def _bound(inspector: SceneGraphInspector, shapes: Sequence[GeometryId]) -> tuple[FloatArray, float] | None:
+    """Centre and radius of a sphere around shapes, in their body's frame."""
+    rows = [shape_row(inspector, shape) for shape in shapes]
+    if not rows:
+        return None
+    centre = np.mean([X_BG.translation() for _, _, X_BG in rows], axis=0)
+    reach = [np.linalg.norm(X_BG.translation() - centre) + np.linalg.norm(half) for _, half, X_BG in rows]
+    return centre, float(max(reach))

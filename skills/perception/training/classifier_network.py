@@ -1,0 +1,79 @@
+"""The classifier network: judges what the refinement network saw in a crop, with a backbone pretrained on ImageNet.
+
+It begins with the refinement network's opinion, to which it adds. In use it adds three quarters of what it would: it is
+surer of what it has learnt from than of what is new. (As the mean of weights before and after learning, after Wortsman
+et al., "Robust fine-tuning of zero-shot models", 2022, but of the last layers alone.)
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from skills.perception.detector.proposals import CROP_PX
+from skills.perception.training.crop_network import MOST_LOGIT, CropNetwork, covered, moved
+from skills.perception.training.lite_backbone import AT_8, AT_16, AT_32, LiteBackbone
+from skills.perception.training.network import ConvUnit
+
+__all__ = ["USED", "ClassifierNetwork"]
+
+_CELLS_16, _CELLS_32 = CROP_PX // 16, CROP_PX // 32
+_SQUEEZED_16, _SQUEEZED_32, _JOINED = 24, 96, 192
+_SIDES_SCALE = 0.1
+USED = 0.75
+"""The share of what it adds to the refinement network's opinion that it adds in use."""
+
+
+class ClassifierNetwork(CropNetwork):
+    """A crop network that says at first what stands before it says."""
+
+    def __init__(self, classes: int) -> None:
+        super().__init__()
+        self.classes = classes
+        self.backbone = LiteBackbone()
+        self.place = nn.Conv2d(1, AT_8, 1, bias=False)
+        self.squeeze16 = ConvUnit(AT_16, _SQUEEZED_16)
+        self.squeeze32 = ConvUnit(AT_32, _SQUEEZED_32)
+        known = _SQUEEZED_16 * _CELLS_16 * _CELLS_16 + _SQUEEZED_32 * _CELLS_32 * _CELLS_32 + classes + 4
+        self.join = nn.Sequential(
+            nn.Linear(known, _JOINED, bias=False),
+            nn.BatchNorm1d(_JOINED, eps=1e-3, momentum=0.03),
+            nn.ReLU(),
+            nn.Dropout(0.1),
+        )
+        self.scores = nn.Linear(_JOINED, classes)
+        self.sides = nn.Linear(_JOINED, 4)
+        self.trust = nn.Parameter(torch.ones(classes))
+        for last in (self.scores, self.sides):
+            nn.init.zeros_(last.weight)
+            nn.init.zeros_(last.bias)
+        nn.init.zeros_(self.place.weight)
+
+    @property
+    def early_layers(self) -> LiteBackbone:
+        """What makes the features at stride 8."""
+        return self.backbone
+
+    def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, K) and boxes (N, 4) of what the early layers make of crops."""
+        at16, at32 = self.backbone.late(at8 + self.place(covered(boxes)))
+        before = logits.clamp(-MOST_LOGIT, MOST_LOGIT)
+        told = [self.squeeze16(at16).flatten(1), self.squeeze32(at32).flatten(1), before, boxes / CROP_PX]
+        known = self.join(torch.cat(told, dim=1))
+        return self.trust * before + self.scores(known), moved(boxes, _SIDES_SCALE * self.sides(known).float())
+
+    def stop_learning(self) -> None:
+        """Add only a part of what it adds while learning: `USED`."""
+        self.add(USED)
+
+    @torch.no_grad()
+    def add(self, share: float) -> None:
+        """Add a share, or a multiple, of what it adds to logits and boxes from now on."""
+        self.trust.sub_(1.0).mul_(share).add_(1.0)
+        for layer in (self.scores, self.sides):
+            layer.weight.mul_(share)
+            layer.bias.mul_(share)
+
+    def take_bytes(self) -> None:
+        """Take crops of values from 0 to 255 from now on."""
+        self.backbone.take_bytes()

@@ -1,0 +1,61 @@
+"""What the refinement and the classifier network have in common: both judge boxes in crops."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import torch
+from torch import Tensor, nn
+
+from skills.perception.detector.proposals import CROP_PX
+from skills.perception.training.network import EarlyLayers
+
+__all__ = ["MOST_LOGIT", "CropNetwork", "covered", "moved"]
+
+MOST_LOGIT: Final = 8.0
+_MOST_GROWTH: Final = 1.5
+_CELLS_8: Final = CROP_PX // 8
+
+
+class CropNetwork(nn.Module):
+    """Crops (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them and logits before (N, K) to logits and better boxes."""
+
+    classes: int
+    scores: nn.Linear
+
+    @property
+    def early_layers(self) -> EarlyLayers:
+        """What makes the features at stride 8."""
+        raise NotImplementedError
+
+    def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, K) and boxes (N, 4) of what the early layers make of crops."""
+        raise NotImplementedError
+
+    def take_bytes(self) -> None:
+        """Take crops of values from 0 to 255 from now on."""
+        raise NotImplementedError
+
+    def stop_learning(self) -> None:
+        """Change what is to be otherwise in use than while learning: nothing, unless said."""
+
+    def forward(self, crops: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
+        """Logits (N, K) and boxes (N, 4) as x0 y0 x1 y1 in pixels of the crop."""
+        return self.from_early(self.early_layers.early(crops), boxes, logits)
+
+
+def covered(boxes: Tensor) -> Tensor:
+    """The share of each cell of stride 8 that boxes (N, 4) cover, (N, 1, 16, 16)."""
+    edges = torch.arange(_CELLS_8, device=boxes.device, dtype=boxes.dtype)[None] * 8.0
+    x0, y0, x1, y1 = (boxes[:, k : k + 1] for k in range(4))
+    across = ((x1 - edges) / 8.0).clamp(0.0, 1.0) - ((x0 - edges) / 8.0).clamp(0.0, 1.0)
+    down = ((y1 - edges) / 8.0).clamp(0.0, 1.0) - ((y0 - edges) / 8.0).clamp(0.0, 1.0)
+    return (down[:, :, None] * across[:, None, :])[:, None]
+
+
+def moved(boxes: Tensor, sides: Tensor) -> Tensor:
+    """Boxes (N, 4) with middles moved by shares of their sizes, and sizes changed by factors of which `sides` tells."""
+    middle, size = (boxes[:, :2] + boxes[:, 2:]) / 2, boxes[:, 2:] - boxes[:, :2]
+    middle = middle + sides[:, :2] * size
+    half = size * sides[:, 2:].clamp(-_MOST_GROWTH, _MOST_GROWTH).exp() / 2
+    return torch.cat([middle - half, middle + half], dim=1)

@@ -1,0 +1,151 @@
+"""Labelled pictures as the renderer writes them (COCO), with the outline of each thing, so that they can be turned."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.perception.detector.letterbox import Letterbox
+
+__all__ = ["Labels", "LearningPicture", "TrainingDataError", "category_names", "digest_of", "read_split"]
+
+Floats = NDArray[np.float32]
+LEAST_SEEN: Final = 0.25
+_MOST_CORNERS: Final = 24
+
+
+class TrainingDataError(ValueError):
+    """The folder of a data set cannot be learnt from; the text says where and why, `mend` what to do."""
+
+    def __init__(self, message: str, *, mend: str) -> None:
+        self.message, self.mend = message, mend
+        super().__init__(f"{message}; {mend}")
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Things of one picture: convex outlines (K, 2) in pixels, class indices (N,), how much of each is seen, and more.
+
+    `seen` (N,) is the share of the whole thing that the picture shows; `ignored` (N,) marks what is neither to be
+    found nor to be left.
+    """
+
+    outlines: tuple[Floats, ...]
+    classes: NDArray[np.int64]
+    seen: Floats
+    ignored: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.outlines)
+
+
+@dataclass(frozen=True)
+class LearningPicture:
+    """A picture's file and its labels, in pixels of the letterbox."""
+
+    file: Path
+    labels: Labels
+
+
+def category_names(folder: Path) -> tuple[str, ...]:
+    """Names of the classes in the order of their ids. Raises TrainingDataError."""
+    document = _document(folder / "train.json")
+    return tuple(str(entry["name"]) for entry in sorted(document["categories"], key=lambda entry: int(entry["id"])))
+
+
+def read_split(folder: Path, split: str) -> tuple[LearningPicture, ...]:
+    """All pictures of `train` or `val`. Raises TrainingDataError."""
+    return tuple(_read(folder, entry, labels) for entry, labels in _entries(folder, split))
+
+
+def digest_of(folder: Path) -> str:
+    """A short digest of what the data set says of itself and of its training labels."""
+    made = hashlib.sha256()
+    for name in ("dataset.json", "train.json"):
+        path = folder / name
+        made.update(path.read_bytes() if path.is_file() else b"")
+    return made.hexdigest()[:16]
+
+
+def _entries(folder: Path, split: str) -> Iterable[tuple[Mapping[str, Any], Sequence[Mapping[str, Any]]]]:
+    document = _document(folder / f"{split}.json")
+    grouped: dict[int, list[Mapping[str, Any]]] = {image["id"]: [] for image in document["images"]}
+    for label in document["annotations"]:
+        grouped[label["image_id"]].append(label)
+    return [(image, grouped[image["id"]]) for image in document["images"]]
+
+
+def _document(path: Path) -> Mapping[str, Any]:
+    mend = "make one: errand dataset render --out DIR --images 8000"
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TrainingDataError(f"{path}: there is no such data set ({error.strerror})", mend=mend) from error
+    except ValueError as error:
+        raise TrainingDataError(f"{path}: is damaged ({error})", mend=mend) from error
+    if not isinstance(found, dict) or not {"images", "annotations", "categories"} <= found.keys():
+        raise TrainingDataError(f"{path}: is no COCO file", mend=mend)
+    return found
+
+
+def _read(folder: Path, image: Mapping[str, Any], labels: Sequence[Mapping[str, Any]]) -> LearningPicture:
+    try:
+        scale = np.array(Letterbox(int(image["width"]), int(image["height"])).scale_xy, dtype=np.float32)
+        return LearningPicture(folder / str(image["file_name"]), _labels(labels, scale))
+    except (KeyError, TypeError, ValueError) as error:
+        place = f"{folder}: picture {image.get('file_name')}"
+        raise TrainingDataError(f"{place}: its labels are damaged ({error!r})", mend="render it anew") from error
+
+
+def _labels(labels: Sequence[Mapping[str, Any]], scale: Floats) -> Labels:
+    return Labels(
+        outlines=tuple(outline_of(label) * scale for label in labels),
+        classes=np.array([int(label["category_id"]) - 1 for label in labels], dtype=np.int64),
+        seen=np.array([_seen(label) for label in labels], dtype=np.float32),
+        ignored=np.array([bool(label.get("ignore", 0)) for label in labels], dtype=bool),
+    )
+
+
+def _seen(label: Mapping[str, Any]) -> float:
+    return float(label.get("visibility", 1.0)) * (1.0 - float(label.get("truncation", 0.0)))
+
+
+def outline_of(label: Mapping[str, Any]) -> Floats:
+    """The convex outline (K, 2) of a label's mask, or of its box where it has no mask of run lengths."""
+    x, y, width, height = (float(value) for value in label["bbox"])
+    corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]], dtype=np.float32)
+    lengths = label.get("segmentation")
+    if not isinstance(lengths, Mapping) or not isinstance(lengths.get("counts"), list):
+        return corners
+    points = _run_ends(lengths)
+    hull = cv2.convexHull(points).reshape(-1, 2).astype(np.float32)
+    return hull if len(hull) <= _MOST_CORNERS else _simplified(hull)
+
+
+def _run_ends(lengths: Mapping[str, Any]) -> Floats:
+    """Corners (N, 2) of the first and last pixel of every run in a column."""
+    height = int(lengths["size"][0])
+    edges = np.cumsum(np.asarray(lengths["counts"], dtype=np.int64))
+    starts, ends = edges[0:-1:2], edges[1::2]
+    starts = starts[: len(ends)]
+    whole = (ends - 1) // height > starts // height
+    tops = np.where(whole, 0, starts % height)
+    bottoms = np.where(whole, height, (ends - 1) % height + 1)
+    left, right = starts // height, (ends - 1) // height + 1
+    pairs = [(left, tops), (left, bottoms), (right, tops), (right, bottoms)]
+    return np.concatenate([np.stack(pair, axis=1) for pair in pairs]).astype(np.float32)
+
+
+def _simplified(hull: Floats) -> Floats:
+    """Every few corners of a hull, and always those on its box."""
+    keep = set(np.linspace(0, len(hull) - 1, _MOST_CORNERS - 4).round().astype(int).tolist())
+    keep |= {int(hull[:, axis].argmin()) for axis in (0, 1)} | {int(hull[:, axis].argmax()) for axis in (0, 1)}
+    return np.asarray(hull[sorted(keep)], dtype=np.float32)

@@ -1,0 +1,92 @@
+"""The losses: scores should be as high as boxes are good, and boxes should overlap."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+
+from skills.perception.training.assign import Assigned, AssignOptions, assign
+from skills.perception.training.overlaps import overlap, sizes
+
+__all__ = ["LossOptions", "Losses", "TruthBatch", "complete_overlap", "losses"]
+
+_TINY = 1e-7
+
+
+@dataclass(frozen=True)
+class LossOptions:
+    """Weight of the boxes beside the scores, and how cells are assigned."""
+
+    box_weight: float = 3.0
+    assignment: AssignOptions = field(default_factory=AssignOptions)
+
+
+@dataclass(frozen=True)
+class TruthBatch:
+    """The things of N pictures, filled up to G rows: boxes (N, G, 4), classes, ignored and present (N, G)."""
+
+    boxes: Tensor
+    classes: Tensor
+    ignored: Tensor
+    present: Tensor
+
+
+@dataclass(frozen=True)
+class Losses:
+    """Two scalars, the box loss with its weight, and the sum."""
+
+    scores: Tensor
+    boxes: Tensor
+
+    @property
+    def total(self) -> Tensor:
+        """What is made small."""
+        return self.scores + self.boxes
+
+
+def losses(logits: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch, options: LossOptions) -> Losses:
+    """The losses of logits (N, A, K) and boxes (N, A, 4), per answering cell, weighted by how well it does."""
+    logits, boxes = logits.float(), boxes.float()
+    assigned = assign(
+        logits.detach().sigmoid(),
+        boxes.detach(),
+        middles,
+        truth=truth.boxes,
+        classes=truth.classes,
+        ignored=truth.ignored,
+        present=truth.present,
+        options=options.assignment,
+    )
+    total = assigned.quality.sum().clamp(min=1.0)
+    wanted = _wanted_scores(logits, truth, assigned)
+    each = torch.nn.functional.binary_cross_entropy_with_logits(logits, wanted, reduction="none").sum(dim=2)
+    score_loss = (each * ~assigned.left_out).sum() / total
+    answering = assigned.things >= 0
+    targets = truth.boxes.gather(1, assigned.things.clamp(min=0)[..., None].expand(-1, -1, 4))[answering]
+    box_each = (1.0 - complete_overlap(boxes[answering], targets)) * assigned.quality[answering]
+    return Losses(score_loss, options.box_weight * box_each.sum() / total)
+
+
+def _wanted_scores(logits: Tensor, truth: TruthBatch, assigned: Assigned) -> Tensor:
+    """Quality at the class of each answering cell, nought elsewhere."""
+    classes = truth.classes.gather(1, assigned.things.clamp(min=0))
+    return torch.zeros_like(logits).scatter_(2, classes[..., None], assigned.quality[..., None])
+
+
+def complete_overlap(first: Tensor, second: Tensor) -> Tensor:
+    """Overlap less penalties for distant middles and other proportions (M,), of boxes (M, 4).
+
+    After Zheng et al., "Distance-IoU Loss" (2020).
+    """
+    shared, size1, size2 = overlap(first, second), sizes(first), sizes(second)
+    around = torch.maximum(first[:, 2:], second[:, 2:]) - torch.minimum(first[:, :2], second[:, :2])
+    apart = (first[:, :2] + first[:, 2:] - second[:, :2] - second[:, 2:]).square().sum(dim=1) / 4
+    away = apart / (around.square().sum(dim=1) + _TINY)
+    angles = torch.atan(size2[:, 0] / size2[:, 1]) - torch.atan(size1[:, 0] / size1[:, 1])
+    shape = 4 / math.pi**2 * angles.square()
+    with torch.no_grad():
+        weight = shape / (1.0 - shared + shape + _TINY)
+    return shared - away - weight * shape

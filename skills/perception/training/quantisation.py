@@ -1,0 +1,246 @@
+"""Networks that are quantised to INT8, which processor cores do over twice as fast as with floats.
+
+    python -m skills.perception.training.quantisation DIR/errand_detector.onnx --data PICTURES --out FOLDER
+
+Weights have 8 bits in the file, those of each output in steps of their own; learning can go on from them. What passes
+between layers gets its range from some pictures that were learnt from. The first convolution, which sees the picture
+(with a separable one right after it), and the last ones, which tell scores and boxes, stay as they are. After Jacob et
+al., "Quantization and Training of Neural Networks for Efficient Integer-Arithmetic-Only Inference" (2018). Needs no
+torch.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import hashlib
+import io
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, QuantFormat, QuantType, quantize_static
+from onnxruntime.quantization.shape_inference import quant_pre_process
+
+from skills.perception.detector.cascade_files import DetectorModel, classifier_file, load_model, refinement_file
+from skills.perception.detector.crops import crops_about
+from skills.perception.detector.letterbox import letterbox
+from skills.perception.detector.network_file import ModelFileError, Network
+from skills.perception.detector.proposals import CLASSIFIED, ProposalOptions, Proposals, proposals_of
+from skills.perception.detector.scales import Scales, halved
+from skills.perception.training.command import exit_code_of
+from skills.perception.training.labels import TrainingDataError
+from skills.perception.training.onnx_files import (
+    QUANTISED,
+    compact,
+    facts_of,
+    shorten_names,
+    with_float32_weights,
+    write_sealed,
+)
+from skills.perception.training.stages import proposed, refined_by
+from skills.perception.training.store import read_picture
+from skills.perception.training.validate import examination
+
+__all__ = ["main", "quantised", "quantised_detector", "write_quantised"]
+
+_MEASURED_BY: Final = 160
+_CROPS_AT_ONCE: Final = 8
+_AT_ONCE: Final = 8
+_KINDS: Final = ("Conv", "Relu", "Clip", "Concat", "MaxPool", "Resize", "Add")
+
+Given = Mapping[str, NDArray[Any]]
+
+
+def quantised_detector(file: Path, data: Path, out: Path) -> Path:
+    """Write the network of a file, and those beside it, into a folder; gives the first's file.
+
+    Those that are quantised already stay as they are. Ranges are measured on pictures of the data set `data` that
+    were learnt from. Raises TrainingDataError for files that cannot be used, or when there is nothing to do.
+    """
+    try:
+        model = load_model(file)
+    except ModelFileError as error:
+        raise TrainingDataError(f"{error.file}: {error.message}", mend="name a detector's ONNX file") from error
+    if QUANTISED in (model.classifier or model.refinement or model.proposal).metadata:
+        raise TrainingDataError(
+            f"{file}: is quantised already", mend="name a file that errand dataset train or refine wrote"
+        )
+    made = out / file.name
+    if made.exists() and made.samefile(file):
+        raise TrainingDataError(f"{file}: would be written over", mend="name another folder with --out")
+    exam = examination(data, "train", model.class_names, _MEASURED_BY)
+    pictures = [letterbox(read_picture(exam.folder / picture.file))[0] for picture in exam.pictures]
+    out.mkdir(parents=True, exist_ok=True)
+    scales = [Scales(picture, halved(picture)) for picture in pictures]
+    networks: tuple[tuple[Path, Network | None, Callable[[], Sequence[Given]]], ...] = (
+        (file, model.proposal, lambda: [{"images": picture[None]} for picture in pictures]),
+        (refinement_file(file), model.refinement, lambda: _crops(partial(_places, model), scales)),
+        (classifier_file(file), model.classifier, lambda: _crops(partial(_seen_places, model), scales)),
+    )
+    belongs: dict[str, str] = {}
+    for name, (source, network, given) in zip(("first", "second", "third"), networks, strict=True):
+        if network is not None:
+            target = out / source.name
+            if QUANTISED in network.metadata:
+                kept = onnx.load(source)
+                write_sealed(kept, target, {**facts_of(kept), **belongs})
+            else:
+                write_quantised(source, given(), target, belongs)
+            belongs = {name: hashlib.sha256(target.read_bytes()).hexdigest()}
+    return made
+
+
+def quantised(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelProto:
+    """A network that is quantised, with ranges measured on what is `given` to it, always of as many rows."""
+    plain = onnx.ModelProto.FromString(model.SerializeToString())
+    with_float32_weights(plain.graph)
+    for number, node in enumerate(plain.graph.node):
+        node.name = f"n{number}"
+    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
+        shaped, made = Path(folder) / "shaped.onnx", Path(folder) / "made.onnx"
+        quant_pre_process(plain, shaped, skip_optimization=True, skip_symbolic_shape=True)
+        quantize_static(
+            shaped,
+            made,
+            _Given(given[: _whole_strides(len(given))]),
+            quant_format=QuantFormat.QDQ,
+            op_types_to_quantize=list(_KINDS),
+            per_channel=True,
+            activation_type=QuantType.QUInt8,
+            weight_type=QuantType.QInt8,
+            nodes_to_quantize=_between_convolutions(plain.graph),
+            calibrate_method=CalibrationMethod.Entropy,
+            extra_options={
+                "QuantizeBias": False,
+                "CalibStridedMinMax": min(_AT_ONCE, len(given)),
+            },
+        )
+        found = onnx.load(made)
+    del found.graph.value_info[:]
+    compact(found.graph)
+    shorten_names(found.graph)
+    found.producer_name, found.producer_version = "errand", ""
+    return found
+
+
+class _Given(CalibrationDataReader):
+    """What is given to a network, a stretch of it at a time, so that not all that it makes is kept at once."""
+
+    def __init__(self, given: Sequence[Given]) -> None:
+        self._given = given
+        self.set_range(0, len(given))
+
+    def __len__(self) -> int:
+        return len(self._given)
+
+    def set_range(self, start_index: int, end_index: int) -> None:
+        """The stretch of which `get_next` gives the first from now on."""
+        self._left = iter(self._given[start_index:end_index])
+
+    def get_next(self) -> dict[str, NDArray[Any]] | None:
+        """The next, None after the last."""
+        following = next(self._left, None)
+        return None if following is None else dict(following)
+
+
+def _whole_strides(count: int) -> int:
+    """How many of so many make whole stretches."""
+    return count if count < _AT_ONCE else count - count % _AT_ONCE
+
+
+def _between_convolutions(graph: onnx.GraphProto) -> list[str]:
+    """Names of the nodes that have a convolution both somewhere before them and somewhere after them.
+
+    Before them are those that open the network; of these there are several where the second convolution takes each
+    channel by itself: in 8 bits this is where the classifier network lost, presumably in channels much weaker than
+    others.
+    """
+    convolutions = [node for node in graph.node if node.op_type == "Conv"]
+    before = _upstream(graph, convolutions)
+    after = _downstream(graph, convolutions[_last_opening(convolutions) :])
+    return [node.name for node in graph.node if node.op_type in _KINDS and node.name in before & after]
+
+
+def _last_opening(convolutions: Sequence[onnx.NodeProto]) -> int:
+    """The number of the last convolution of the opening: the first, or the one that joins the channels again."""
+    separate = len(convolutions) > 2 and _groups(convolutions[1]) > 1
+    return 2 if separate else 0
+
+
+def _groups(convolution: onnx.NodeProto) -> int:
+    """In how many groups a convolution takes its channels."""
+    return next((int(told.i) for told in convolution.attribute if told.name == "group"), 1)
+
+
+def _upstream(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto]) -> set[str]:
+    """Names of all nodes from which some nodes take something, over others too."""
+    wanted, found = {name for node in nodes for name in node.input}, set[str]()
+    for node in reversed(graph.node):
+        if wanted.intersection(node.output):
+            found.add(node.name)
+            wanted.update(node.input)
+    return found
+
+
+def _downstream(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto]) -> set[str]:
+    """Names of all nodes that take something from some nodes, over others too."""
+    made, found = {name for node in nodes for name in node.output}, set[str]()
+    for node in graph.node:
+        if made.intersection(node.input):
+            found.add(node.name)
+            made.update(node.output)
+    return found
+
+
+def _crops(look: Callable[[Scales], Proposals], pictures: Sequence[Scales]) -> list[Given]:
+    """What a network is given at the places of a look at pictures in the letterbox, always of as many crops."""
+    looked_at = [(picture, look(picture)) for picture in pictures]
+    found = [crops_about(picture, regions) for picture, regions in looked_at if len(regions)]
+    if not found:
+        raise TrainingDataError("the proposal network finds no place to look at", mend="train it for longer first")
+    together = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
+    count = len(together["chips"])
+    size = min(_CROPS_AT_ONCE, count)
+    return [
+        {name: values[first : first + size] for name, values in together.items()}
+        for first in range(0, count - size + 1, size)
+    ]
+
+
+def _places(model: DetectorModel, scales: Scales) -> Proposals:
+    """Where the refinement network looks."""
+    return proposals_of(*proposed(model, scales), ProposalOptions())
+
+
+def _seen_places(model: DetectorModel, scales: Scales) -> Proposals:
+    """Where the classifier network looks."""
+    return proposals_of(*refined_by(model, scales), CLASSIFIED)
+
+
+def write_quantised(
+    file: Path, given: Sequence[Given], out: Path, other_facts: Mapping[str, str] | None = None
+) -> None:
+    """Write the network of a file so that it is quantised; it tells what it did, and `other_facts`."""
+    model = onnx.load(file)
+    facts = {**facts_of(model), **(other_facts or {}), QUANTISED: "yes"}
+    write_sealed(quantised(model, given), out, facts)
+
+
+def main() -> int:
+    """The command line."""
+    parser = argparse.ArgumentParser(description="A detector that is quantised to INT8.")
+    parser.add_argument("file", type=Path, help="the proposal network's ONNX file")
+    parser.add_argument("--data", type=Path, required=True, help="the data set's folder")
+    parser.add_argument("--out", type=Path, required=True, help="the folder to write to")
+    given = parser.parse_args()
+    return exit_code_of(lambda: quantised_detector(given.file, given.data, given.out))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

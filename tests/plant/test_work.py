@@ -1,0 +1,30 @@
+"""The plant counts what it does; the same run counts the same."""
+
+from plant.simulation import Simulation
+from plant.worlds.world import load_world
+
+
+def counted():
+    simulation = Simulation(load_world("flat"), seed=1, looks=False)
+    before = simulation.work()
+    simulation.clock.advance(0.5)
+    robot = simulation.robots["Alice"]
+    robot.image("frontleft", depth=False)
+    robot.image("frontleft", visual=False)
+    robot.image("hand")
+    return before, simulation.work()
+
+
+def test_steps_rays_and_pictures_are_counted():
+    before, after = counted()
+    scan = 16 * 900
+    assert before["lidar_rays"] == scan
+    assert (after["plant_steps"], after["lidar_rays"]) == (50, 2 * scan)
+    assert after["pictures_320x240"] == after["depth_pictures_160x120"] == 1
+    assert after["pictures_40x30"] == 1  # for what is too dark or too shiny for depth
+    assert after["pictures_640x480"] == after["depth_pictures_640x480"] == 1
+    assert after["contact_points"] > before["contact_points"]
+
+
+def test_the_same_run_does_the_same_work():
+    assert counted() == counted()

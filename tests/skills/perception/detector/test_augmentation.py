@@ -1,0 +1,204 @@
+"""Test-time augmentation, with a small network whose pictures tell what it sees there."""
+
+import numpy as np
+import pytest
+from tiny_detector import CLASSES, picture_of, write_model
+
+from skills.detection import Detection, Detector
+from skills.perception.detector.augmentation import (
+    AugmentationOptions,
+    AugmentedDetector,
+    DetectsClass,
+    DetectsInViews,
+    View,
+)
+from skills.perception.detector.onnx_detector import OnnxDetector, load_detector
+
+SEEN = np.full((480, 640, 3), 90, dtype=np.uint8)
+BOX = (100.0, 50.0, 300.0, 150.0)
+MIRRORED = (340.0, 50.0, 540.0, 150.0)
+SMALL = (50.0, 25.0, 150.0, 75.0)
+VIEWS = (View(), View(mirrored=True), View(scale=0.5))
+
+
+@pytest.fixture
+def seen_in(tmp_path, monkeypatch):
+    model = load_detector(write_model(tmp_path / "tiny.onnx")).model
+
+    def look(*answers, views=VIEWS, least_score=None, model=model):
+        left = iter(answers)
+        monkeypatch.setattr(OnnxDetector, "detect", lambda self, pictures: [tuple(next(left)) for _ in pictures])
+        options = AugmentationOptions(views, low=-1.0, high=2.0)
+        return AugmentedDetector(OnnxDetector(model), options).detect_in_views(SEEN, least_score)
+
+    return look
+
+
+def test_what_all_views_tell_has_their_mean_score_and_place(seen_in):
+    (found,) = seen_in(
+        [Detection("hammer", 0.9, BOX)], [Detection("hammer", 0.6, MIRRORED)], [Detection("hammer", 0.6, SMALL)]
+    )
+    assert (found.class_name, found.score) == ("hammer", pytest.approx(0.7))
+    assert found.box == pytest.approx(BOX)
+
+
+@pytest.mark.parametrize(("least_score", "told"), [(None, 0), (0.3, 1)])
+def test_what_is_less_sure_is_told_when_asked_for(seen_in, least_score, told):
+    each = ([Detection("hammer", 0.4, box)] for box in (BOX, MIRRORED, SMALL))
+    assert len(seen_in(*each, least_score=least_score)) == told
+
+
+def test_what_most_views_take_for_something_else_is_that(seen_in):
+    # hammer 0.6, 0.9, 0.9; coke 0.9, 0.3, 0
+    both = [Detection("coke", 0.9, BOX, (("hammer", 0.6),))]
+    (found,) = seen_in(both, [Detection("hammer", 0.9, MIRRORED, (("coke", 0.3),))], [Detection("hammer", 0.9, SMALL)])
+    assert (found.class_name, found.score) == ("hammer", pytest.approx(0.8))
+    assert found.rivals == (("coke", pytest.approx(0.4)),)
+
+
+def test_what_one_view_alone_tells_is_not_sure(seen_in):
+    assert seen_in([Detection("hammer", 0.9, BOX)], [], []) == ()
+
+
+def test_a_view_at_which_a_thing_would_be_too_small_does_not_count(seen_in):
+    little, mirrored = (100.0, 50.0, 140.0, 70.0), (500.0, 50.0, 540.0, 70.0)
+    (found,) = seen_in([Detection("beer", 0.8, little)], [Detection("beer", 0.6, mirrored)], [])
+    assert found.score == pytest.approx(0.7)
+
+
+def test_what_is_very_large_is_judged_where_it_is_smaller(seen_in):
+    # 400 pixels long; 200 in the look at half the size
+    found = seen_in(
+        [Detection("coke", 0.9, (100.0, 50.0, 500.0, 150.0))],
+        [Detection("coke", 0.9, (140.0, 50.0, 540.0, 150.0))],
+        [Detection("hammer", 0.8, (50.0, 25.0, 250.0, 75.0))],
+    )
+    assert [(one.class_name, one.score) for one in found] == [("hammer", pytest.approx(0.8))]
+
+
+def test_a_person_is_judged_at_the_whole_picture_unless_that_makes_them_small(seen_in, tmp_path):
+    # 400 pixels high, 200 at half the size, 80 at a fifth, which counts as little as the part that shows all of them
+    box = (100.0, 40.0, 200.0, 440.0)
+    views = (View(), View(scale=0.5), View(scale=0.2), View(part=(0.0, 0.0, 0.5, 1.0)))
+    model = load_detector(write_model(tmp_path / "people.onnx", classes=("beer", "person"))).model
+    half = Detection("person", 0.7, (50.0, 20.0, 100.0, 220.0))
+    (found,) = seen_in([Detection("person", 0.9, box)], [half], [], [], views=views, model=model)
+    assert (found.class_name, found.score) == ("person", pytest.approx(0.8))
+
+
+def test_a_view_at_a_part_that_shows_all_of_a_thing_counts(seen_in):
+    # the lower right quarter, twice as large: (400, 300, 440, 360) is (80, 60, 120, 120) of its 320 x 240 pixels
+    whole, part = [Detection("beer", 0.4, (400.0, 300.0, 440.0, 360.0))], [Detection("beer", 0.8, (80, 60, 120, 120))]
+    (found,) = seen_in(whole, part, views=(View(), View(part=(0.5, 0.5, 1.0, 1.0))))
+    assert found.score == pytest.approx(0.6)
+    assert found.box == pytest.approx((400.0, 300.0, 440.0, 360.0))
+
+
+def test_what_a_part_cuts_off_is_judged_by_the_other_looks(seen_in):
+    # from 280 to 360 across, of which the part from 320 on shows the right half only
+    whole, half = [Detection("beer", 0.8, (280.0, 300.0, 360.0, 340.0))], [Detection("hammer", 0.9, (0, 60, 40, 100))]
+    (found,) = seen_in(whole, half, views=(View(), View(part=(0.5, 0.5, 1.0, 1.0))))
+    assert (found.class_name, found.score, found.rivals) == ("beer", pytest.approx(0.8), ())
+
+
+def test_what_would_be_very_large_in_a_part_is_judged_by_the_other_looks(seen_in):
+    # 200 pixels long, and 400 in the quarter
+    whole, part = [Detection("beer", 0.8, (400.0, 300.0, 600.0, 360.0))], [Detection("hammer", 0.9, (80, 60, 280, 120))]
+    (found,) = seen_in(whole, part, views=(View(), View(part=(0.5, 0.5, 1.0, 1.0))))
+    assert (found.class_name, found.score, found.rivals) == ("beer", pytest.approx(0.8), ())
+
+
+# first view                               views taken
+# hammer 0.9                               1
+# hammer 0.9, coke 0.2                     1
+# nothing, or next to nothing              1
+# hammer 0.9, coke 0.4                     all: the coke may be one
+# hammer 0.9, may be a beer by 0.4         all
+# hammer 0.6                               all
+@pytest.mark.parametrize(
+    ("first", "views"),
+    [
+        ([Detection("hammer", 0.9, BOX)], 1),
+        ([Detection("hammer", 0.9, BOX), Detection("coke", 0.2, SMALL)], 1),
+        ([Detection("hammer", 0.2, BOX)], 1),
+        ([], 1),
+        ([Detection("hammer", 0.9, BOX), Detection("coke", 0.4, SMALL)], 3),
+        ([Detection("hammer", 0.9, BOX, (("beer", 0.4),))], 3),
+        ([Detection("hammer", 0.6, BOX)], 3),
+    ],
+)
+def test_other_views_are_taken_where_the_proposal_network_leaves_doubt(tmp_path, monkeypatch, first, views):
+    taken = []
+
+    def detect(self, pictures):
+        taken.extend(pictures)
+        return [tuple(first) for _ in pictures]
+
+    monkeypatch.setattr(OnnxDetector, "detect", detect)
+    detector = AugmentedDetector(load_detector(write_model(tmp_path / "tiny.onnx")), AugmentationOptions(VIEWS))
+    detector.detect_in_views(SEEN)
+    assert len(taken) == views
+
+
+def test_two_things_of_a_class_stay_two(seen_in):
+    other = (400.0, 300.0, 600.0, 400.0)
+    found = seen_in(
+        [Detection("beer", 0.8, BOX), Detection("beer", 0.7, other)],
+        [Detection("beer", 0.8, MIRRORED), Detection("beer", 0.7, (40.0, 300.0, 240.0, 400.0))],
+        [Detection("beer", 0.8, SMALL), Detection("beer", 0.7, (200.0, 150.0, 300.0, 200.0))],
+    )
+    assert [one.box for one in found] == [pytest.approx(BOX), pytest.approx(other)]
+
+
+def test_nothing_seen_is_nothing(seen_in):
+    assert seen_in([], [], []) == ()
+
+
+@pytest.mark.parametrize(
+    "view",
+    [
+        View(),
+        View(True),
+        View(scale=0.7),
+        View(True, 0.5),
+        View(part=(0.1, 0.05, 1.0, 0.9)),
+        View(True, 0.8, (0.1, 0.05, 1.0, 0.9)),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("shape", [(480, 640, 3), (240, 320)], ids=["colour", "grey"])
+def test_a_box_of_a_view_lies_where_the_thing_is_in_the_picture(view, shape):
+    picture = np.zeros(shape, dtype=np.uint8)
+    picture[50:150, 100:300] = 255
+    varied = view.of(picture)
+    white = varied if varied.ndim == 2 else varied[..., 0]
+    rows, columns = np.nonzero(white > 200)
+    box = (float(columns.min()), float(rows.min()), float(columns.max() + 1), float(rows.max() + 1))
+    assert view.back(box, shape) == pytest.approx((100.0, 50.0, 300.0, 150.0), abs=3.0)
+
+
+@pytest.mark.parametrize("view", [View(), View(True), View(scale=0.35)], ids=str)
+def test_a_whole_picture_keeps_its_size(view):
+    assert view.of(np.zeros((240, 320, 3), dtype=np.uint8)).shape == (240, 320, 3)
+
+
+def test_a_part_of_a_picture_of_one_pixel_is_that_pixel():
+    assert View(part=(0.375, 0.375, 1.0, 1.0)).of(np.zeros((1, 1), dtype=np.uint8)).shape == (1, 1)
+
+
+def test_it_is_a_detector_that_views_once_unless_asked(tmp_path):
+    inner = load_detector(write_model(tmp_path / "tiny.onnx"))
+    augmented: Detector = AugmentedDetector(inner)
+    picture = picture_of(("hammer", 0.9, (100, 50, 200, 80)))
+    assert isinstance(augmented, DetectsInViews)
+    assert not isinstance(inner, DetectsInViews)
+    assert isinstance(inner, DetectsClass)
+    assert isinstance(augmented, DetectsClass)
+    assert augmented.class_names == CLASSES
+    assert augmented.detect([picture]) == inner.detect([picture])
+
+
+@pytest.mark.parametrize("bad", [np.zeros((0, 0, 3), np.uint8), np.zeros((9, 9, 7), np.uint8)], ids=["empty", "seven"])
+def test_what_is_no_picture_is_refused(tmp_path, bad):
+    with pytest.raises(ValueError, match="picture"):
+        AugmentedDetector(load_detector(write_model(tmp_path / "tiny.onnx"))).detect_in_views(bad)

@@ -1,0 +1,114 @@
+"""One picture looked through."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RotationMatrix
+from table_scene import CAMERA, COKE, TABLE, scene
+
+from skills.arm.poses import camera_pose
+from skills.perception.detector.camera_images import brightened, detections_in, found_in_grey, is_dark, on_its_head
+from skills.robot import FrameTree
+from skills.testing.detector import PlainColours
+
+COKES = PlainColours({"coke": COKE.colour})
+
+
+def rolled(roll_rad):
+    """The scene from a camera that is turned about its axis."""
+    X_WC = camera_pose(CAMERA, np.array([1.05, 0.0, TABLE.height_m]))
+    return scene([COKE], X_WC=X_WC @ RigidTransform(RotationMatrix.MakeZRotation(roll_rad), np.zeros(3)))
+
+
+class Recorder(PlainColours):
+    """Keeps the pictures that it is shown."""
+
+    def detect(self, pictures):
+        self.__dict__["shown"] = list(pictures)
+        return [() for _ in pictures]
+
+
+@pytest.mark.parametrize(
+    ("roll_deg", "turned"), [(0, False), (78, False), (-102, False), (172, True), (180, True), (-172, True)]
+)
+def test_a_picture_is_on_its_head_when_its_camera_hangs_upside_down(roll_deg, turned):
+    # Spot's cameras: left and back about 0, frontleft -78, frontright -102, right 172 degrees
+    assert on_its_head(rolled(np.radians(roll_deg))) is turned
+
+
+def test_a_picture_that_looks_straight_down_is_left_as_it_is():
+    down = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), [1.05, 0.0, 1.6])
+    image = rolled(0.0)
+    assert not on_its_head(replace(image, frames=FrameTree({"hand_camera": ("odom", down)})))
+
+
+def test_boxes_in_a_turned_picture_are_those_of_the_picture_as_it_was_taken():
+    image = rolled(np.pi)
+    (seen,) = detections_in(COKES, image)
+    (plain,) = COKES.detect([image.colour])[0]
+    assert seen.box == plain.box
+
+
+@pytest.mark.parametrize("roll_rad", [0.0, np.pi], ids=["upright", "on its head"])
+def test_the_detector_sees_the_world_upright(roll_rad):
+    detector, upright, image = Recorder(), rolled(0.0), rolled(roll_rad)
+    detections_in(detector, image)
+    (shown,) = detector.shown
+    rows = np.nonzero(np.all(shown == COKE.colour, axis=2))[0]
+    assert abs(rows.mean() - np.nonzero(np.all(upright.colour == COKE.colour, axis=2))[0].mean()) < 2.0
+    assert np.nonzero(np.all(image.colour == COKE.colour, axis=2))[0].size == rows.size
+
+
+def test_each_grey_picture_is_turned_as_it_needs_to_be():
+    detector, upright, head = Recorder(), rolled(0.0), rolled(np.pi)
+    assert found_in_grey(detector, [upright, head], "coke") == [(), ()]
+    assert np.array_equal(detector.shown[0], upright.grey)
+    assert np.array_equal(detector.shown[1], head.grey[::-1, ::-1])
+
+
+def test_a_quick_look_is_taken_where_the_detector_has_one():
+    class Quick(Recorder):
+        def detect_class(self, pictures, class_name):
+            self.__dict__["asked"] = class_name
+            return [() for _ in pictures]
+
+    detector = Quick()
+    assert found_in_grey(detector, [rolled(0.0)], "person") == [()]
+    assert (detector.asked, hasattr(detector, "shown")) == ("person", False)
+
+
+@pytest.mark.parametrize(("counts", "dark"), [(0, True), (4, True), (12, False), (255, False)])
+def test_a_picture_that_is_black_all_over_is_dark(counts, dark):
+    image = scene([COKE])
+    assert is_dark(replace(image, grey=np.full_like(image.grey, counts))) is dark
+
+
+def test_a_dim_picture_with_something_in_it_is_not_dark():
+    image = scene([COKE])
+    grey = np.zeros_like(image.grey)
+    grey[100:140, 100:160] = 60
+    assert not is_dark(replace(image, grey=grey))
+
+
+# mean   as bright as       ways
+# 120    120                left as it is
+# 20     100                five times
+# 5      40                 eight times, and no more
+@pytest.mark.parametrize(("mean", "shown"), [(120, 120), (20, 100), (5, 40)])
+def test_a_dim_picture_is_made_brighter(mean, shown):
+    assert brightened(np.full((4, 4, 3), mean, np.uint8)).mean() == shown
+
+
+def test_what_is_bright_in_a_dim_picture_stays_white():
+    picture = np.full((10, 10), 10, np.uint8)
+    picture[0, 0] = 200
+    assert brightened(picture)[0, 0] == 255
+
+
+def test_the_detector_is_shown_dim_pictures_brighter():
+    detector, image = Recorder(), rolled(0.0)
+    dim = replace(image, colour=image.colour // 8)
+    detections_in(detector, dim)
+    (shown,) = detector.shown
+    assert shown.mean() > 1.5 * dim.colour.mean()

@@ -1,0 +1,240 @@
+"""From pictures to detections, with small networks whose pictures tell what they see."""
+
+import threading
+
+import numpy as np
+import pytest
+from tiny_detector import CLASSES, picture_of, write_cascade, write_model, write_pair
+
+from skills.detection import Detection
+from skills.perception.detector.network_file import ModelFileError
+from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
+from skills.perception.detector.proposals import ProposalOptions
+
+HAMMER = ("hammer", 0.9, (100, 50, 200, 80))
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return write_model(tmp_path_factory.mktemp("model") / "tiny.onnx")
+
+
+@pytest.fixture(scope="module")
+def detector(file):
+    return load_detector(file)
+
+
+def test_a_thing_is_told_with_class_score_and_box(detector):
+    (found,) = detector.detect([picture_of(HAMMER)])
+    assert found == (Detection("hammer", pytest.approx(0.9), (100.0, 50.0, 200.0, 80.0)),)
+    assert detector.class_names == CLASSES
+
+
+def test_the_surest_comes_first_and_the_unsure_not_at_all(detector):
+    things = [("beer", 0.6, (0, 0, 50, 50)), ("coke", 0.8, (300, 0, 350, 50)), ("hammer", 0.48, (100, 100, 200, 200))]
+    (found,) = detector.detect([picture_of(*things)])
+    assert [one.class_name for one in found] == ["coke", "beer"]
+
+
+def test_a_lower_threshold_tells_more(file):
+    detector = load_detector(file, DetectorOptions(threshold=0.1))
+    assert len(detector.detect([picture_of(("beer", 0.2, (0, 0, 50, 50)))])[0]) == 1
+
+
+def test_what_a_thing_may_be_as_well_is_told_with_it(detector):
+    things = [
+        HAMMER,
+        ("coke", 0.3, (100, 50, 200, 78)),
+        ("beer", 0.4, (100, 50, 200, 80)),
+        ("beer", 0.05, (0, 0, 9, 9)),
+    ]
+    (found,) = detector.detect([picture_of(*things)])
+    assert [one.rivals for one in found] == [(("beer", pytest.approx(0.4)), ("coke", pytest.approx(0.3)))]
+
+
+def test_two_boxes_on_one_thing_become_one(detector):
+    double = ("coke", 0.7, (100, 50, 200, 77.5))
+    (found,) = detector.detect([picture_of(HAMMER, double)])
+    assert [one.class_name for one in found] == ["hammer"]
+
+
+def test_boxes_are_in_the_pictures_own_pixels_and_inside_it(detector):
+    # 320x480 fills the left 320 of 640 columns at scale 1: what reaches beyond is clipped
+    picture = picture_of(("beer", 0.9, (300, 100, 400, 200)), size=(480, 320))
+    assert detector.detect([picture])[0][0].box == (300.0, 100.0, 320.0, 200.0)
+
+
+def test_what_lies_in_the_padding_is_nothing(detector):
+    assert detector.detect([picture_of(("beer", 0.9, (400, 100, 500, 200)), size=(480, 320))]) == [()]
+
+
+def test_grey_pictures_are_taken(detector):
+    assert detector.detect([picture_of(HAMMER)[:, :, 0]])[0][0].class_name == "hammer"
+
+
+def test_pictures_of_several_sizes_at_once_are_each_judged_alone(file):
+    pictures = [picture_of(HAMMER), np.zeros((7, 900), np.uint8), picture_of(("beer", 0.7, (0, 0, 50, 50)))]
+    detector = load_detector(file)
+    together = detector.detect(pictures)
+    assert [len(found) for found in together] == [1, 0, 1]
+    assert together == [detector.detect([picture])[0] for picture in pictures]
+
+
+def test_one_that_is_no_picture_among_others_is_refused(detector):
+    with pytest.raises(ValueError, match="a picture is"):
+        detector.detect([picture_of(HAMMER), np.zeros((4, 4)), picture_of(HAMMER)])
+
+
+def test_no_pictures_no_detections(detector):
+    assert detector.detect([]) == []
+
+
+@pytest.mark.parametrize("picture", [np.zeros((1, 1), np.uint8), np.zeros((480, 640, 3), np.uint8)])
+def test_black_and_tiny_pictures_hold_nothing(detector, picture):
+    assert detector.detect([picture]) == [()]
+
+
+@pytest.mark.parametrize("picture", [np.zeros((4, 4, 4), np.uint8), np.zeros((4, 4)), np.empty((0, 5), np.uint8), None])
+def test_what_is_no_picture_is_refused(detector, picture):
+    with pytest.raises(ValueError, match="a picture is"):
+        detector.detect([picture])
+
+
+def test_threads_that_share_it_find_the_same(detector):
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(detector.detect([picture_of(HAMMER)]))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 4
+    assert all(one == found[0] for one in found)
+
+
+def test_the_detector_of_a_missing_file_says_so(tmp_path):
+    with pytest.raises(ModelFileError, match=r"missing\.onnx: there is no such model"):
+        load_detector(tmp_path / "missing.onnx")
+
+
+@pytest.fixture(scope="module")
+def looks_again(tmp_path_factory):
+    """Its refinement network tells by the share of red in what it is shown how surely that is a beer."""
+    return load_detector(write_pair(tmp_path_factory.mktemp("pair") / "tiny.onnx"))
+
+
+def reddened(picture, box):
+    u0, v0, u1, v1 = box
+    picture[v0:v1, u0:u1, 0] = 255
+    return picture
+
+
+def test_a_refinement_network_judges_what_the_proposal_network_is_not_sure_of(looks_again):
+    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 200))), (50, 50, 250, 250))
+    (found,) = looks_again.detect([picture])
+    assert [(one.class_name, round(one.score, 2)) for one in found] == [("beer", 1.0)]
+
+
+def test_a_refinement_network_tells_where_it_is_exactly(looks_again):
+    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 150))), (0, 2, 300, 300))
+    (found,) = looks_again.detect([picture])
+    assert found[0].box == pytest.approx((105.0, 102.5, 195.0, 147.5), abs=0.01)
+
+
+# mirrored from   seen in the crop   in its mirror image   told
+# None            1.0                not looked at         1.0
+# 0.3             1.0                0.0                   0.5
+@pytest.mark.parametrize(("mirrored_from", "score"), [(None, 1.0), (0.3, 0.5)])
+def test_a_crop_and_its_mirror_image_are_judged_together(tmp_path, mirrored_from, score):
+    """A refinement network that takes the left half of a crop alone for a beer says half of it with both."""
+    file = write_pair(tmp_path / "tiny.onnx", left_only=True)
+    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (0, 2, 150, 400))
+    options = DetectorOptions(0.05, proposals=ProposalOptions(mirrored_from=mirrored_from))
+    (found,) = load_detector(file, options).detect([picture])
+    assert round(found[0].score, 1) == score
+
+
+def test_the_mirror_image_of_what_hardly_looks_like_a_thing_is_not_looked_at(tmp_path):
+    file = write_pair(tmp_path / "tiny.onnx", left_only=True)
+    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
+    options = DetectorOptions(0.05, proposals=ProposalOptions(mirrored_from=0.3))
+    assert load_detector(file, options).detect([picture]) == [()]
+
+
+def test_a_refinement_network_takes_back_what_the_proposal_network_is_sure_of(looks_again):
+    assert looks_again.detect([picture_of(HAMMER)]) == [()]
+
+
+def test_where_the_proposal_network_sees_nothing_the_refinement_network_is_not_asked(looks_again):
+    assert looks_again.detect([reddened(picture_of(), (50, 50, 250, 250))]) == [()]
+
+
+def test_with_a_refinement_network_one_picture_gives_the_same_as_several(looks_again):
+    pictures = [
+        reddened(picture_of(("hammer", 0.2, (100, 100, 200, 200))), (50, 50, 250, 250)),
+        reddened(picture_of(("coke", 0.3, (300, 200, 400, 400))), (250, 150, 450, 450)),
+    ]
+    assert looks_again.detect(pictures) == [looks_again.detect([one])[0] for one in pictures]
+
+
+def test_a_classifier_network_judges_what_the_refinement_network_sees(tmp_path):
+    """The classifier network sees red in the left half alone, where there is none."""
+    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
+    second, third = (write_pair(tmp_path / "two.onnx"), write_cascade(tmp_path / "three.onnx", left_only=True))
+    options = DetectorOptions(0.05)
+    assert [one.class_name for one in load_detector(second, options).detect([picture])[0]] == ["beer"]
+    assert load_detector(third, options).detect([picture]) == [()]
+
+
+# each network says boxes a tenth smaller than those that it gets
+# 100 wide, 50 high -> 90, 45 -> 81, 40.5 about the same middle (150, 125)
+def test_a_classifier_network_looks_where_the_refinement_network_says(tmp_path):
+    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 150))), (0, 2, 300, 300))
+    (found,) = load_detector(write_cascade(tmp_path / "three.onnx")).detect([picture])
+    assert found[0].box == pytest.approx((109.5, 104.75, 190.5, 145.25), abs=0.01)
+
+
+# least score that is judged   what the refinement network says   told
+# 0.12                         1.0                        what the classifier network says: nothing
+# 1.1                          1.0                        what the refinement network says
+@pytest.mark.parametrize(("least_score", "told"), [(0.12, []), (1.1, ["beer"])])
+def test_what_the_classifier_does_not_judge_is_what_the_refinement_network_sees(tmp_path, least_score, told):
+    """The classifier network sees red in the left half alone, where there is none."""
+    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
+    options = DetectorOptions(0.05, classified=ProposalOptions(least_score=least_score, mirrored_from=None))
+    (found,) = load_detector(write_cascade(tmp_path / "three.onnx", left_only=True), options).detect([picture])
+    assert [one.class_name for one in found] == told
+
+
+# of two places that the refinement network sees, the third judges so many
+@pytest.mark.parametrize(("most", "told"), [(1, 1), (2, 0)])
+def test_the_surest_places_are_judged(tmp_path, most, told):
+    picture = picture_of(("hammer", 0.6, (100, 100, 200, 200)), ("hammer", 0.6, (400, 100, 500, 200)))
+    picture = reddened(reddened(picture, (150, 2, 300, 400)), (450, 2, 600, 400))
+    options = DetectorOptions(0.05, classified=ProposalOptions(same=1.0, most=most, mirrored_from=None))
+    (found,) = load_detector(write_cascade(tmp_path / "three.onnx", left_only=True), options).detect([picture])
+    assert len(found) == told
+
+
+def test_a_quick_look_finds_the_objects_of_one_class(detector):
+    picture = picture_of(HAMMER, ("coke", 0.9, (200, 150, 300, 180)))
+    assert detector.detect_class([picture], "hammer") == [
+        (Detection("hammer", pytest.approx(0.9), (100.0, 50.0, 200.0, 80.0)),)
+    ]
+
+
+# the refinement network takes red for a beer
+# proposal    asked for   found
+# hammer      beer        nothing: it is not asked
+# beer 0.2    beer        beer
+@pytest.mark.parametrize(("proposal", "found"), [(("hammer", 0.9), []), (("beer", 0.2), ["beer"])])
+def test_a_quick_look_refines_only_where_the_class_is_proposed(tmp_path, proposal, found):
+    picture = reddened(picture_of((*proposal, (100, 100, 200, 200))), (60, 60, 240, 240))
+    detector = load_detector(write_pair(tmp_path / "pair.onnx"))
+    assert [one.class_name for one in detector.detect_class([picture], "beer")[0]] == found
+
+
+def test_a_quick_look_refuses_what_is_no_picture_and_no_class(detector):
+    with pytest.raises(ValueError, match="picture"):
+        detector.detect_class([np.zeros((0, 0, 3), np.uint8)], "beer")
+    with pytest.raises(ValueError, match="screwdriver"):
+        detector.detect_class([np.zeros((240, 320), np.uint8)], "screwdriver")

@@ -1,0 +1,42 @@
+"""What the processor tells that it can do."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from onnxruntime import InferenceSession, SessionOptions
+
+from skills.perception.detector.cascade_files import MODEL_FILE, load_model
+from skills.perception.detector.processor import adds_byte_products_exactly
+
+
+@pytest.mark.parametrize(
+    ("told", "able"),
+    [
+        # what Linux tells                                          whether byte products are added exactly
+        ("flags\t\t: fpu avx2 avx512f avx512_vnni\n", True),
+        ("flags : fpu avx2 avx_vnni\n", True),
+        ("flags : fpu avx2\n", False),
+        ("flags : avx_vnni\nprocessor : 1\nflags : avx2\n", False),
+        ("Features : fp asimd asimddp\n", False),
+        ("", False),
+    ],
+)
+def test_it_goes_by_the_flags_of_all_cores(tmp_path: Path, told: str, able: bool) -> None:
+    file = tmp_path / "cpuinfo"
+    file.write_text(told)
+    assert adds_byte_products_exactly(file) is able
+
+
+def test_where_nothing_is_told_it_does_not_count_on_it(tmp_path: Path) -> None:
+    assert not adds_byte_products_exactly(tmp_path / "none")
+
+
+def test_the_detector_says_here_what_it_says_with_the_exact_sums() -> None:
+    exact = SessionOptions()
+    exact.add_session_config_entry("session.x64quantprecision", "1")
+    given = {"images": np.random.default_rng(3).integers(0, 256, (1, 480, 640, 3), dtype=np.uint8)}
+    said = load_model(networks=1).proposal.session.run(None, given)
+    expected = InferenceSession(str(MODEL_FILE), exact).run(None, given)
+    for mine, theirs in zip(said, expected, strict=True):
+        assert np.allclose(mine, theirs, atol=1e-3)

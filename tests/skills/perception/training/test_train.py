@@ -1,0 +1,170 @@
+"""From a folder of pictures to the ONNX file; skipped without torch."""
+
+import json
+import multiprocessing
+import os
+import select
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+pytest.importorskip("onnx")
+
+from skills.perception.detector.cascade_files import load_model
+from skills.perception.training.canvases import CanvasOptions
+from skills.perception.training.labels import TrainingDataError
+from skills.perception.training.loop import CHECKPOINT
+from skills.perception.training.schedule import Budget, Phase, Schedule
+from skills.perception.training.train import MODEL, Report, TrainOptions, train
+from skills.perception.training.validate import examination
+
+NAMES = ("beer", "coke")
+SMALL = Schedule(warm_up_steps=2, phases=(Phase(0.0, CanvasOptions(96, 64), 2),))
+
+
+def write_split(folder: Path, split: str, count: int) -> None:
+    images, labels = [], []
+    for k in range(count):
+        name = f"{split}{k}.png"
+        picture = np.full((240, 320, 3), 60, dtype=np.uint8)
+        picture[60:160, 100:180] = (30, 200, 30 * k)
+        cv2.imwrite(str(folder / name), picture)
+        images.append({"id": k, "file_name": name, "width": 320, "height": 240})
+        labels.append({"id": k, "image_id": k, "category_id": 1 + k % 2, "bbox": [100, 60, 80, 100]})
+    categories = [{"id": k + 1, "name": name} for k, name in enumerate(NAMES)]
+    document = {"images": images, "annotations": labels, "categories": categories}
+    (folder / f"{split}.json").write_text(json.dumps(document))
+
+
+@pytest.fixture
+def options(tmp_path: Path) -> TrainOptions:
+    data = tmp_path / "data"
+    data.mkdir()
+    write_split(data, "train", 4)
+    write_split(data, "val", 2)
+    return TrainOptions(data, tmp_path / "out", Budget(pictures=8), examined=2, schedule=SMALL)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_data_set_becomes_a_detectors_file(options: TrainOptions, processes: int) -> None:
+    told = list[Report]()
+    file = train(replace(options, processes=processes), told.append)
+    assert file == options.out / MODEL
+    assert load_model(file).class_names == NAMES
+    assert told[-1].progress == 1.0
+    assert told[-1].figures is not None
+    assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, "training.jsonl", "pictures"}
+
+
+def test_an_interrupted_training_leaves_no_process_behind(options: TrainOptions) -> None:
+    def interrupted(_report: Report) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(replace(options, processes=2, budget=Budget(seconds=3600.0)), interrupted)
+    assert multiprocessing.active_children() == []
+
+
+def test_processes_end_when_the_one_that_began_them_was_killed(options: TrainOptions) -> None:
+    command = f"""
+from pathlib import Path
+from skills.perception.training.schedule import Budget
+from skills.perception.training.train import TrainOptions, train
+if __name__ == "__main__":
+    chosen = TrainOptions(Path({str(options.data)!r}), Path({str(options.out)!r}), Budget(seconds=3600.0), processes=2)
+    train(chosen, lambda report: print(report.steps, flush=True))
+"""
+    script = options.data / "learn.py"
+    script.write_text(command)
+    with subprocess.Popen(
+        ["sh", "-c", f"trap '' INT; exec {sys.executable} {script}"],  # deaf to interrupts, as in a script's background
+        stdout=subprocess.PIPE,
+        cwd=Path.cwd(),
+        env=environment(),
+    ) as began:
+        assert began.stdout is not None
+        assert int(began.stdout.readline()) > 0
+        children = Path(f"/proc/{began.pid}/task/{began.pid}/children").read_text().split()
+        learning = [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+        began.kill()
+    assert len(learning) == 2
+    assert all(ends(pid, within_s=60.0) for pid in learning)
+
+
+def ends(pid: int, within_s: float) -> bool:
+    """Whether a process is over, or is in time."""
+    try:
+        handle = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return True
+    return bool(select.select([handle], [], [], within_s)[0])
+
+
+def environment() -> dict[str, str]:
+    """That of this process, with the sources in the path."""
+    return {**os.environ, "PYTHONPATH": str(Path.cwd())}
+
+
+def test_a_resumed_training_counts_what_it_has_seen(options: TrainOptions) -> None:
+    train(options, lambda _report: None)
+    told = list[Report]()
+    train(replace(options, resume=True, budget=Budget(pictures=12)), told.append)
+    assert told[-1].steps == 6
+
+
+def test_a_training_that_is_over_writes_its_file_anew(options: TrainOptions) -> None:
+    file = train(options, lambda _report: None)
+    content = file.read_bytes()
+    file.unlink()
+    train(replace(options, resume=True), lambda _report: None)
+    assert file.read_bytes() == content
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_weights_that_are_not_there_are_named(options: TrainOptions, tmp_path: Path, processes: int) -> None:
+    chosen = replace(options, start=tmp_path / "none.pt", processes=processes)
+    with pytest.raises(TrainingDataError, match=r"none\.pt"):
+        train(chosen, lambda _report: None)
+
+
+def test_weights_of_another_training_are_taken_over(options: TrainOptions, tmp_path: Path) -> None:
+    train(options, lambda _report: None)
+    told = list[Report]()
+    train(replace(options, out=tmp_path / "next", start=options.out / CHECKPOINT), told.append)
+    assert told[-1].steps == 4
+
+
+def test_learning_goes_on_from_an_onnx_file(options: TrainOptions, tmp_path: Path) -> None:
+    start = train(options, lambda _report: None)
+    told = list[Report]()
+    chosen = replace(options, out=tmp_path / "next", start=start)
+    train(chosen, told.append)
+    assert told[-1].steps == 4
+
+
+@pytest.mark.parametrize("content", [b"", b"no network"])
+def test_an_onnx_file_that_is_damaged_is_named(options: TrainOptions, tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "old.onnx"
+    file.write_bytes(content)
+    with pytest.raises(TrainingDataError, match=r"old\.onnx"):
+        train(replace(options, start=file), lambda _report: None)
+
+
+def test_scores_are_shifted_by_pictures_that_are_not_crowded(options: TrainOptions) -> None:
+    document = json.loads((options.data / "train.json").read_text())
+    for image in document["images"][1:]:
+        image["crowded"] = True
+    (options.data / "train.json").write_text(json.dumps(document))
+    assert [one.file for one in examination(options.data, "train", NAMES).pictures] == ["train0.png"]
+
+
+def test_a_picture_that_is_damaged_is_named(options: TrainOptions) -> None:
+    (options.data / "train2.png").write_bytes(b"no picture")
+    with pytest.raises(TrainingDataError, match=r"train2\.png"):
+        train(options, lambda _report: None)

@@ -20,10 +20,12 @@ from executive.tree.registry import built_in_skills
 from executive.tree.types import describe_type, field_types
 from plant.worlds.world import SeedRules
 from skills.api import Skill
+from skills.stack import SLOTS, components, skill_options, stack_schema
 from skills.testing.fault_kinds import STANDARD_FAULTS
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "reference"
+STACK_SCHEMA = ROOT / "skills" / "stack.schema.json"
 NOTE = "<!-- Written by docs/make_reference.py; don't edit. -->\n\n"
 
 
@@ -75,7 +77,7 @@ SCHEMA_PAGES = (
 def pages() -> dict[str, str]:
     """The text of every page by file name."""
     written = {f"{page.name}.md": schema_page(page) for page in SCHEMA_PAGES}
-    return {**written, "skills.md": skills_page(), "faults.md": faults_page()}
+    return {**written, "skills.md": skills_page(), "stack.md": stack_page(), "faults.md": faults_page()}
 
 
 def schema_page(page: SchemaPage) -> str:
@@ -216,6 +218,44 @@ def _type(hint: Any) -> str:
     return describe_type(hint).replace("skills.api.", "").replace("skills.robot.", "").replace("|", "&#124;")
 
 
+def stack_page() -> str:
+    """The page on stack files: every slot with its components, every skill that has options."""
+    words = (
+        "What a robot uses, and with which options: `errand run --stack FILE`. A slot, a skill or an option that the "
+        "file leaves out is as in the default; `errand stack show` prints all. Unknown keys are refused with file and "
+        "line. `skills/stack.schema.json` is the schema for editors. Each component is a frozen dataclass that an "
+        "installed distribution registers in the slot's entry-point group."
+    )
+    slots = "".join(_slot(slot, group) for slot, group in SLOTS.items())
+    skills = "".join(_options(f"### {name}", kind) for name, kind in skill_options().items())
+    example = "planner: {use: lattice, margin_m: 0.1}\nskills:\n  navigate:\n    replans: 3\n"
+    shown = f"## Example\n\n```yaml\n{example}```\n"
+    return f"{NOTE}# Stack files\n\n{words}\n\n{slots}## skills\n\n{skills}{shown}"
+
+
+def _slot(slot: str, group: str) -> str:
+    known = "".join(_options(f"### {name}", kind) for name, kind in components(slot).items())
+    return f"## {slot}\n\nEntry points: `{group}`.\n\n{known}"
+
+
+def _options(heading: str, kind: type[Any]) -> str:
+    """One component or skill: its docstring, then its options; options within options follow."""
+    rows, inner = [], []
+    default, hints = kind(), field_types(kind)
+    for field in dataclasses.fields(kind):
+        value = getattr(default, field.name)
+        if dataclasses.is_dataclass(value):
+            inner.append(_options(f"{heading}.{field.name}", type(value)))
+        else:
+            rows.append(f"| `{field.name}` | {_type(hints[field.name])} | `{value}` |")
+    table = "| option | type | unless said |\n|---|---|---|\n" + "\n".join(rows) + "\n\n" if rows else ""
+    return f"{heading}\n\n{_paragraph(kind)}\n\n{table}{''.join(inner)}"
+
+
+def _paragraph(kind: type[Any]) -> str:
+    return " ".join((kind.__doc__ or "").split())
+
+
 def faults_page() -> str:
     """The page on the faults that can be injected by name."""
     rows = "\n".join(f"| `{kind.example}` | {kind.meaning} |" for kind in STANDARD_FAULTS)
@@ -227,9 +267,15 @@ def faults_page() -> str:
     return f"{NOTE}# Faults by name\n\n{words}\n\n| for instance | what happens |\n|---|---|\n{rows}\n"
 
 
+def stack_schema_text() -> str:
+    """The text of `skills/stack.schema.json`."""
+    return json.dumps(stack_schema(), indent=2) + "\n"
+
+
 def main() -> None:
     """Write all pages."""
     FOLDER.mkdir(exist_ok=True)
+    STACK_SCHEMA.write_text(stack_schema_text(), encoding="utf-8")
     for name, text in pages().items():
         (FOLDER / name).write_text(text, encoding="utf-8")
 

@@ -23,6 +23,7 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
+from plant.locomotion.carrier import CarrierLimits
 from plant.scene import Scene
 from plant.scenery import add_model, add_scenery
 from plant.spot.model import SpotModel
@@ -67,6 +68,7 @@ def build_diagram(
     robot_names: Sequence[str],
     looks: bool = True,
     carried: bool = True,
+    locomotion: CarrierLimits | None = None,
     render: bool = True,
     time_step_s: float = TIME_STEP_S,
     renderer_parameters: RenderEngineVtkParams | None = None,
@@ -77,7 +79,8 @@ def build_diagram(
     SAP contact at `time_step_s`; sampled outputs, which would double the cost of a step, are off, so that evaluating
     contact results solves once more. Positions of the models are defaults, the robots' are set by the caller.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
-    `looks` draws Spot with meshes where they are installed; `render` makes the scene for cameras.
+    `looks` draws Spot with meshes where they are installed; `render` makes the scene for cameras. `locomotion` limits
+    what bears the robots.
     """
     rebuild = partial(
         build_diagram,
@@ -86,6 +89,7 @@ def build_diagram(
         robot_names=robot_names,
         looks=looks,
         carried=carried,
+        locomotion=locomotion,
         render=False,
         time_step_s=time_step_s,
     )
@@ -97,7 +101,9 @@ def build_diagram(
     parser = parser_of(plant)
     scenery = {} if directives is None else add_scenery(plant, directives, parser_of)
     instances = {model.name: _add_model(plant, parser, model) for model in models}
-    robots = {name: SpotModel(plant, name, looks=looks, carried=carried) for name in sorted(robot_names)}
+    robots = {
+        name: SpotModel(plant, name, looks=looks, carried=carried, limits=locomotion) for name in sorted(robot_names)
+    }
     plant.Finalize()
     for model in models:
         if not model.fixed:

@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context
 
 from plant.diagram import LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
+from plant.locomotion.carrier import CarrierLimits
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.sleeping import Sleepers
@@ -163,13 +164,14 @@ class Simulation:
         record: bool = False,
         looks: bool = True,
         charge: float = 1.0,
+        locomotion: CarrierLimits | None = None,
         extra_models: Sequence[LooseModel] = (),
     ) -> None:
         """Build the plant of `world`; things and people stand where the seed puts them.
 
         The first robot stands at the world's start pose, others a robot's length behind one another. Batteries begin at
-        `charge` (0 to 1). `extra_models` stand in the world though no map knows them. Raises WorldError when the things
-        do not fit into the world.
+        `charge` (0 to 1). `extra_models` stand in the world though no map knows them; `locomotion` limits what bears
+        the robots. Raises WorldError when the things do not fit into the world.
         """
         self.seed, self.world = seed, world
         things, people = place_objects(world, seed), place_people(world, seed)
@@ -182,6 +184,7 @@ class Simulation:
             ],
             robot_names=robot_names,
             looks=looks,
+            locomotion=locomotion,
             renderer_parameters=render_parameters(),
         )
         self.engine = Engine(built, _starts(world.start, robot_names), seed=seed, dock=world.dock, charge=charge)

@@ -20,6 +20,7 @@ from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
 from skills.robot import Clock, Lease, Pose2D, Robot, Scan
+from skills.stack import RobotStack, default_stack
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
@@ -40,6 +41,10 @@ class Cause(enum.Enum):
     TIMEOUT = "TIMEOUT"  # the robot's clock ran past the limit
     CANCELLED = "CANCELLED"  # somebody stopped it
     ERROR = "ERROR"  # a defect: an exception, a hung verb
+
+
+class PlanningError(Exception):
+    """No plan was found; the message is one plain sentence."""
 
 
 @dataclass(frozen=True)
@@ -165,6 +170,14 @@ class ForgettingCostmap(Protocol):
         """Forget all that was seen and not surveyed; the number of cells that were blocked by it."""
 
 
+@runtime_checkable
+class LayeredView(Protocol):
+    """A costmap that tells what is seen and not surveyed."""
+
+    def seen_m(self) -> NDArray[np.float64]:
+        """Centres (N, 2) of the cells that are blocked by something seen that the map does not explain."""
+
+
 class Job(Protocol[ResultT_co]):
     """Work under way in the Worker."""
 
@@ -286,6 +299,7 @@ class SkillContext:
     ask: Ask = nobody_to_ask
     detector: Detector = NO_DETECTOR
     work: WorkCounter = NO_WORK_COUNTER
+    stack: RobotStack = field(default_factory=default_stack)
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""
@@ -296,6 +310,11 @@ class SkillContext:
         return Pose2D.from_transform(self.X_WB())
 
 
+@dataclass(frozen=True)
+class NoOptions:
+    """Nothing can be set."""
+
+
 class Skill(ABC, Generic[InputsT]):
     """Base of all skills.
 
@@ -303,6 +322,7 @@ class Skill(ABC, Generic[InputsT]):
     ports and their types; `causes` documents which failures it gives and when. `default_timeout_s` counts the
     robot's clock. `checkpoint` holds what a later `resume` needs beyond the inputs, as JSON values; it is kept durably.
     `changes_world` marks what must not be done twice: after a restart such a skill is told to `resume` and looks first.
+    `Options` is a frozen dataclass of what a stack file may set of the skill, all with defaults.
     `max_data_age_s` says how old (s) the data may be on which a success rests, by name: a sense verb (not `image`),
     "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.
     """
@@ -314,10 +334,12 @@ class Skill(ABC, Generic[InputsT]):
     default_timeout_s: ClassVar[float] = 60.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {}
     changes_world: ClassVar[bool] = False
+    Options: ClassVar[type] = NoOptions
     checkpoint: Mapping[str, Any] = MappingProxyType({})
 
-    def __init__(self, context: SkillContext) -> None:
+    def __init__(self, context: SkillContext, options: Any = None) -> None:
         self.context = context
+        self.options = options or context.stack.skills.get(self.name) or self.Options()
 
     @abstractmethod
     def begin(self, inputs: InputsT) -> None:

@@ -12,7 +12,8 @@ z forward, x right, y down; `lidar` (L). `X_AB` is the pose of frame B in frame 
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NewType, Protocol
 
@@ -51,24 +52,77 @@ class Pose2D:
         return Pose2D(float(p[0]), float(p[1]), float(RollPitchYaw(X_AB.rotation()).yaw_angle()))
 
 
+class BaseKind(enum.Enum):
+    """How a base goes about."""
+
+    OMNIDIRECTIONAL = "omnidirectional"  # moves and turns in any direction: legs, mecanum wheels
+    DIFFERENTIAL = "differential"  # goes only where it heads, ahead or back, and turns on the spot: two driven wheels
+
+
+class InverseKinematics(Protocol):
+    """An arm's own solver."""
+
+    def __call__(self, X_BH: RigidTransform) -> Sequence[FloatArray]:
+        """Joint angles (J,) that put the hand there, every branch; joint limits are checked by the caller."""
+
+
 @dataclass(frozen=True)
 class ArmCapabilities:
-    """The arm: joint names from the shoulder on, the furthest reach from the first joint, in metres."""
+    """The arm: joint names from the shoulder on, the furthest reach from the first joint (m), what it lifts (kg).
+
+    `inverse` solves its inverse kinematics; None for an arm with shoulder yaw, two pitch joints and a spherical wrist,
+    whose closed form `skills.arm.kinematics` reads from the robot's description.
+    """
 
     joint_names: tuple[str, ...]
     max_reach_m: float
     stowed_rad: tuple[float, ...]
+    max_payload_kg: float
+    inverse: InverseKinematics | None = None
 
 
 @dataclass(frozen=True)
 class GripperCapabilities:
-    """The gripper: 0 is closed, `open_rad` is fully open (a positive jaw angle)."""
+    """The gripper: 0 is closed, `open_rad` is fully open (a positive jaw angle).
+
+    Geometry in the hand frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, fingertips at
+    `tip_x_m`, the inner face of the fixed finger at `fixed_z_m`; the tips are 2 `half_breadth_m` wide along y and
+    `tip_thickness_m` thick. A thing in the grip has its middle about `grip_x_m` ahead of H, and things up to
+    `max_grasp_m` wide are taken. Hand, gripper and what it holds end `length_m` ahead of H.
+    """
 
     joint_name: str
     open_rad: float
     max_opening_m: float
     max_force_n: float
     depth_m: float
+    palm_x_m: float
+    tip_x_m: float
+    fixed_z_m: float
+    half_breadth_m: float
+    tip_thickness_m: float
+    grip_x_m: float
+    max_grasp_m: float
+    length_m: float
+
+
+@dataclass(frozen=True)
+class CameraCapabilities:
+    """One camera: the source that `image` takes, what carries it, the body or the hand, and its pose X_FC there."""
+
+    source: str
+    X_FC: RigidTransform
+    on_hand: bool = False
+
+    @property
+    def heading_rad(self) -> float:
+        """How far to the left of ahead its optical axis points in the frame that carries it."""
+        axis = self.X_FC.rotation().matrix()[:, 2]
+        return math.atan2(axis[1], axis[0])
+
+    def looks_towards(self, heading_rad: float, within_rad: float = math.pi / 4) -> bool:
+        """Whether the optical axis lies so near to a direction in the body frame."""
+        return abs(math.remainder(self.heading_rad - heading_rad, math.tau)) < within_rad
 
 
 @dataclass(frozen=True)
@@ -88,8 +142,24 @@ class Capabilities:
     pitch_range_rad: tuple[float, float]
     arm: ArmCapabilities | None
     gripper: GripperCapabilities | None
-    camera_sources: tuple[str, ...]
+    cameras: tuple[CameraCapabilities, ...]
     description: str
+    base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL
+
+    @property
+    def camera_sources(self) -> tuple[str, ...]:
+        """The names of all cameras."""
+        return tuple(camera.source for camera in self.cameras)
+
+    @property
+    def body_cameras(self) -> tuple[CameraCapabilities, ...]:
+        """The cameras on the body, which look for people and for what lies in the way."""
+        return tuple(camera for camera in self.cameras if not camera.on_hand)
+
+    @property
+    def hand_camera(self) -> CameraCapabilities | None:
+        """The camera on the hand, None when there is none."""
+        return next((camera for camera in self.cameras if camera.on_hand), None)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
-from executive.cli.detector_choice import detector_of
 from executive.cli.promises import promises_of
 from executive.mission.errors import InputError
 from executive.mission.knowledge import Knowledge
@@ -20,39 +19,40 @@ from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError
-from skills.detect.attributes import known_attributes
 from skills.detection import Detector
-from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import GridMap, MapError, load_grid_map
-from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
+from skills.estimate.grid_map import MapError, load_grid_map
 from skills.navigate.footprint import Footprint
-from skills.perception.detector.augmentation import AugmentedDetector
-from skills.perception.detector.cascade_files import MODEL_FILE
-from skills.perception.detector.onnx_detector import DetectorOptions
+from skills.perception.attributes import known_attributes
+from skills.perception.detector.network_file import ModelFileError
 from skills.robot import Pose2D
-
-UNSURE_SIGMA = (0.5, 0.5, 0.3)
-UNSURE_RADIUS_M = 4.0
-LIFT_KG = 5.0
-"""What Spot's arm lifts continuously at half a metre, by its data sheet."""
+from skills.stack import DetectorComponent, RobotStack, default_stack
 
 
-def simulate(world: World, *, seed: int, robot_name: str, record: bool) -> Simulation:
+def simulate(world: World, *, seed: int, robot_name: str, record: bool, stack: RobotStack | None = None) -> Simulation:
     """The plant of a world, things set by the seed. Raises InputError when they do not fit into it."""
+    locomotion = (stack or default_stack()).locomotion
     try:
-        return Simulation(world, seed=seed, robot_names=(robot_name,), record=record)
+        return Simulation(world, seed=seed, robot_names=(robot_name,), record=record, locomotion=locomotion)
     except WorldError as error:
         raise InputError(str(error)) from error
 
 
-def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, believed: Pose2D | None = None) -> RunEntry:
-    """The robot of a tree's name with its estimators.
+def run_entry(
+    simulation: Simulation,
+    world: World,
+    tree: CompiledTree,
+    stack: RobotStack | None = None,
+    *,
+    believed: Pose2D | None = None,
+) -> RunEntry:
+    """The robot of a tree's name with the components of its stack.
 
     `believed` is where the robot believed to be before a restart; it looks for its place in a wide circle then.
 
     Raises:
         InputError: there is no such robot, or the world's maps or the detector's model cannot be read.
     """
+    stack = stack or default_stack()
     if tree.robot_name not in simulation.robots:
         known = ", ".join(simulation.robots)
         raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", mend=f"known: {known}")
@@ -63,28 +63,24 @@ def run_entry(simulation: Simulation, world: World, tree: CompiledTree, *, belie
     return RunEntry(
         tree=tree,
         robot=simulation.robots[tree.robot_name],
-        localiser=_localiser(scan_map, world.start, believed),
-        costmap=LayeredCostmap(keepout_map),
-        detector=shared_detector(),
+        localiser=stack.localiser.build(scan_map, believed or world.start, surely=believed is None),
+        costmap=stack.costmap.build(keepout_map),
+        detector=shared_detector(stack),
+        stack=stack,
     )
+
+
+def shared_detector(stack: RobotStack | None = None) -> Detector:
+    """The detector of a stack, or the default one, loaded once in this process. Raises InputError."""
+    return _built((stack or default_stack()).detector)
 
 
 @cache
-def shared_detector() -> Detector:
-    """The one detector of this process, loaded at the first call. Raises InputError when its model cannot be used."""
-    return AugmentedDetector(detector_of(MODEL_FILE, DetectorOptions()))
-
-
-def _localiser(scan_map: GridMap, start: Pose2D, believed: Pose2D | None) -> ScanMatchingLocaliser:
-    if believed is None:
-        return ScanMatchingLocaliser(scan_map, start)
-    usual = LocaliserOptions()
-    wide = LocaliserOptions(
-        height_band_m=scan_map.height_band_m or usual.height_band_m,
-        initial_sigma=UNSURE_SIGMA,
-        search_radius_m=UNSURE_RADIUS_M,
-    )
-    return ScanMatchingLocaliser(scan_map, believed, wide)
+def _built(component: DetectorComponent) -> Detector:
+    try:
+        return component.build()
+    except ModelFileError as error:
+        raise InputError(error.message, mend=error.mend, file=error.file) from error
 
 
 def take_up_plant(simulation: Simulation, path: Path, *, label: str | None) -> None:
@@ -107,14 +103,16 @@ def itinerary_of(world: World) -> PlannedWays:
         keepout_map = load_grid_map(world.keepout_map_path)
     except (MapError, OSError) as error:
         raise InputError(str(error)) from error
-    return PlannedWays(LayeredCostmap(keepout_map), Footprint.of(spot_capabilities()))
+    return PlannedWays(default_stack().costmap.build(keepout_map), Footprint.of(spot_capabilities()))
 
 
 @cache
 def abilities_of() -> Abilities:
     """What the robot can lift, and what the things weigh that there are models of."""
     masses = {name: _mass_kg(one.path()) for name, one in load_catalogue().items() if one.file is not None}
-    return Abilities(masses, LIFT_KG, frozenset(shared_detector().class_names), known_attributes())
+    arm = spot_capabilities().arm
+    lift_kg = 0.0 if arm is None else arm.max_payload_kg
+    return Abilities(masses, lift_kg, frozenset(shared_detector().class_names), known_attributes())
 
 
 def _mass_kg(sdf: Path) -> float:

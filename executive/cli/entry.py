@@ -46,6 +46,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     ),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "dataset": _Command("dataset_command", "dataset", "Labelled pictures rendered in the plant; scores, training."),
+    "stack": _Command("stack_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
     "new-skill": _Command("new_skill_command", "new_skill", "Write an installable package with a skill and tests."),
 }
 """The commands by name, in the order of the help."""

@@ -20,10 +20,13 @@ from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Request
 from executive.cli.shown import control_for, show_files, show_run
+from executive.cli.stack_command import STACK
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.language.questions import QuestionPolicy
+from executive.mission.stack_file import load_stack
 from executive.record.profile import Profile, lines
 from executive.store.missions import MissionStore
+from skills.stack import RobotStack
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]
@@ -54,6 +57,7 @@ def run(
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
     profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: Store = None,
+    stack: STACK = None,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
     view_port: Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0 takes a free one.")] = 0,
@@ -81,6 +85,7 @@ def run(
             console=console,
             page=page_of,
             profile=timing,
+            stack=load_stack(stack),
         )
     if timing is not None:
         for line in lines(timing.table()):
@@ -141,6 +146,7 @@ def _run_kept(
     console: Console,
     page: PageOf,
     profile: Profile | None,
+    stack: RobotStack,
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
     request = asked.request()
@@ -165,6 +171,7 @@ def _run_kept(
                 page=shown,
                 durable=durable,
                 profile=profile,
+                stack=stack,
             )
             talk = None if shown is None else shown.conversation
             finished = show_run(start, request, compiled, console, control=control, quiet=quiet, conversation=talk)

@@ -32,6 +32,7 @@ from executive.tree.compiler import CompiledTree
 from executive.view.collapse import DRAWN_NODES, folded_to
 from executive.view.model import NodeView, node_view
 from executive.view.svg import to_svg
+from skills.stack import RobotStack, default_stack
 
 
 @dataclass(frozen=True)
@@ -54,17 +55,21 @@ def run_request(
     page: PageView | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
+    stack: RobotStack | None = None,
 ) -> Finished:
     """Run a compiled request in the plant and write log, tree, recording and pictures into `out`.
 
     The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it;
     with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
+    `stack` is what the robot uses.
 
     Raises:
         InputError: the world cannot be used.
     """
-    simulation = simulate(request.world, seed=seed, robot_name=request.mission.robot_name, record=record)
-    entry = run_entry(simulation, request.world, tree, believed=None if durable is None else durable.pose)
+    stack = stack or default_stack()
+    robot_name = request.mission.robot_name
+    simulation = simulate(request.world, seed=seed, robot_name=robot_name, record=record, stack=stack)
+    entry = run_entry(simulation, request.world, tree, stack, believed=None if durable is None else durable.pose)
     if durable is not None:
         entry = replace(entry, journal=durable.journal)
         durable.begin(simulation)

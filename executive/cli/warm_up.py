@@ -5,8 +5,9 @@ from __future__ import annotations
 from contextlib import suppress
 
 from executive.run.runner import RunEntry
+from skills.api import PlanningError
 from skills.navigate.footprint import Footprint
-from skills.navigate.planner import PlanningError, plan_path
+from skills.navigate.planner import plan_path
 from skills.robot import Pose2D
 
 

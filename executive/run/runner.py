@@ -29,13 +29,14 @@ from executive.tree.compiling.workshop import slug
 from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
 from skills.detection import NO_DETECTOR
 from skills.robot import Clock, LeaseError, Robot
+from skills.stack import RobotStack, default_stack
 
 HOLDER = "errand"
 
 
 @dataclass(frozen=True)
 class RunEntry:
-    """One robot with its tree and estimators, what looks through its pictures, and who keeps notes of its mission."""
+    """One robot with its tree, its estimators and detector, the rest of its stack, and its mission's journal."""
 
     tree: CompiledTree
     robot: Robot
@@ -43,6 +44,7 @@ class RunEntry:
     costmap: Costmap
     journal: Journal | None = None
     detector: Detector = NO_DETECTOR
+    stack: RobotStack = field(default_factory=default_stack)
 
 
 @dataclass(frozen=True)
@@ -196,6 +198,7 @@ class _Run:
             stop_pressed=lambda: self._control.stop_pressed,
             detector=entry.detector,
             work=self._work,
+            stack=entry.stack,
         )
         try:
             return Session(entry.tree, context, robot, self._control, entry.journal, self._profile)

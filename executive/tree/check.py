@@ -10,10 +10,10 @@ from executive.mission.errors import InputError, listing
 from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.estimate import Estimate, Estimates, Itinerary, Way, estimate_tree
-from skills.api import Costmap
+from skills.api import Costmap, PlanningError
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import path_length
-from skills.navigate.planner import PlanningError, plan_path
+from skills.navigate.planner import plan_path
 from skills.robot import Pose2D
 
 __all__ = ["Abilities", "Checked", "PlannedWays", "check_tree"]

@@ -33,7 +33,7 @@ from skills.robot import FloatArray, Pose2D
 
 @dataclass(frozen=True)
 class CarrierLimits:
-    """What the carrier can do; forces in N, torques in N m."""
+    """A planar floating base that bears the body: what it can do; forces in N, torques in N m."""
 
     speed_m_s: float = 1.6
     turn_rate_rad_s: float = 2.0

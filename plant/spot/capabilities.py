@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from plant.models.spot.description import LEGS, spot_facts, spot_urdf
+from plant.sensors.camera_spec import load_cameras
 from plant.spot.model import JAW
-from skills.robot import ArmCapabilities, Capabilities, FloatArray, GripperCapabilities
+from plant.spot.sensing import CAMERAS
+from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities
 
 
 def nominal_footholds() -> FloatArray:
@@ -20,6 +23,7 @@ def nominal_footholds() -> FloatArray:
     return np.array([[sx * x, sy * y] for sx, sy in (signs[leg] for leg in LEGS)], dtype=np.float64)
 
 
+@cache
 def spot_capabilities() -> Capabilities:
     """Spot's capabilities, from the facts."""
     facts = spot_facts()
@@ -32,10 +36,25 @@ def spot_capabilities() -> Capabilities:
         standing_height_m=body["standing_height"],
         height_range_m=tuple(body["height_range"]),
         pitch_range_rad=tuple(body["pitch_range"]),
-        arm=ArmCapabilities(arm_names, body["max_reach"], tuple(facts["stowed"][name] for name in arm_names)),
-        gripper=GripperCapabilities(
-            JAW, gripper["open"], gripper["max_opening"], gripper["max_force"], gripper["depth"]
+        arm=ArmCapabilities(
+            arm_names,
+            body["max_reach"],
+            tuple(facts["stowed"][name] for name in arm_names),
+            body["max_payload"],
         ),
-        camera_sources=("hand", "frontleft", "frontright", "left", "right", "back"),
+        gripper=GripperCapabilities(
+            joint_name=JAW,
+            open_rad=gripper["open"],
+            max_opening_m=gripper["max_opening"],
+            max_force_n=gripper["max_force"],
+            depth_m=gripper["depth"],
+            **{f"{name}_m": value for name, value in gripper["in_hand"].items()},
+        ),
+        cameras=_cameras(),
         description=spot_urdf(),
     )
+
+
+def _cameras() -> tuple[CameraCapabilities, ...]:
+    cameras = load_cameras(CAMERAS).items()
+    return tuple(CameraCapabilities(name, spec.X_link_camera(), spec.link != "body") for name, spec in cameras)

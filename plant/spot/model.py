@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RevoluteJoint
 from pydrake.systems.framework import Context
 
-from plant.locomotion.carrier import Carrier
+from plant.locomotion.carrier import Carrier, CarrierLimits
 from plant.models.spot.description import (
     LEGS,
     LOOKS_PACKAGE,
@@ -39,7 +39,15 @@ _ARM_GAINS = {
 class SpotModel:
     """Spot's bodies, joints and carrier in a plant."""
 
-    def __init__(self, plant: MultibodyPlant, name: str, *, looks: bool, carried: bool = True) -> None:
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        name: str,
+        *,
+        looks: bool,
+        carried: bool = True,
+        limits: CarrierLimits | None = None,
+    ) -> None:
         """Add the robot to `plant` (before Finalize); a robot that is not carried keeps its free base."""
         self.plant = plant
         self.name = name
@@ -51,7 +59,7 @@ class SpotModel:
         (self.instance,) = parser.AddModelsFromString(spot_urdf(looks=meshes is not None), "urdf")
         plant.RenameModelInstance(self.instance, name)
         self.body = plant.GetBodyByName("body", self.instance)
-        self.carrier = Carrier(plant, name, self.body) if carried else None
+        self.carrier = Carrier(plant, name, self.body, limits) if carried else None
         for joint, (p, d) in self._gains().items():
             plant.GetJointActuatorByName(joint, self.instance).set_controller_gains(PdControllerGains(p=p, d=d))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -16,17 +17,12 @@ from skills.arm.arm_skill import ArmSkill
 from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
-from skills.grasp.candidates import Target, grasp_candidates
+from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.planning import within_reach
 from skills.grasp.posture import body_height_m
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 
-POSITION_TOLERANCE_M = 0.06
-YAW_TOLERANCE_RAD = 0.08
-SPEED_M_S = 0.5
-_MOST_TRIES = 3
-_GOOD_GRASP = 0.1
 _STILL_BEFORE_M = 1.3
 
 
@@ -38,11 +34,28 @@ class ApproachInputs:
     surfaces: tuple[Surface, ...]
 
 
+@dataclass(frozen=True)
+class ApproachOptions:
+    """How exactly and how fast the robot goes before the object.
+
+    It goes to the first of `tries` places to which a path leads. Where the best grasp from here costs no more than
+    `good_grasp` above the best there is, it stays.
+    """
+
+    position_tolerance_m: float = 0.06
+    yaw_tolerance_rad: float = 0.08
+    speed_m_s: float = 0.5
+    tries: int = 3
+    good_grasp: float = 0.1
+
+
 class Approach(ArmSkill[ApproachInputs]):
     """Drives with the arm stowed, at low speed; the observation that comes out is fresh."""
 
     name = "approach"
     Inputs = ApproachInputs
+    Options: ClassVar[type] = ApproachOptions
+    options: ApproachOptions
     outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PLANNING: "no free place to stand is near enough to the thing, or no way leads there",
@@ -58,7 +71,7 @@ class Approach(ArmSkill[ApproachInputs]):
         point_W = (seen.position_W[0], seen.position_W[1])
         here = self.context.pose()
         from_here = self._reach_cost(seen)(here) if is_comfortable(here, point_W) else None
-        if from_here is None or from_here > _GOOD_GRASP:
+        if from_here is None or from_here > self.options.good_grasp:
             free, reach_cost = self._free_places(seen), self._reach_cost(seen)
             places = yield from self.compute(
                 lambda: reachable(free, reach_cost),
@@ -71,7 +84,7 @@ class Approach(ArmSkill[ApproachInputs]):
                     Cause.PLANNING, f"there is no free place to stand from which the {seen.thing} is within reach"
                 )
             yield from self.stow()
-            yield from self.go_to_one([place.pose for place in places[:_MOST_TRIES]])
+            yield from self.go_to_one([place.pose for place in places[: self.options.tries]])
         return (yield from self._look_again(inputs))
 
     def undone(self, inputs: ApproachInputs) -> str | None:
@@ -83,7 +96,9 @@ class Approach(ArmSkill[ApproachInputs]):
     def go_to_one(self, poses: list[Pose2D]) -> Routine[None]:
         """Drive to the first of some poses to which there is a way."""
         for k, pose in enumerate(poses):
-            goal = NavigateInputs(pose, POSITION_TOLERANCE_M, YAW_TOLERANCE_RAD, SPEED_M_S)
+            goal = NavigateInputs(
+                pose, self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s
+            )
             try:
                 yield from self.perform(Navigate(self.context), goal)
                 return
@@ -106,17 +121,24 @@ class Approach(ArmSkill[ApproachInputs]):
 
     def _reach_cost(self, seen: ObjectObservation) -> Callable[[Pose2D], float | None]:
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
-        model, height_m = self.model, body_height_m(base_m, self.context.robot.capabilities())
-        return lambda pose: grasp_cost(model, pose.transform(height_m), seen)
+        model = self.model
+        candidates = partial(self.context.stack.grasp_planner.candidates, p_BS=model.p_BS, gripper=self.gripper)
+        height_m = body_height_m(base_m, self.context.robot.capabilities())
+        return lambda pose: grasp_cost(model, candidates, pose.transform(height_m), seen)
 
 
-def grasp_cost(model: ArmModel, X_WB: RigidTransform, seen: ObjectObservation) -> float | None:
+def grasp_cost(
+    model: ArmModel,
+    candidates_of: Callable[[Target], list[GraspCandidate]],
+    X_WB: RigidTransform,
+    seen: ObjectObservation,
+) -> float | None:
     """Cost of the best grasp of a thing that the arm reaches with the body at X_WB, beyond the best there is.
 
     None when it reaches no grasp.
     """
     up_B = X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
-    candidates = grasp_candidates(observed_target(seen, X_WB), model.p_BS)
+    candidates = candidates_of(observed_target(seen, X_WB))
     reached = (candidate.cost for candidate in candidates if within_reach(model, candidate, up_B))
     best = next(reached, None)
     return None if best is None else best - candidates[0].cost

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skills.api import Costmap
+from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.robot import Capabilities, Pose2D
 
@@ -33,7 +34,7 @@ class Standing:
 def is_comfortable(pose: Pose2D, point_W: tuple[float, float]) -> bool:
     """Whether the point lies before the robot at a good distance already."""
     dx, dy = point_W[0] - pose.x_m, point_W[1] - pose.y_m
-    bearing = (math.atan2(dy, dx) - pose.yaw_rad + math.pi) % (2 * math.pi) - math.pi
+    bearing = wrap(math.atan2(dy, dx) - pose.yaw_rad)
     return COMFORTABLE_M[0] <= math.hypot(dx, dy) <= COMFORTABLE_M[1] and abs(bearing) < COMFORTABLE_BEARING_RAD
 
 
@@ -63,6 +64,6 @@ def reachable(free: Sequence[Standing], reach_cost: Callable[[Pose2D], float | N
 
 def _cost(pose: Pose2D, here: Pose2D, distance_m: float) -> float:
     """Metres to go, turning, and how far the distance is from the best."""
-    turn = abs((pose.yaw_rad - here.yaw_rad + math.pi) % (2 * math.pi) - math.pi)
+    turn = abs(wrap(pose.yaw_rad - here.yaw_rad))
     way = float(np.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
     return way + 0.3 * turn + 4.0 * abs(distance_m - DISTANCES_M[0])

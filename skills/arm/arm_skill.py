@@ -10,9 +10,8 @@ from pydrake.math import RigidTransform
 from skills.api import Cause, InputsT, SkillContext
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel, arm_model
-from skills.arm.motion import plan_joint_path, plan_line, time_path
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
-from skills.robot import ArmTrajectory, FloatArray, Image
+from skills.robot import ArmTrajectory, CameraCapabilities, FloatArray, GripperCapabilities, Image
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
 
@@ -20,7 +19,6 @@ PLANNING_LATENCY_S = 0.3
 PICTURE_LATENCY_S = 0.1
 SETTLE_S = 0.15
 OLDEST_PICTURE_S = 0.5
-HAND_CAMERA = "hand"
 LINE_SPEED_RAD_S = 0.6
 JAW_FORCE_N = 20.0
 
@@ -102,15 +100,15 @@ class ArmSkill(RoutineSkill[InputsT]):
 
         return prepared
 
-    def move_to(self, goal: Goal, message: str, speed_rad_s: float = 1.2) -> Routine[FloatArray]:
+    def move_to(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[FloatArray]:
         """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration."""
 
         scene_now, start = self.scene_now(), self.q_rad()
 
         def plan() -> tuple[ArmTrajectory, FloatArray]:
-            scene = scene_now()
-            path = plan_joint_path(scene, start, goal(scene, start), self._rng)
-            return time_path(path, speed_rad_s=speed_rad_s, scene=scene), path[-1]
+            scene, planner = scene_now(), self.context.stack.arm_planner
+            path = planner.path(scene, start, goal(scene, start), self._rng)
+            return planner.timed(path, speed_rad_s=speed_rad_s, scene=scene), path[-1]
 
         trajectory, q_goal_rad = yield from self.compute(
             plan, latency_s=PLANNING_LATENCY_S, name="plan arm motion", message=message
@@ -130,7 +128,8 @@ class ArmSkill(RoutineSkill[InputsT]):
 
         def plan() -> ArmTrajectory:
             X_BH = RigidTransform(self.model.X_BH(q).rotation(), p_BH)
-            return time_path(plan_line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
+            planner = self.context.stack.arm_planner
+            return planner.timed(planner.line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
 
         trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)
         yield from self.follow(trajectory, message)
@@ -140,11 +139,30 @@ class ArmSkill(RoutineSkill[InputsT]):
         yield from self.move_straight(self.model.X_BH(self.q_rad()).translation() + offset_B, message)
 
     @property
-    def open_rad(self) -> float:
-        """How far the jaw opens."""
+    def gripper(self) -> GripperCapabilities:
+        """The gripper's geometry and limits. Raises SkillFailure with cause PRECONDITION when there is none."""
         gripper = self.context.robot.capabilities().gripper
-        assert gripper is not None
-        return gripper.open_rad
+        if gripper is None:
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no gripper")
+        return gripper
+
+    @property
+    def hand_camera(self) -> CameraCapabilities:
+        """The camera on the hand. Raises SkillFailure with cause PRECONDITION when there is none."""
+        camera = self.context.robot.capabilities().hand_camera
+        if camera is None:
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on its hand")
+        return camera
+
+    @property
+    def open_rad(self) -> float:
+        """How far the gripper opens."""
+        return self.gripper.open_rad
+
+    @property
+    def p_HT(self) -> FloatArray:
+        """Where the middle of what the gripper holds is in the hand frame (3,), m."""
+        return np.array([self.gripper.grip_x_m, 0.0, 0.0])
 
     def clear_view(self, message: str) -> Routine[None]:
         """Open an empty jaw, which else stands before the hand camera."""
@@ -168,8 +186,9 @@ class ArmSkill(RoutineSkill[InputsT]):
         """
         yield from self.pause(SETTLE_S, message)
         robot, asked_s = self.context.robot, self.context.clock.now()
+        source = self.hand_camera.source
         image = yield from self.sense(
-            lambda: robot.image(HAND_CAMERA), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
+            lambda: robot.image(source), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
         )
         if image.stamp_s < asked_s - OLDEST_PICTURE_S:
             age_s = asked_s - image.stamp_s
@@ -182,8 +201,3 @@ class ArmSkill(RoutineSkill[InputsT]):
             yield from self.stow("stowing the arm after the failure")
         except SkillFailure:
             return
-
-
-def hand_camera_in_hand(image: Image) -> RigidTransform:
-    """X_HC from a picture's frame tree."""
-    return image.frames.pose(image.camera_frame, "hand")

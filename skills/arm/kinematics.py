@@ -1,7 +1,8 @@
 """Kinematics of an arm with shoulder yaw, two parallel pitch joints and a spherical roll-pitch-roll wrist.
 
 All poses are in the body frame B; the hand frame H is the last arm link, x along the fingers, y along the jaw's hinge.
-The chain is read from the robot's own URDF, and the inverse is solved in closed form: every branch, no seeds.
+The chain is read from the robot's own URDF. The inverse is solved in closed form, every branch and no seeds, or by
+the solver that the robot's capabilities bring.
 """
 
 from __future__ import annotations
@@ -9,14 +10,15 @@ from __future__ import annotations
 import itertools
 import math
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.robot import Capabilities, FloatArray
+from skills.geometry import wrap
+from skills.robot import Capabilities, FloatArray, InverseKinematics
 
 _EXPECTED_AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0))
 
@@ -40,6 +42,7 @@ class ArmModel:
     joints: tuple[ChainJoint, ...]
     jaw: ChainJoint
     stowed_rad: FloatArray
+    solver: InverseKinematics | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -80,12 +83,17 @@ class ArmModel:
 
     def inverse(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> tuple[FloatArray, ...]:
         """All joint angles that put the hand at X_BH and keep margin_rad from the limits; empty when out of reach."""
+        solutions = self._closed_form(X_BH) if self.solver is None else self.solver(X_BH)
+        return tuple(q for q in solutions if self.within_limits(q, margin_rad))
+
+    def _closed_form(self, X_BH: RigidTransform) -> list[FloatArray]:
+        """Every branch of an arm with shoulder yaw, two pitch joints and a spherical wrist."""
         solutions = []
         for q_arm in self._arm_branches(X_BH.translation() - self.p_BS):
             R_BE = _axis_rotation((0, 0, 1), q_arm[0]) @ _axis_rotation((0, 1, 0), q_arm[1] + q_arm[2])
             for q_wrist in _wrist_branches(R_BE.T @ X_BH.rotation().matrix()):
-                solutions.append(_wrapped(np.array([*q_arm, *q_wrist])))
-        return tuple(q for q in solutions if self.within_limits(q, margin_rad))
+                solutions.append(wrap(np.array([*q_arm, *q_wrist])))
+        return solutions
 
     def nearest_inverse(
         self, X_BH: RigidTransform, q_near_rad: FloatArray, margin_rad: float = 0.03
@@ -138,11 +146,6 @@ def _wrist_branches(R: NDArray[np.float64]) -> list[tuple[float, float, float]]:
     ]
 
 
-def _wrapped(q_rad: FloatArray) -> FloatArray:
-    """Angles brought into [-pi, pi)."""
-    return np.asarray((q_rad + math.pi) % (2 * math.pi) - math.pi)
-
-
 def _floats(text: str) -> tuple[float, float, float]:
     x, y, z = (float(part) for part in text.split())
     return x, y, z
@@ -178,20 +181,32 @@ def _check_structure(joints: tuple[ChainJoint, ...]) -> None:
 
 
 @lru_cache(maxsize=4)
-def _read_model(description: str, names: tuple[str, ...], jaw_name: str, stowed: tuple[float, ...]) -> ArmModel:
+def _read_model(
+    description: str,
+    names: tuple[str, ...],
+    jaw_name: str,
+    stowed: tuple[float, ...],
+    closed_form: bool,
+) -> ArmModel:
     robot = ElementTree.fromstring(description.replace("drake:", "drake-"))  # the prefix is often left undeclared
     elements = {element.get("name"): element for element in robot.findall("joint")}
     missing = [name for name in (*names, jaw_name) if name not in elements]
     if missing:
         raise ValueError(f"URDF of the robot: no joint {', '.join(missing)}")
     joints = tuple(_read_joint(elements[name]) for name in names)
-    _check_structure(joints)
+    if closed_form:
+        _check_structure(joints)
     return ArmModel(joints, _read_joint(elements[jaw_name]), np.array(stowed))
 
 
 def arm_model(capabilities: Capabilities) -> ArmModel:
-    """The arm described by a robot's capabilities. Raises ValueError when it has none or of another structure."""
+    """The arm described by a robot's capabilities.
+
+    Raises ValueError when it has none, or one of another structure that brings no solver of its own.
+    """
     if capabilities.arm is None or capabilities.gripper is None:
         raise ValueError("the robot has no arm with a gripper")
-    names, stowed = capabilities.arm.joint_names, capabilities.arm.stowed_rad
-    return _read_model(capabilities.description, names, capabilities.gripper.joint_name, stowed[: len(names)])
+    names, stowed, solver = capabilities.arm.joint_names, capabilities.arm.stowed_rad, capabilities.arm.inverse
+    jaw_name = capabilities.gripper.joint_name
+    model = _read_model(capabilities.description, names, jaw_name, stowed[: len(names)], solver is None)
+    return replace(model, solver=solver)

@@ -8,9 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
+from skills.api import PlanningError
 from skills.arm.collision import ArmScene
 from skills.arm.kinematics import ArmModel
-from skills.arm.routine import PlanningError
 from skills.robot import FloatArray
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -25,13 +25,13 @@ def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
 
 
 def look_configuration(
-    scene: ArmScene, X_HC: RigidTransform, stations_B: Iterable[FloatArray], p_BT: FloatArray, q_near_rad: FloatArray
+    scene: ArmScene, X_HC: RigidTransform, viewpoints_B: Iterable[FloatArray], p_BT: FloatArray, q_near_rad: FloatArray
 ) -> FloatArray:
-    """Arm angles with the hand camera (X_HC) at the first possible station, looking at p_BT.
+    """Arm angles with the hand camera (X_HC) at the first possible viewpoint, looking at p_BT.
 
-    Raises PlanningError when no station can be taken.
+    Raises PlanningError when no viewpoint can be taken.
     """
-    for p_BC in stations_B:
+    for p_BC in viewpoints_B:
         solutions = scene.model.inverse(camera_pose(p_BC, p_BT) @ X_HC.inverse())
         free = [q for q in solutions if scene.free(q)]
         if free:
@@ -42,7 +42,7 @@ def look_configuration(
 _COMFORT = np.array([1.0, 1.0, 1.0, 2.0, 1.0, 1.0])
 
 
-def overview_stations(model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
+def overview_viewpoints(model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
     """Camera places above the shoulder on p_BT's side, high ones first; shift_rad turns them about the shoulder."""
     direction = np.arctan2(p_BT[1] - model.p_BS[1], p_BT[0] - model.p_BS[0]) + shift_rad
     heading = np.array([np.cos(direction), np.sin(direction), 0.0])
@@ -52,7 +52,7 @@ def overview_stations(model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0)
     ]
 
 
-def close_stations(p_BS: FloatArray, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
+def close_viewpoints(p_BS: FloatArray, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
     """Camera places 0.35 to 0.5 m from p_BT, on the shoulder's side of it and looking down at it."""
     direction = np.arctan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0]) + shift_rad
     return [
@@ -61,7 +61,7 @@ def close_stations(p_BS: FloatArray, p_BT: FloatArray, shift_rad: float = 0.0) -
     ]
 
 
-def stations_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, aside_m: float = 0.06) -> list[FloatArray]:
+def viewpoints_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, aside_m: float = 0.06) -> list[FloatArray]:
     """Camera places beside and above p_BC, as seen when looking from there at p_BT.
 
     First those on the side on which p_BC is already, seen from the shoulder at p_BS towards p_BT: away from what hides

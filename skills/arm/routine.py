@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from skills.api import Cause, Failed, InputsT, Job, Running, Skill, SkillContext, Step, Succeeded
+from skills.api import Cause, Failed, InputsT, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
+from skills.geometry import wrap
 from skills.robot import ArmTrajectory, CommandId, CommandState, FloatArray, Pose2D
 
 ResultT = TypeVar("ResultT")
@@ -36,10 +37,6 @@ class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program er
         self.cause = cause
         self.message = message
         self.outputs: Mapping[str, Any] = outputs or {}
-
-
-class PlanningError(Exception):
-    """No way was found; the message is one plain sentence."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +107,7 @@ class RoutineSkill(Skill[InputsT]):
         now = self._stance_now()
         moved_m = math.hypot(now.pose.x_m - before.pose.x_m, now.pose.y_m - before.pose.y_m)
         turn = now.pose.yaw_rad - before.pose.yaw_rad
-        still = moved_m < _STAYED_M and abs(math.remainder(turn, math.tau)) < _STAYED_RAD
+        still = moved_m < _STAYED_M and abs(wrap(turn)) < _STAYED_RAD
         arm_off = float(np.max(np.abs(now.arm_rad - before.arm_rad), initial=0.0))
         fresh = now.since_s - before.since_s < _PAUSE_S
         return fresh and still and arm_off < _STAYED_RAD and (now.holding or not before.holding)

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step, Succeeded
-from skills.estimate.planar import compose, relative
+from skills.geometry import compose, relative
 from skills.navigate.base import Base
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.robot import Pose2D
@@ -18,9 +18,6 @@ from skills.robot import Pose2D
 DIRECTIONS_RAD = tuple(math.radians(degrees) for degrees in (180, 150, -150, 90, -90, 30, -30, 0))
 """Ways to go, in the body frame; backwards is tried first."""
 _STEP_M = 0.05
-_SLOW_M_S = 0.25
-_ARRIVED_M = 0.03
-_SETTLE_S = 0.4
 
 
 @dataclass(frozen=True)
@@ -31,11 +28,22 @@ class BackOffInputs:
     least_m: float = 0.15
 
 
+@dataclass(frozen=True)
+class BackOffOptions:
+    """How fast the robot goes, how near the goal it stops (m), and how long it takes to come to rest (s)."""
+
+    speed_m_s: float = 0.25
+    arrived_m: float = 0.03
+    settle_s: float = 0.4
+
+
 class BackOff(Skill[BackOffInputs]):
     """Goes straight, slowly, without turning, in the first direction with room; looks at the costmap all the way."""
 
     name: ClassVar[str] = "back_off"
     Inputs: ClassVar[type] = BackOffInputs
+    Options: ClassVar[type] = BackOffOptions
+    options: BackOffOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PLANNING: "there is no room in any direction",
         Cause.EXECUTION: "the robot refuses to drive or does not get on",
@@ -99,12 +107,12 @@ class BackOff(Skill[BackOffInputs]):
         left_m = math.hypot(off.x_m, off.y_m)
         if left_m < self._least_left_m - 0.02:
             self._least_left_m, self._best_s = left_m, now_s
-        if left_m < _ARRIVED_M:
-            self._settled_s = now_s + _SETTLE_S
+        if left_m < self.options.arrived_m:
+            self._settled_s = now_s + self.options.settle_s
             return self._settling()
         if now_s - self._best_s > 3.0:
             return Failed(Cause.EXECUTION, f"The robot does not get on; {left_m:.2f} m are left of backing off.")
-        speed = min(_SLOW_M_S, max(0.08, 1.5 * left_m))
+        speed = min(self.options.speed_m_s, max(0.08, 1.5 * left_m))
         self._base.drive((speed * off.x_m / left_m, speed * off.y_m / left_m, 0.5 * off.yaw_rad))
         return Running(f"backing off, {left_m:.2f} m to go")
 

@@ -8,9 +8,6 @@ from typing import ClassVar
 
 from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
 
-_NO_GAIN_S = 30.0
-_LEAST_GAIN = 0.005
-
 
 @dataclass(frozen=True)
 class ChargeInputs:
@@ -19,11 +16,21 @@ class ChargeInputs:
     level: float = 0.8
 
 
+@dataclass(frozen=True)
+class ChargeOptions:
+    """A battery that has not gained `least_gain` (a share) within `no_gain_s` does not charge."""
+
+    no_gain_s: float = 30.0
+    least_gain: float = 0.005
+
+
 class Charge(Skill[ChargeInputs]):
     """The robot stands on its dock already. It moves nothing; it waits, and looks whether the charge really rises."""
 
     name: ClassVar[str] = "charge"
     Inputs: ClassVar[type] = ChargeInputs
+    Options: ClassVar[type] = ChargeOptions
+    options: ChargeOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the level is not from 0 to 1",
         Cause.POSTCONDITION: "the charge does not rise: the robot does not stand on its dock, or the dock is dead",
@@ -44,9 +51,9 @@ class Charge(Skill[ChargeInputs]):
         charge, now_s = self.context.robot.battery().charge, self.context.clock.now()
         if charge >= self._level:
             return Succeeded(f"the battery is at {charge:.0%}")
-        if charge > self._best + _LEAST_GAIN:
+        if charge > self._best + self.options.least_gain:
             self._best, self._best_s = charge, now_s
-        if now_s - self._best_s > _NO_GAIN_S:
+        if now_s - self._best_s > self.options.no_gain_s:
             return Failed(Cause.POSTCONDITION, f"the battery does not charge here; it stays at {charge:.0%}")
         done = (charge - self._begun_at) / max(self._level - self._begun_at, 1e-6)
         return Running(f"charging, {charge:.0%} of {self._level:.0%}", min(1.0, max(0.0, done)))

@@ -8,19 +8,19 @@ from typing import Any
 from pydrake.math import RigidTransform
 
 from skills.api import Detection, ObjectObservation, SkillContext
-from skills.detect.coverage import SurfaceShares
-from skills.detect.forms import class_forms
-from skills.detect.points import camera_pose_W
-from skills.detect.sighting import Sighting
-from skills.detect.tracks import Track
+from skills.perception.class_forms import class_forms
+from skills.perception.coverage import SurfaceShares
+from skills.perception.detection_3d import Detection3D
+from skills.perception.point_cloud import camera_pose_W
+from skills.perception.tracker import Track
 from skills.robot import Image
 
 Message = Mapping[str, Any]
 
 
-def detections_message(image: Image, found: Iterable[Detection], placed: Sequence[Sighting]) -> Message:
+def detections_message(image: Image, found: Iterable[Detection], placed: Sequence[Detection3D]) -> Message:
     """All detections of one picture, with boxes (u0, v0, u1, v1) in its pixels, and the picture itself."""
-    places = {id(sighting.detection): sighting for sighting in placed}
+    places = {id(detected.detection): detected for detected in placed}
     return {
         "stamp_s": image.stamp_s,
         "source": image.source,
@@ -29,7 +29,7 @@ def detections_message(image: Image, found: Iterable[Detection], placed: Sequenc
     }
 
 
-def _detection(detection: Detection, placed: Sighting | None) -> Message:
+def _detection(detection: Detection, placed: Detection3D | None) -> Message:
     told = {
         "class_id": class_id(detection.class_name),
         "class_name": detection.class_name,

@@ -11,15 +11,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, Detection, LocalisationEstimate, ObjectObservation, Running, Succeeded, Surface
-from skills.arm.arm_skill import ArmSkill, hand_camera_in_hand
+from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene
-from skills.arm.poses import close_stations, look_configuration, overview_stations, stations_beside
+from skills.arm.poses import close_viewpoints, look_configuration, overview_viewpoints, viewpoints_beside
 from skills.arm.routine import Routine, SkillFailure
-from skills.detect.attention import unnamed
-from skills.detect.attributes import known_attributes, shows
-from skills.detect.coverage import Coverage
-from skills.detect.forms import class_forms
-from skills.detect.looking import in_plain_view, look_targets, surface_boxes
 from skills.detect.messages import (
     coverage_message,
     detections_message,
@@ -27,22 +22,21 @@ from skills.detect.messages import (
     object_to_detect_message,
     tracks_message,
 )
-from skills.detect.sighting import FLOOR, Sighting, observation, sightings
-from skills.detect.surface_view import Cluster, view_surface
-from skills.detect.tracks import FAINT_SCORE, SURE_SCORE, Track, TrackBook
+from skills.detect.unidentified import unnamed
+from skills.detect.viewpoints import in_plain_view, look_targets, surface_boxes
 from skills.detect.words import counted, describe, surface_names, wanted
+from skills.geometry import wrap
+from skills.perception.attributes import known_attributes, shows
+from skills.perception.class_forms import class_forms
+from skills.perception.coverage import Coverage
+from skills.perception.detection_3d import FLOOR, Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in, is_dark
+from skills.perception.surface_segmentation import Cluster, view_surface
+from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.robot import FloatArray, Image
 
-_CONFIRM_SHIFTS_RAD = (0.25, -0.3)
-_CANDIDATES = 3
-_EXPECTED_WITHIN_M = 0.35
-_FLOOR_WITHIN_M = 2.2
 _LEAST_SEEN = 0.02
-_CLOSER_LOOKS = 3
 _LOOKED_AT_M = 0.08
-_FRESH_S = 1.5
-_AROUND_RAD = (0.7, -0.7)
 
 
 @dataclass(frozen=True)
@@ -72,8 +66,27 @@ class Look:
     image: Image
     localisation: LocalisationEstimate
     detections: tuple[Detection, ...]
-    sightings: tuple[Sighting, ...]
+    detections_3d: tuple[Detection3D, ...]
     clusters: tuple[Cluster, ...]
+
+
+@dataclass(frozen=True)
+class DetectOptions:
+    """How long the skill looks on.
+
+    What may be meant is looked at again from aside, turned by `confirm_shifts_rad` about the shoulder; `candidates` of
+    them more than are asked for. What has no name yet is looked at from near, `closer_looks` at most; what something
+    hides is looked at from `around_rad`. An answer rests on a picture no older than `fresh_s`. A thing counts within
+    `expected_within_m` of where it is expected, and on the floor within `floor_within_m` of the robot.
+    """
+
+    confirm_shifts_rad: tuple[float, ...] = (0.25, -0.3)
+    candidates: int = 3
+    expected_within_m: float = 0.35
+    floor_within_m: float = 2.2
+    closer_looks: int = 3
+    fresh_s: float = 1.5
+    around_rad: tuple[float, ...] = (0.7, -0.7)
 
 
 class Detect(ArmSkill[DetectInputs]):
@@ -81,6 +94,8 @@ class Detect(ArmSkill[DetectInputs]):
 
     name = "detect"
     Inputs = DetectInputs
+    Options: ClassVar[type] = DetectOptions
+    options: DetectOptions
     outputs: ClassVar[Mapping[str, type]] = {
         "observation": ObjectObservation,
         "observations": tuple[ObjectObservation, ...],
@@ -103,19 +118,18 @@ class Detect(ArmSkill[DetectInputs]):
         targets = self._targets(inputs, X_WB)
         if not targets:
             raise SkillFailure(Cause.PRECONDITION, f"{surface_names(inputs.surfaces)} is out of sight from here")
-        self._book, self._coverage = TrackBook(self.context.detector.class_names), Coverage(inputs.surfaces)
+        self._tracker, self._coverage = Tracker(self.context.detector.class_names), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
         self._clusters: list[Cluster] = []
-        X_HC = hand_camera_in_hand((yield from self.picture("looking")))
         blocked: list[SkillFailure] = []
         for k, target in enumerate(targets):
-            yield from self._look_and_confirm(inputs, X_HC, target, blocked)
+            yield from self._look_and_confirm(inputs, target, blocked)
             if self._has_enough(inputs):
                 break
             yield Running(f"looking for {wanted(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
-        yield from self._look_closer(inputs, X_HC)
-        yield from self._look_around(inputs, X_HC)
-        yield from self._refresh(inputs, X_HC)
+        yield from self._look_closer(inputs)
+        yield from self._look_around(inputs)
+        yield from self._refresh(inputs)
         self.context.publish("surfaces_seen", coverage_message(self.context, self._coverage.shares()))
         return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
 
@@ -139,52 +153,55 @@ class Detect(ArmSkill[DetectInputs]):
     def _has_enough(self, inputs: DetectInputs) -> bool:
         return 0 < inputs.count <= len(self._found(inputs))
 
-    def _look_closer(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
+    def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
         """Look from near where the thing is expected, or at what was not named and may be what is wanted."""
         if inputs.expected_W is not None:
             if not self._has_enough(inputs):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
-                yield from self._look_and_confirm(inputs, X_HC, p_BT, [], close=True)
+                yield from self._look_and_confirm(inputs, p_BT, [], close=True)
             return
-        for _ in range(_CLOSER_LOOKS):
-            left = unnamed(self._clusters, self._book.snapshot(), inputs.classes)
+        for _ in range(self.options.closer_looks):
+            left = unnamed(self._clusters, self._tracker.snapshot(), inputs.classes)
             if self._has_enough(inputs) or not left:
                 return
             shape, base_m = left[0].shape, left[0].base_m
             self._clusters = [c for c in self._clusters if _apart(c.shape.centre, shape.centre) > _LOOKED_AT_M]
             p_BT = self.X_WB().inverse() @ np.array([*shape.centre, base_m + 0.5 * shape.height_m])
             kept, self._clusters = self._clusters, []
-            yield from self._look_and_confirm(inputs, X_HC, p_BT, [], close=True)
+            yield from self._look_and_confirm(inputs, p_BT, [], close=True)
             self._clusters = kept
 
-    def _look_around(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
+    def _look_around(self, inputs: DetectInputs) -> Routine[None]:
         """Look from either side at what something hides."""
         for p_W in self._coverage.hidden_middle_W().values() if inputs.expected_W is None else ():
-            for shift_rad in _AROUND_RAD:
+            for shift_rad in self.options.around_rad:
                 if self._has_enough(inputs):
                     return
                 p_BT = self.X_WB().inverse() @ p_W
-                yield from self._look_and_confirm(inputs, X_HC, p_BT, [], shift_rad=shift_rad)
+                yield from self._look_and_confirm(inputs, p_BT, [], shift_rad=shift_rad)
 
-    def _refresh(self, inputs: DetectInputs, X_HC: RigidTransform) -> Routine[None]:
+    def _refresh(self, inputs: DetectInputs) -> Routine[None]:
         """Look once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""
         if (track := self._seen_a_while_ago(inputs)) is not None:
-            yield from self._look_and_confirm(inputs, X_HC, self.X_WB().inverse() @ track.position_W, [])
+            yield from self._look_and_confirm(inputs, self.X_WB().inverse() @ track.position_W, [])
         if (track := self._seen_a_while_ago(inputs)) is not None:  # from there it did not show: from where it did
             X_BW = self.X_WB().inverse()
             p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
-            stations = [*stations_beside(self.model.p_BS, eye_B, p_BO), *self._stations(p_BO)]
-            yield from self._look_if_possible(inputs, X_HC, p_BO, stations)
+            viewpoints = [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
+            yield from self._look_if_possible(inputs, p_BO, viewpoints)
 
     def _seen_a_while_ago(self, inputs: DetectInputs) -> Track | None:
         """What was found and seen last, unless it was seen just now."""
         newest = next(iter(self._found(inputs)), None)
-        return newest if newest is not None and self.context.clock.now() - newest.last_seen_s > _FRESH_S else None
+        return (
+            newest
+            if newest is not None and self.context.clock.now() - newest.last_seen_s > self.options.fresh_s
+            else None
+        )
 
     def _look_and_confirm(
         self,
         inputs: DetectInputs,
-        X_HC: RigidTransform,
         p_BT: FloatArray,
         blocked: list[SkillFailure],
         *,
@@ -193,7 +210,7 @@ class Detect(ArmSkill[DetectInputs]):
     ) -> Routine[None]:
         """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
         try:
-            yield from self.look(inputs, X_HC, p_BT, self._stations(p_BT, shift_rad, close=close))
+            yield from self.look(inputs, p_BT, self._viewpoints(p_BT, shift_rad, close=close))
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -202,45 +219,46 @@ class Detect(ArmSkill[DetectInputs]):
         while (track := self._candidate(inputs)) is not None:
             tries = self._tried[track.number] = self._tried.get(track.number, 0) + 1
             p_BO = self.X_WB().inverse() @ track.position_W
-            yield from self._look_if_possible(inputs, X_HC, p_BO, self._stations_to_confirm(track, tries, close=close))
+            yield from self._look_if_possible(inputs, p_BO, self._confirming(track, tries, close=close))
 
     def _look_if_possible(
-        self, inputs: DetectInputs, X_HC: RigidTransform, p_BT: FloatArray, stations_B: Sequence[FloatArray]
+        self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray]
     ) -> Routine[None]:
         """Look at a point, unless the arm cannot."""
         try:
-            yield from self.look(inputs, X_HC, p_BT, stations_B)
+            yield from self.look(inputs, p_BT, viewpoints_B)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
 
-    def _stations(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
+    def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
         """Camera places p_BC to look from at p_BT, turned by shift_rad about the shoulder; near ones first if close."""
-        far = overview_stations(self.model, p_BT, shift_rad)
-        if abs(shift_rad) >= max(_AROUND_RAD):
+        far = overview_viewpoints(self.model, p_BT, shift_rad)
+        if abs(shift_rad) >= max(map(abs, self.options.around_rad)):
             far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
-        return [*close_stations(self.model.p_BS, p_BT, shift_rad), *far] if close else far
+        return [*close_viewpoints(self.model.p_BS, p_BT, shift_rad), *far] if close else far
 
-    def _stations_to_confirm(self, track: Track, tries: int, *, close: bool) -> list[FloatArray]:
+    def _confirming(self, track: Track, tries: int, *, close: bool) -> list[FloatArray]:
         """Camera places to look from at a track for the first, second or third time after it was seen.
 
         First from the side farther from where it was seen, then from the other, then from right beside there.
         """
         X_BW = self.X_WB().inverse()
         p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
-        if tries > len(_CONFIRM_SHIFTS_RAD):
-            return [*stations_beside(self.model.p_BS, eye_B, p_BO), *self._stations(p_BO)]
+        if tries > len(self.options.confirm_shifts_rad):
+            return [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
         seen_rad, bearing = _bearing(eye_B - self.model.p_BS), _bearing(p_BO - self.model.p_BS)
-        off = {shift: abs(math.remainder(bearing + shift - seen_rad, math.tau)) for shift in _CONFIRM_SHIFTS_RAD}
-        shifts_rad = sorted(_CONFIRM_SHIFTS_RAD, key=lambda shift: -off[shift])
-        return self._stations(p_BO, shifts_rad[tries - 1], close=close)
+        off = {shift: abs(wrap(bearing + shift - seen_rad)) for shift in self.options.confirm_shifts_rad}
+        shifts_rad = sorted(self.options.confirm_shifts_rad, key=lambda shift: -off[shift])
+        return self._viewpoints(p_BO, shifts_rad[tries - 1], close=close)
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
         """The likeliest track that may be what is looked for and is to be looked at again."""
-        if self._has_enough(inputs) or len(self._tried) > _CANDIDATES + inputs.count:
+        if self._has_enough(inputs) or len(self._tried) > self.options.candidates + inputs.count:
             return None
+        shifts = len(self.options.confirm_shifts_rad)
         open_ones = (t for t in self._matching(inputs) if not t.confirmed)
-        return next((t for t in open_ones if self._tried.get(t.number, 0) < _tries_for(t)), None)
+        return next((t for t in open_ones if self._tried.get(t.number, 0) < _tries_for(t, shifts)), None)
 
     def _found(self, inputs: DetectInputs) -> list[Track]:
         """The confirmed ones, those seen last first."""
@@ -249,31 +267,32 @@ class Detect(ArmSkill[DetectInputs]):
 
     def _matching(self, inputs: DetectInputs) -> list[Track]:
         """The tracks that are of the classes, show the attributes and lie in the right place; the likeliest first."""
-        tracks = [t for t in self._book.snapshot() if t.class_name in inputs.classes and self._in_place(inputs, t)]
+        tracks = [t for t in self._tracker.snapshot() if t.class_name in inputs.classes and self._in_place(inputs, t)]
         fitting = [t for t in tracks if all(shows(t.best, word) for word in inputs.attributes)]
         if inputs.expected_W is None:
             return sorted(fitting, key=lambda t: -t.belief * t.best.detection.score)
         off = {t.number: _apart(t.position_W, inputs.expected_W) for t in fitting}
-        return sorted((t for t in fitting if off[t.number] < _EXPECTED_WITHIN_M), key=lambda t: off[t.number])
+        return sorted(
+            (t for t in fitting if off[t.number] < self.options.expected_within_m), key=lambda t: off[t.number]
+        )
 
     def _in_place(self, inputs: DetectInputs, track: Track) -> bool:
         if track.latest.surface in {surface.name for surface in inputs.surfaces}:
             return True
-        near = _apart(track.position_W, self.X_WB().translation()) < _FLOOR_WITHIN_M
+        near = _apart(track.position_W, self.X_WB().translation()) < self.options.floor_within_m
         return inputs.floor and track.latest.surface == FLOOR and near
 
     def look(
         self,
         inputs: DetectInputs,
-        X_HC: RigidTransform,
         p_BT: FloatArray,
-        stations_B: Sequence[FloatArray],
+        viewpoints_B: Sequence[FloatArray],
     ) -> Routine[Look]:
-        """Point the camera at p_BT, from the first possible one of `stations_B`, and take in what is seen."""
+        """Point the camera at p_BT, from the first possible one of `viewpoints_B`, and take in what is seen."""
         message = f"looking for {wanted(inputs.classes, inputs.attributes)}"
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return look_configuration(scene, X_HC, stations_B, p_BT, q)
+            return look_configuration(scene, self.hand_camera.X_FC, viewpoints_B, p_BT, q)
 
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)
@@ -284,7 +303,7 @@ class Detect(ArmSkill[DetectInputs]):
             found = detections_in(detector, image, FAINT_SCORE)
             views = (view_surface(image, place.X_WO, surface) for surface in inputs.surfaces)
             clusters = tuple(cluster for view in views if view is not None for cluster in view.clusters)
-            return Look(image, place, found, sightings(image, place, found, inputs.surfaces), clusters)
+            return Look(image, place, found, detections_3d(image, place, found, inputs.surfaces), clusters)
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
         self._take_in(look)
@@ -294,9 +313,9 @@ class Detect(ArmSkill[DetectInputs]):
         X_WO = look.localisation.X_WO
         if not is_dark(look.image):
             self._coverage.add(look.image, X_WO)
-        tracks = self._book.update(look.sightings, lambda t: in_plain_view(look.image, X_WO, t.position_W))
+        tracks = self._tracker.update(look.detections_3d, lambda t: in_plain_view(look.image, X_WO, t.position_W))
         sure = [detection for detection in look.detections if detection.score >= SURE_SCORE]
-        self.context.publish("detections", detections_message(look.image, sure, look.sightings))
+        self.context.publish("detections", detections_message(look.image, sure, look.detections_3d))
         self.context.publish("tracks", tracks_message(self.context, tracks))
         self._clusters += look.clusters
         self._last = look
@@ -331,13 +350,13 @@ class Detect(ArmSkill[DetectInputs]):
 
 
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
-    """A track as an observation: its fused place, the rest from its last sighting."""
+    """A track as an observation: its fused place, the rest from its last detection."""
     return observation(replace(track.latest, position_W=track.position_W), attributes)
 
 
-def _tries_for(track: Track) -> int:
+def _tries_for(track: Track, shifts: int) -> int:
     """How often to look at a track again: once more from nearby where neither side showed its place."""
-    return len(_CONFIRM_SHIFTS_RAD) + (track.views == 1 and track.missed == 0)
+    return shifts + (track.views == 1 and track.missed == 0)
 
 
 def _bearing(p_B: FloatArray) -> float:

@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from skills.api import LocalisationEstimate
 from skills.estimate.compiled import distances
 from skills.estimate.grid_map import GridMap
-from skills.estimate.planar import compose
 from skills.estimate.scan_points import scan_points, sensor_pose
 from skills.estimate.seen_layer import Beams, clear_cells, mark_cells
 from skills.estimate.self_filter import SelfFilter, in_body_axes
+from skills.geometry import compose
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 
 @dataclass(frozen=True)
 class CostmapOptions:
-    """Numbers of the layer of seen things.
+    """The surveyed keep-out grid and a layer of obstacles that the sensors see.
 
     A point between the heights counts when it is nearer than max_range_m and farther than `explained_m` from all
     that the keep-out grid knows. LiDAR cells count once two scans agree; a cell is remembered for `memory_s` unless
@@ -38,6 +38,10 @@ class CostmapOptions:
     memory_s: float = 12.0
     cell_m: float = 0.05
     min_points_per_cell: int = 3
+
+    def build(self, keepout: GridMap) -> LayeredCostmap:
+        """A costmap on a surveyed keep-out grid."""
+        return LayeredCostmap(keepout, self)
 
 
 class LayeredCostmap:

@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
 from skills.estimate.matching import Match, MatchOptions, match, score_poses
-from skills.estimate.planar import compose, inverse, relative
 from skills.estimate.scan_points import scan_points
+from skills.geometry import compose, inverse, relative
 from skills.robot import FloatArray, Pose2D, Robot, Scan
+
+_HEIGHTS_M = (0.7, 1.3)
+"""The band of a grid that does not name its own."""
 
 
 @dataclass(frozen=True)
 class LocaliserOptions:
-    """Numbers of the localiser.
+    """Matches scans to the surveyed grid, within `height_band_m` above the floor (the grid's own where None).
 
-    `initial_sigma` is the spread of the given start pose in x, y (m) and yaw (rad). Odometry is expected to err by
+    `initial_sigma` is the spread of the given start pose in x, y (m) and yaw (rad); `unsure_sigma` and
+    `unsure_radius_m` count instead where the robot may have been moved since. Odometry is expected to err by
     `drift_per_m` of the way, `yaw_drift_rad_per_m` and `yaw_drift_per_rad` of a turn. Fewer explained points than
     `lost_share`, for `lost_scans` scans on end, means lost; `found_share` is needed to be found again. Places whose
     shares differ by less than `alike_share` count as alike.
     """
 
-    height_band_m: tuple[float, float] = (0.7, 1.3)
+    height_band_m: tuple[float, float] | None = None
     max_range_m: float = 15.0
     azimuths: int = 200
     max_points: int = 500
@@ -34,6 +38,8 @@ class LocaliserOptions:
     drift_per_m: float = 0.03
     yaw_drift_rad_per_m: float = 0.02
     yaw_drift_per_rad: float = 0.03
+    unsure_sigma: tuple[float, float, float] = (0.5, 0.5, 0.3)
+    unsure_radius_m: float = 4.0
     lost_share: float = 0.4
     found_share: float = 0.6
     alike_share: float = 0.02
@@ -41,6 +47,13 @@ class LocaliserOptions:
     search_radius_m: float = 1.5
     search_every_scans: int = 10
     matching: MatchOptions = field(default_factory=MatchOptions)
+
+    def build(self, grid: GridMap, start: Pose2D, *, surely: bool) -> ScanMatchingLocaliser:
+        """A localiser that starts at a pose; not `surely` when the robot may have been moved since it was there."""
+        if surely:
+            return ScanMatchingLocaliser(grid, start, self)
+        wide = replace(self, initial_sigma=self.unsure_sigma, search_radius_m=self.unsure_radius_m)
+        return ScanMatchingLocaliser(grid, start, wide)
 
 
 class ScanMatchingLocaliser:
@@ -52,7 +65,8 @@ class ScanMatchingLocaliser:
 
     def __init__(self, grid: GridMap, initial: Pose2D, options: LocaliserOptions | None = None) -> None:
         self._grid = grid
-        self._options = options or LocaliserOptions(height_band_m=grid.height_band_m or (0.7, 1.3))
+        self._options = options or LocaliserOptions()
+        self._heights_m = self._options.height_band_m or grid.height_band_m or _HEIGHTS_M
         self._initial: Pose2D | None = initial
         self._X_WO = initial
         self._X_OB: Pose2D | None = None
@@ -117,7 +131,7 @@ class ScanMatchingLocaliser:
         """At most max_points returns of a scan, evenly chosen, in the levelled body frame."""
         options = self._options
         points = scan_points(
-            scan, azimuths=options.azimuths, heights_m=options.height_band_m, max_range_m=options.max_range_m
+            scan, azimuths=options.azimuths, heights_m=self._heights_m, max_range_m=options.max_range_m
         )
         if len(points) <= options.max_points:
             return points

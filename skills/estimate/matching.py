@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skills.estimate.compiled import bilinear, compiled
 from skills.estimate.grid_map import GridMap
-from skills.estimate.planar import wrap
+from skills.geometry import wrap
 from skills.robot import FloatArray, Pose2D
 
 INLIER_M = 0.15

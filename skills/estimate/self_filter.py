@@ -16,13 +16,11 @@ from skills.robot import Capabilities, FloatArray, Joints, Pose2D
 class ArmShape:
     """The arm as line segments, from the robot's own description and joint angles."""
 
-    HAND_LENGTH_M = 0.35
-    """The last segment goes on so far beyond the last joint: the hand and a thing in it."""
-
     def __init__(self, capabilities: Capabilities) -> None:
         if capabilities.arm is None:
             raise ValueError("ArmShape: the robot has no arm")
         self._names = capabilities.arm.joint_names
+        self._hand_m = 0.0 if capabilities.gripper is None else capabilities.gripper.length_m
         self._plant = MultibodyPlant(0.0)
         Parser(self._plant).AddModelsFromString(capabilities.description, "urdf")
         self._plant.Finalize()
@@ -37,7 +35,7 @@ class ArmShape:
             q[joint.position_start()] = joints.position_rad[name]
         self._plant.SetPositions(self._context, q)
         poses = [joint.frame_on_child().CalcPose(self._context, self._body) for joint in self._joints]
-        tip = poses[-1] @ np.array([self.HAND_LENGTH_M, 0.0, 0.0])
+        tip = poses[-1] @ np.array([self._hand_m, 0.0, 0.0])
         return np.array([*(pose.translation() for pose in poses), tip])
 
 

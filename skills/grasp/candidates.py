@@ -14,29 +14,12 @@ import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.robot import FloatArray
+from skills.geometry import wrap
+from skills.robot import FloatArray, GripperCapabilities
 
 _ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M = 0.009, 0.006
 _LEAST_GRIP_M = 0.014
 _LEAST_BEYOND_M = 0.004
-
-
-@dataclass(frozen=True)
-class JawGeometry:
-    """The gripper in the hand frame, m: palm at palm_x, fingertips at tip_x, inner face of the fixed jaw at fixed_z.
-
-    The tips are 2 half_breadth wide along y and tip_thickness thick; `clearance` is left beside the fixed jaw,
-    `low_clearance` beside things that lie low, since a jaw that comes down on top of one is stopped by it.
-    """
-
-    palm_x: float = 0.142
-    tip_x: float = 0.250
-    fixed_z: float = -0.038
-    clearance: float = 0.010
-    low_clearance: float = 0.017
-    half_breadth: float = 0.030
-    tip_thickness: float = 0.015
-    max_width: float = 0.115
 
 
 @dataclass(frozen=True)
@@ -73,7 +56,7 @@ class GraspCandidate:
 
 
 @dataclass(frozen=True)
-class _Station:
+class _Placement:
     """A place to grasp along a thing: point (x, y), direction of the approach seen from above, local width, cost."""
 
     xy: FloatArray
@@ -83,15 +66,19 @@ class _Station:
     cost: float
 
 
-def grasp_candidates(target: Target, p_BS: FloatArray, jaw: JawGeometry | None = None) -> list[GraspCandidate]:
-    """Candidates, the best first; empty when the thing is too wide. p_BS is the shoulder."""
-    jaw = jaw or JawGeometry()
+def grasp_candidates(
+    target: Target, p_BS: FloatArray, gripper: GripperCapabilities, beside_m: tuple[float, float] = (0.010, 0.017)
+) -> list[GraspCandidate]:
+    """Candidates, the best first; empty when the thing is too wide. p_BS is the shoulder.
+
+    `beside_m` is left beside the fixed finger, about what stands and about what lies low.
+    """
     ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
-    stations = _round_stations(target, ahead) if target.round else list(_long_stations(target, ahead))
+    placements = _round_placements(target, ahead) if target.round else list(_long_placements(target, ahead))
     tried = [
-        _candidate(target, station, attitude, side, jaw)
-        for station, attitude, side in itertools.product(stations, _attitudes(target), (1.0, -1.0))
-        if station.width_m < jaw.max_width
+        _candidate(target, placement, attitude, side, gripper, beside_m[0 if target.upright else 1])
+        for placement, attitude, side in itertools.product(placements, _attitudes(target), (1.0, -1.0))
+        if placement.width_m < gripper.max_grasp_m
     ]
     found = [candidate for candidate in tried if candidate is not None]
     if not target.upright:
@@ -109,16 +96,16 @@ def _attitudes(target: Target) -> Sequence[tuple[float, float]]:
     return [(float(np.radians(tilt)), float(np.radians(lean))) for tilt, lean in (*down, *leaning)]
 
 
-def _round_stations(target: Target, ahead_rad: float) -> list[_Station]:
+def _round_placements(target: Target, ahead_rad: float) -> list[_Placement]:
     """A round thing can be approached from any side; from the shoulder's is best."""
     centre = np.array(target.centre_B)
     return [
-        _Station(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, 0.5 * abs(turn))
+        _Placement(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, 0.5 * abs(turn))
         for turn in (0.0, 0.3, -0.3, 0.6, -0.6, 0.9, -0.9)
     ]
 
 
-def _long_stations(target: Target, ahead_rad: float) -> Iterator[_Station]:
+def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
     """Places along a box's axes with the local width there; both axes for one that is nearly square."""
     square = target.length_m < 1.4 * target.width_m
     for turn in (0.0, 0.5 * np.pi) if square else (0.0,):
@@ -135,39 +122,43 @@ def _long_stations(target: Target, ahead_rad: float) -> Iterator[_Station]:
             xy = np.array(target.centre_B) + (0.0 if square else middle + shift) * along + 0.5 * (low + high) * across
             half_depth = 0.5 * (target.length_m if turn == 0.0 else target.width_m) if target.upright else 0.02
             for azimuth in (yaw, yaw + np.pi):
-                off = abs((azimuth - ahead_rad + np.pi) % (2 * np.pi) - np.pi)
-                yield _Station(xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 0.15 * off)
+                off = abs(wrap(azimuth - ahead_rad))
+                yield _Placement(xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 0.15 * off)
 
 
 def _candidate(
-    target: Target, station: _Station, attitude: tuple[float, float], side: float, jaw: JawGeometry
+    target: Target,
+    placement: _Placement,
+    attitude: tuple[float, float],
+    side: float,
+    gripper: GripperCapabilities,
+    beside_m: float,
 ) -> GraspCandidate | None:
     tilt, lean = attitude
-    c, s = np.cos(station.azimuth_rad), np.sin(station.azimuth_rad)
+    c, s = np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad)
     x_axis = np.array([np.cos(tilt) * c, np.cos(tilt) * s, -np.sin(tilt)])
     z_axis = side * np.array([-s, c, 0.0])
     upright_hand = RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
     R_BH = RotationMatrix(AngleAxis(lean, np.array([c, s, 0.0]))) @ upright_hand
     if target.upright:
         height = float(np.clip(0.56 * target.height_m, 0.05, 0.095))
-        depth = jaw.palm_x + station.half_depth_m + 0.008
-        cost = station.cost + 0.4 * abs(tilt - np.radians(10.0))
+        depth = gripper.palm_x_m + placement.half_depth_m + 0.008
+        cost = placement.cost + 0.4 * abs(tilt - np.radians(10.0))
     else:
         height = 0.5 * target.height_m
         down = -R_BH.matrix()[2, 0]
         least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
-        room = height - _tip_drop(R_BH, station.width_m, jaw)
+        room = height - _tip_drop(R_BH, placement.width_m, gripper, beside_m)
         above = _above_surface(target.height_m, room - least * down)
         beyond = (room - above) / down
         if beyond < least or height + beyond * down < _LEAST_GRIP_M:
             return None
-        depth = jaw.tip_x - beyond
-        cost = station.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
-    clearance = jaw.clearance if target.upright else jaw.low_clearance
-    p_HT = np.array([depth, 0.0, jaw.fixed_z + clearance + 0.5 * station.width_m])
-    p_BT = np.array([*station.xy, target.base_m + height])
+        depth = gripper.tip_x_m - beyond
+        cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
+    p_HT = np.array([depth, 0.0, gripper.fixed_z_m + beside_m + 0.5 * placement.width_m])
+    p_BT = np.array([*placement.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
-    return GraspCandidate(X_BH, station.width_m, float(cost), tilt)
+    return GraspCandidate(X_BH, placement.width_m, float(cost), tilt)
 
 
 def _above_surface(height_m: float, spare_m: float) -> float:
@@ -176,7 +167,7 @@ def _above_surface(height_m: float, spare_m: float) -> float:
     return float(np.clip(spare_m - 1e-6, _LEAST_ABOVE_SURFACE_M, usual))
 
 
-def _tip_drop(R_BH: RotationMatrix, width_m: float, jaw: JawGeometry) -> float:
+def _tip_drop(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities, beside_m: float) -> float:
     """How far below the middle of the fingertips their lowest corner lies, for a thing of some width between them."""
-    half = 0.5 * width_m + jaw.low_clearance + jaw.tip_thickness
-    return float(abs(R_BH.matrix()[2, 1]) * jaw.half_breadth + abs(R_BH.matrix()[2, 2]) * half)
+    half = 0.5 * width_m + beside_m + gripper.tip_thickness_m
+    return float(abs(R_BH.matrix()[2, 1]) * gripper.half_breadth_m + abs(R_BH.matrix()[2, 2]) * half)

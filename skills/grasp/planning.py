@@ -8,18 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
+from skills.api import PlanningError
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
-from skills.arm.motion import plan_joint_path, plan_line, time_path
-from skills.arm.routine import PlanningError
-from skills.grasp.candidates import GraspCandidate
-from skills.robot import ArmTrajectory, FloatArray
+from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
+from skills.stack import ArmPlanner
 
 PREGRASPS_M = (0.12, 0.07)
+"""How far before the grasp the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0))
 """Ways to lift, up and back towards the shoulder, the best first."""
-APPROACH_SPEED_RAD_S = 0.4
-_FINAL_PADDING_M = 0.003
 
 
 @dataclass(frozen=True)
@@ -41,49 +40,74 @@ class Surroundings:
     up_B: FloatArray
 
 
-def plan_grasp(
-    scene: ArmScene,
-    q_start_rad: FloatArray,
-    candidates: Sequence[GraspCandidate],
-    around: Surroundings,
-    rng: np.random.Generator,
-) -> GraspPlan:
-    """The best candidate that can be carried out. Raises PlanningError when there is none."""
-    reasons = []
-    for candidate in candidates:
-        try:
-            approach, lift_B = reach_candidate(scene, q_start_rad, candidate, around)
-            scene.set_boxes([*around.boxes, around.target])
-            scene.set_padding(0.01)
-            path = plan_joint_path(scene, q_start_rad, approach[0], rng)
-        except PlanningError as error:
-            reasons.append(str(error))
-            continue
-        to_pregrasp, to_grasp = time_path(path, scene=scene), time_path(approach, speed_rad_s=APPROACH_SPEED_RAD_S)
-        return GraspPlan(candidate, to_pregrasp, to_grasp, lift_B)
-    last = f": {max(set(reasons), key=reasons.count)}" if reasons else ""
-    raise PlanningError(f"none of {len(candidates)} grasps is within reach and free{last}")
+@dataclass(frozen=True)
+class GeometricGraspPlanner:
+    """Grasps from the object's outline, the first that the arm can reach, approach and lift.
 
+    The hand keeps `padding_m` from all around on its way and `final_padding_m` on the straight approach, on which no
+    joint is faster than `approach_rad_s`. Beside the fixed finger `beside_fixed_m` are left, `beside_fixed_low_m` about
+    objects that lie low, since a finger that comes down on top of one is stopped by it.
+    """
 
-def reach_candidate(
-    scene: ArmScene, q_near_rad: FloatArray, candidate: GraspCandidate, around: Surroundings
-) -> tuple[FloatArray, FloatArray]:
-    """The straight approach path from the pre-grasp, and the lift (frame B). Raises PlanningError."""
-    scene.set_boxes(around.boxes)
-    scene.set_padding(_FINAL_PADDING_M)
-    reason = "out of reach"
-    for distance in PREGRASPS_M:
-        solutions = scene.model.inverse(candidate.retreated(distance), margin_rad=0.06)
-        for q in sorted(solutions, key=lambda q: float(np.max(np.abs(q - q_near_rad)))):
-            if not scene.free(q):
-                reason = "the hand would touch something before the grasp"
-                continue
+    padding_m: float = 0.01
+    final_padding_m: float = 0.003
+    approach_rad_s: float = 0.4
+    beside_fixed_m: float = 0.010
+    beside_fixed_low_m: float = 0.017
+
+    def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
+        """Grasps, the best first; empty when the object is too wide. p_BS is the shoulder."""
+        return grasp_candidates(target, p_BS, gripper, (self.beside_fixed_m, self.beside_fixed_low_m))
+
+    def plan(
+        self,
+        scene: ArmScene,
+        q_start_rad: FloatArray,
+        candidates: Sequence[GraspCandidate],
+        around: Surroundings,
+        arm_planner: ArmPlanner,
+        rng: np.random.Generator,
+    ) -> GraspPlan:
+        """The best candidate that can be carried out. Raises PlanningError when there is none."""
+        reasons = []
+        for candidate in candidates:
             try:
-                approach = plan_line(scene.model, q, candidate.X_BH, scene)
-                return approach, _lift(scene, approach[-1], around.up_B)
+                approach, lift_B = self._reached(scene, q_start_rad, candidate, around, arm_planner)
+                scene.set_boxes([*around.boxes, around.target])
+                scene.set_padding(self.padding_m)
+                path = arm_planner.path(scene, q_start_rad, approach[0], rng)
             except PlanningError as error:
-                reason = str(error)
-    raise PlanningError(reason)
+                reasons.append(str(error))
+                continue
+            to_grasp = arm_planner.timed(approach, speed_rad_s=self.approach_rad_s)
+            return GraspPlan(candidate, arm_planner.timed(path, scene=scene), to_grasp, lift_B)
+        last = f": {max(set(reasons), key=reasons.count)}" if reasons else ""
+        raise PlanningError(f"none of {len(candidates)} grasps is within reach and free{last}")
+
+    def _reached(
+        self,
+        scene: ArmScene,
+        q_near_rad: FloatArray,
+        candidate: GraspCandidate,
+        around: Surroundings,
+        arm_planner: ArmPlanner,
+    ) -> tuple[FloatArray, FloatArray]:
+        """The straight approach path from the pre-grasp, and the lift (frame B). Raises PlanningError."""
+        scene.set_boxes(around.boxes)
+        scene.set_padding(self.final_padding_m)
+        reason = "out of reach"
+        for distance in PREGRASPS_M:
+            solutions = scene.model.inverse(candidate.retreated(distance), margin_rad=0.06)
+            for q in sorted(solutions, key=lambda q: float(np.max(np.abs(q - q_near_rad)))):
+                if not scene.free(q):
+                    reason = "the hand would touch something before the grasp"
+                    continue
+                try:
+                    approach = arm_planner.line(scene.model, q, candidate.X_BH, scene)
+                    return approach, _lift(scene, approach[-1], around.up_B, arm_planner)
+                except PlanningError as error:
+                    reason = str(error)
+        raise PlanningError(reason)
 
 
 def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:
@@ -102,12 +126,12 @@ def lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[Float
     return [up_m * up_B + back_m * back for up_m, back_m in LIFTS_M]
 
 
-def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray) -> FloatArray:
+def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray, arm_planner: ArmPlanner) -> FloatArray:
     """The first way to lift that the arm can follow. Raises PlanningError."""
     X_BH = scene.model.X_BH(q_rad)
     for lift_B in lifts(scene.model, X_BH, up_B):
         try:
-            plan_line(scene.model, q_rad, RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B))
+            arm_planner.line(scene.model, q_rad, RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B))
         except PlanningError:
             continue
         return lift_B

@@ -11,26 +11,22 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, LocalisationEstimate, ObjectObservation, Succeeded, Surface
-from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
+from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
-from skills.arm.poses import carry_configuration, close_stations, look_configuration, overview_stations
+from skills.arm.poses import carry_configuration, close_viewpoints, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
-from skills.detect.looking import cluster_box, cluster_boxes, surface_boxes
-from skills.detect.sighting import Sighting, sightings
-from skills.detect.surface_view import Cluster, SurfaceView, cluster_of, parted, view_surface
-from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
+from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, plan_grasp
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.posture import body_height_m
+from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
+from skills.perception.surface_segmentation import Cluster, SurfaceView, cluster_of, parted, view_surface
 from skills.robot import FloatArray, Image
 
-GRASP_FORCE_N = 80.0
 _LOOK_HALF_SIDE_M = 0.4
-_SAME_THING_M = 0.12
 _CLOSED_RAD = 0.06
-_SLIP_RAD = 0.12
-_PULL_BACK_M = 0.12
 _SURFACE_AROUND_M = 0.2
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
@@ -55,6 +51,20 @@ class CloseView:
     X_WB: RigidTransform
 
 
+@dataclass(frozen=True)
+class GraspOptions:
+    """How firmly is gripped (N), and when the object counts as lost.
+
+    The object is looked for within `same_object_m` of where it was seen. A gripper that opens or closes by `slip_rad`
+    while it lifts has lost it. After lifting the hand draws back by `pull_back_m`.
+    """
+
+    force_n: float = 80.0
+    same_object_m: float = 0.12
+    slip_rad: float = 0.12
+    pull_back_m: float = 0.12
+
+
 class Grasp(ArmSkill[GraspInputs]):
     """Ends with the thing held near the body; on failure the jaw is opened and the arm stowed.
 
@@ -63,6 +73,8 @@ class Grasp(ArmSkill[GraspInputs]):
 
     name = "grasp"
     Inputs = GraspInputs
+    Options: ClassVar[type] = GraspOptions
+    options: GraspOptions
     outputs: ClassVar[Mapping[str, type]] = {"tried": tuple[TriedGrasp, ...]}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the thing is not where it was seen, the jaw holds something already, or there is no arm",
@@ -129,13 +141,13 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _take_along(self, seen: ObjectObservation, at_thing: bool) -> Routine[None]:
         """Clamp, lift and draw back what the jaw has hold of, hold it near the body, and make sure that it is held."""
-        yield from self.move_gripper(0.0, GRASP_FORCE_N, f"closing on the {seen.thing}")
+        yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {seen.thing}")
         yield from self.pause(_FEEL_S, f"closing on the {seen.thing}")
         message, opening = f"carrying the {seen.thing}", self._check_held(str(seen.thing), None)
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         if at_thing:
             yield from self._lift_again(f"lifting the {seen.thing}")
-            yield from self.try_shift_hand(-_PULL_BACK_M * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
+            yield from self.try_shift_hand(-self.options.pull_back_m * R_BH.matrix()[:, 0] * [1.0, 1.0, 0.0], message)
         yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
         self._check_held(str(seen.thing), opening)
@@ -158,12 +170,12 @@ class Grasp(ArmSkill[GraspInputs]):
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
         surface = _square(seen.position_W, base_m, seen.surface or "surface")
         self.boxes = surface_boxes([_square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
-        X_HC = hand_camera_in_hand((yield from self.picture(message)))
+        X_HC = self.hand_camera.X_FC
         p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            stations = [*close_stations(self.model.p_BS, p_BT), *overview_stations(self.model, p_BT)]
-            return look_configuration(scene, X_HC, stations, p_BT, q)
+            viewpoints = [*close_viewpoints(self.model.p_BS, p_BT), *overview_viewpoints(self.model, p_BT)]
+            return look_configuration(scene, X_HC, viewpoints, p_BT, q)
 
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)
@@ -173,7 +185,8 @@ class Grasp(ArmSkill[GraspInputs]):
         def examine() -> CloseView | None:
             found = detections_in(detector, image)
             same_class = [each for each in found if each.class_name == seen.thing.name]
-            return _examine(image, X_WB, surface, seen, place, sightings(image, place, same_class, [surface]))
+            placed = detections_3d(image, place, same_class, [surface])
+            return _examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
 
         view = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message)
         if view is None:
@@ -183,19 +196,20 @@ class Grasp(ArmSkill[GraspInputs]):
     def _plan(self, view: CloseView, thing: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         self.boxes = view.boxes
         up_B = view.X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
-        candidates = grasp_candidates(view.target, self.model.p_BS)
+        candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
             raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the jaw")
         opening = 0.9 * self.open_rad
         yield from self.move_gripper(opening, JAW_FORCE_N, "opening the jaw")
 
-        scene_now, q = self.scene_now(), self.q_rad()
+        scene_now, q, stack = self.scene_now(), self.q_rad(), self.context.stack
 
         def plan() -> GraspPlan:
             scene = scene_now()
             scene.set_jaw(opening)
-            return plan_grasp(scene, q, candidates, Surroundings(view.boxes, view.target_box, up_B), self._rng)
+            around = Surroundings(view.boxes, view.target_box, up_B)
+            return stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng)
 
         return (
             yield from self.compute(plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}")
@@ -205,7 +219,7 @@ class Grasp(ArmSkill[GraspInputs]):
         """Reach, close, lift; raises SkillFailure with cause POSTCONDITION when it is not held then."""
         yield from self.follow(plan.to_pregrasp, f"reaching for the {thing}")
         yield from self.follow(plan.to_grasp, f"reaching for the {thing}")
-        yield from self.move_gripper(0.0, GRASP_FORCE_N, f"closing on the {thing}")
+        yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
         yield from self._lift(plan.lift_B, f"lifting the {thing}")
@@ -229,7 +243,7 @@ class Grasp(ArmSkill[GraspInputs]):
         gripper = self.context.robot.gripper()
         if gripper.opening_rad < _CLOSED_RAD or not gripper.holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the jaw closed on nothing where the {thing} was seen")
-        if opening_before_rad is not None and abs(gripper.opening_rad - opening_before_rad) > _SLIP_RAD:
+        if opening_before_rad is not None and abs(gripper.opening_rad - opening_before_rad) > self.options.slip_rad:
             raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the jaw while it was lifted")
         return gripper.opening_rad
 
@@ -241,7 +255,7 @@ class Grasp(ArmSkill[GraspInputs]):
         message = f"carrying the {thing}"
         ahead = grasp.X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
         try:
-            yield from self.shift_hand(-_PULL_BACK_M * ahead + 0.02 * self._up_B(), message)
+            yield from self.shift_hand(-self.options.pull_back_m * ahead + 0.02 * self._up_B(), message)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -296,13 +310,14 @@ def _examine(
     surface: Surface,
     seen: ObjectObservation,
     place: LocalisationEstimate,
-    found: tuple[Sighting, ...],
+    found: tuple[Detection3D, ...],
+    within_m: float,
 ) -> CloseView | None:
     view = view_surface(image, place.X_WO, surface, margin_m=0.0)
     if view is None:
         return None
     view = reduce(parted, found, view)
-    cluster = _same_thing(view, seen, found)
+    cluster = _same_thing(view, seen, found, within_m)
     if cluster is None:
         return None
     others = [each for each in view.clusters if each is not cluster]
@@ -323,7 +338,9 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
     return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), view.plane.height_m)
 
 
-def _same_thing(view: SurfaceView, seen: ObjectObservation, found: tuple[Sighting, ...]) -> Cluster | None:
+def _same_thing(
+    view: SurfaceView, seen: ObjectObservation, found: tuple[Detection3D, ...], within_m: float
+) -> Cluster | None:
     """The cluster that is the thing: detected as of its class and nearest, else nearest of all; None: all are far."""
     expected = np.array(seen.position_W[:2])
 
@@ -332,7 +349,7 @@ def _same_thing(view: SurfaceView, seen: ObjectObservation, found: tuple[Sightin
 
     classed = [cluster for each in found if (cluster := cluster_of(view.clusters, each)) is not None]
     for clusters in (classed, view.clusters):
-        near = [cluster for cluster in clusters if off(cluster) < _SAME_THING_M]
+        near = [cluster for cluster in clusters if off(cluster) < within_m]
         if near:
             return min(near, key=off)
     return None

@@ -4,28 +4,23 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.api import Cause, Running, Succeeded
+from skills.api import Cause, PlanningError, Running, Succeeded
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
-from skills.arm.routine import PlanningError, Routine, SkillFailure
-from skills.hand_over.people import SeenPerson, people_in_scan, person_in_world
+from skills.arm.routine import Routine, SkillFailure
+from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import Navigate, NavigateInputs
+from skills.perception.people import SeenPerson, people_in_scan
 from skills.robot import FloatArray, Pose2D
 
-STAND_OFF_M = 1.5
-STAND_OFF_RANGE_M = (1.25, 1.65)
-THING_FROM_AXIS_M = 0.55
-LEAST_FROM_AXIS_M = 0.45
-HEIGHT_M = 1.0
-_HAND_TO_THING_M = 0.18
 _FACING_RAD = 0.5
 _SCANS = 3
 _SCAN_PATIENCE_S = 2.0
@@ -39,11 +34,28 @@ class HandOverInputs:
     person: str
 
 
+@dataclass(frozen=True)
+class HandOverOptions:
+    """Where the robot stands and holds the object.
+
+    The robot stands `stand_off_m` from the person's axis, or stays within `stand_off_range_m`. The object is held out
+    at `height_m`, at the first of `gaps_m` from the person's axis that the arm can reach, `furthest_m` at most.
+    """
+
+    stand_off_m: float = 1.5
+    stand_off_range_m: tuple[float, float] = (1.25, 1.65)
+    height_m: float = 1.0
+    gaps_m: tuple[float, ...] = (0.55, 0.5, 0.45, 0.62, 0.7, 0.8)
+    furthest_m: float = 0.85
+
+
 class HandOver(ArmSkill[HandOverInputs]):
     """Finds the person by LiDAR, goes before them, stretches out the arm; the thing stays in the jaw."""
 
     name = "hand_over"
     Inputs = HandOverInputs
+    Options: ClassVar[type] = HandOverOptions
+    options: HandOverOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free way for the arm",
@@ -59,7 +71,7 @@ class HandOver(ArmSkill[HandOverInputs]):
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the jaw to hand over")
         person = yield from self._find(inputs.person)
-        if not _well_placed(person):
+        if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
             yield from self._go_before(person, inputs.person)
             person = yield from self._find(inputs.person)
         yield from self._hold_out(person, inputs.person)
@@ -73,16 +85,17 @@ class HandOver(ArmSkill[HandOverInputs]):
             scan = self.context.robot.scan()
             if scan is not None and scan.stamp_s > stamp_s:
                 stamp_s = scan.stamp_s
-                seen += people_in_scan(scan)[:1] if not seen else _same(people_in_scan(scan), seen[0])
+                people = people_in_scan(scan, self.X_WB(), self.context.robot.capabilities().footprint_m)
+                seen += people[:1] if not seen else _same(people, seen[0])
             yield Running(f"looking for {name}")
         if len(seen) < _SCANS:
             raise SkillFailure(Cause.PRECONDITION, f"nobody is seen near, so {name} cannot be handed anything")
-        return SeenPerson(float(np.median([p.x_m for p in seen])), float(np.median([p.y_m for p in seen])))
+        x, y = (float(np.median([p.place_W[axis] for p in seen])) for axis in (0, 1))
+        return replace(seen[-1], place_W=(x, y))
 
     def _go_before(self, person: SeenPerson, name: str) -> Routine[None]:
         """Drive to the nearest free pose that faces the person."""
-        point_W, here = person_in_world(person, self.X_WB()), self.context.pose()
-        poses = facing_poses(point_W, here)
+        poses = facing_poses(person.place_W, self.context.pose(), self.options.stand_off_m)
         footprint = Footprint.of(self.context.robot.capabilities())
         free = [pose for pose in poses if footprint_clear(self.context.costmap, footprint, pose)]
         for k, pose in enumerate(free[:3]):
@@ -97,12 +110,13 @@ class HandOver(ArmSkill[HandOverInputs]):
     def _hold_out(self, person: SeenPerson, name: str) -> Routine[None]:
         """Stretch the arm towards the person."""
         R_BH = self.model.X_BH(self.q_rad()).rotation()
-        axis = RigidTransform([person.x_m, person.y_m, 0.5 * _PERSON_SIZE_M[2] - self._height_m()])
+        p_BP = self._ahead(person)
+        axis = RigidTransform([*p_BP, 0.5 * _PERSON_SIZE_M[2] - self._height_m()])
         self.boxes = [Box(axis, _PERSON_SIZE_M)]
-        level_m = HEIGHT_M - self._height_m()
+        level_m = self.options.height_m - self._height_m()
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return hold_out_configuration(scene, R_BH, person, level_m, q)
+            return hold_out_configuration(scene, R_BH, p_BP, self.p_HT, level_m, self.options.gaps_m, q)
 
         yield from self.move_to(goal, f"holding the thing out to {name}", speed_rad_s=0.8)
 
@@ -110,53 +124,63 @@ class HandOver(ArmSkill[HandOverInputs]):
         """Raise SkillFailure with cause POSTCONDITION unless the thing is held out near the person."""
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the thing was lost while it was held out to {name}")
-        p_BT = self.model.X_BH(self.q_rad()) @ np.array([_HAND_TO_THING_M, 0.0, 0.0])
-        off = float(np.hypot(p_BT[0] - person.x_m, p_BT[1] - person.y_m))
-        if off > 0.85:
+        p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
+        off = float(np.linalg.norm(p_BT[:2] - self._ahead(person)))
+        if off > self.options.furthest_m:
             raise SkillFailure(Cause.POSTCONDITION, f"the thing is held {off:.2f} m from {name}, which is too far")
         return Succeeded(f"holding the thing out, {off:.2f} m from {name}")
+
+    def _ahead(self, person: SeenPerson) -> FloatArray:
+        """The person's axis (x, y) in the body frame."""
+        return np.asarray((self.X_WB().inverse() @ np.array([*person.place_W, 0.0]))[:2])
 
     def _height_m(self) -> float:
         return float(self.context.robot.odometry().X_OB.translation()[2])
 
 
-def facing_poses(point_W: tuple[float, float], here: Pose2D, count: int = 24) -> list[Pose2D]:
-    """Poses STAND_OFF_M from a point that face it, the ones that cost least to reach first."""
+def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float, count: int = 24) -> list[Pose2D]:
+    """Poses stand_off_m from a point that face it, the ones that cost least to reach first."""
     poses = []
     for k in range(count):
         yaw = math.atan2(point_W[1] - here.y_m, point_W[0] - here.x_m) + 2 * math.pi * k / count
-        x, y = point_W[0] - STAND_OFF_M * math.cos(yaw), point_W[1] - STAND_OFF_M * math.sin(yaw)
-        poses.append(Pose2D(x, y, (yaw + math.pi) % (2 * math.pi) - math.pi))
+        x, y = point_W[0] - stand_off_m * math.cos(yaw), point_W[1] - stand_off_m * math.sin(yaw)
+        poses.append(Pose2D(x, y, wrap(yaw)))
     return sorted(poses, key=lambda pose: math.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
 
 
 def hold_out_configuration(
-    scene: ArmScene, R_BH: RotationMatrix, person: SeenPerson, level_m: float, q_near_rad: FloatArray
+    scene: ArmScene,
+    R_BH: RotationMatrix,
+    p_BP: FloatArray,
+    p_HT: FloatArray,
+    level_m: float,
+    gaps_m: Sequence[float],
+    q_near_rad: FloatArray,
 ) -> FloatArray:
     """Arm angles with the thing before the person, as upright as it is held; level_m is its height in B.
 
-    Raises PlanningError when the arm cannot get there.
+    The person's axis is at p_BP (2,), the middle of the thing at p_HT. Raises PlanningError out of the arm's reach.
     """
-    direction = math.atan2(person.y_m, person.x_m)
+    direction = math.atan2(p_BP[1], p_BP[0])
     heading = np.array([math.cos(direction), math.sin(direction), 0.0])
     x_axis = R_BH.matrix()[:, 0]
     turn = RotationMatrix.MakeZRotation(direction - math.atan2(x_axis[1], x_axis[0]))
-    for gap, lower in itertools.product((THING_FROM_AXIS_M, 0.5, LEAST_FROM_AXIS_M, 0.62, 0.7, 0.8), (0.0, 0.1, 0.2)):
-        p_BT = (person.distance_m - gap) * heading + np.array([0.0, 0.0, level_m - lower])
+    for gap, lower in itertools.product(gaps_m, (0.0, 0.1, 0.2)):
+        p_BT = (float(np.linalg.norm(p_BP)) - gap) * heading + np.array([0.0, 0.0, level_m - lower])
         rotation = turn @ R_BH
-        X_BH = RigidTransform(rotation, p_BT - rotation.matrix() @ np.array([_HAND_TO_THING_M, 0.0, 0.0]))
+        X_BH = RigidTransform(rotation, p_BT - rotation.matrix() @ p_HT)
         free = [q for q in scene.model.inverse(X_BH, margin_rad=0.05) if scene.free(q)]
         if free:
             return min(free, key=lambda q: float(np.max(np.abs(q - q_near_rad))))
     raise PlanningError("the arm cannot hold the thing out near enough to the person from here")
 
 
-def _well_placed(person: SeenPerson) -> bool:
-    near = STAND_OFF_RANGE_M[0] <= person.distance_m <= STAND_OFF_RANGE_M[1]
-    return near and abs(math.atan2(person.y_m, person.x_m)) < _FACING_RAD
+def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:
+    near = range_m[0] <= float(np.linalg.norm(p_BP)) <= range_m[1]
+    return near and abs(math.atan2(p_BP[1], p_BP[0])) < _FACING_RAD
 
 
 def _same(people: list[SeenPerson], other: SeenPerson) -> list[SeenPerson]:
     """The person among some who stands where another was seen, if there is one."""
-    near = [p for p in people if math.hypot(p.x_m - other.x_m, p.y_m - other.y_m) < 0.25]
+    near = [p for p in people if math.dist(p.place_W, other.place_W) < 0.25]
     return near[:1]

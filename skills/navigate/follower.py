@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from skills.api import Costmap
-from skills.estimate.planar import wrap
+from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m
 from skills.navigate.path import TURN_M_PER_RAD, Path
 from skills.robot import FloatArray, Pose2D
@@ -16,8 +16,9 @@ from skills.robot import FloatArray, Pose2D
 
 @dataclass(frozen=True)
 class FollowerOptions:
-    """Numbers of the follower: speeds (m/s, rad/s), accelerations (m/s^2, rad/s^2), gain (1/s).
+    """Follows a path with brakes for obstacles: speeds (m/s, rad/s), accelerations (m/s^2, rad/s^2), gain (1/s).
 
+    A mission may ask for less than `max_speed_m_s`, and not for more.
     `lead_s` looks ahead for the base's lag; closer than `touch_m` counts as in the way, looked for `look_m` ahead;
     between `near_m` and `wide_m` of clearance the speed falls from full to near_speed_m_s.
     """
@@ -39,6 +40,10 @@ class FollowerOptions:
     creep_m_s: float = 0.04
     lost_path_m: float = 0.35
     period_s: float = 0.05
+
+    def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> PathFollower:
+        """A follower of one path, at most so fast."""
+        return PathFollower(path, footprint, replace(self, max_speed_m_s=min(self.max_speed_m_s, max_speed_m_s)))
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,7 @@ class PathFollower:
         """Move the index to the nearest pose of the path a little behind or ahead; returns the distance to it (m)."""
         first, last = max(0, self._index - 3), min(len(self._progress), self._index + 25)
         delta = self._path.poses[first:last] - here
-        turns = (delta[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+        turns = wrap(delta[:, 2])
         off = np.sqrt(delta[:, 0] ** 2 + delta[:, 1] ** 2 + (TURN_M_PER_RAD * turns) ** 2)
         best = int(np.argmin(off))
         self._index = first + best

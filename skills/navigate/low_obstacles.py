@@ -14,13 +14,12 @@ from skills.robot import FloatArray, Image
 
 @dataclass(frozen=True)
 class WatchOptions:
-    """Cameras asked in turn, one picture each `period_s`, which arrives after `latency_s`.
+    """The cameras that look ahead are asked in turn, one picture each `period_s`, which arrives after `latency_s`.
 
     Of each row about `columns` pixels are used. Kept are points between the heights above the floor and within
     `reach_m` of the camera.
     """
 
-    sources: tuple[str, ...] = ("frontleft", "frontright")
     period_s: float = 0.35
     latency_s: float = 0.1
     columns: int = 110
@@ -34,8 +33,8 @@ class LowObstacleWatch:
     def __init__(self, context: SkillContext, options: WatchOptions | None = None) -> None:
         self._context = context
         self._options = options or WatchOptions()
-        known = context.robot.capabilities().camera_sources
-        self._sources = tuple(source for source in self._options.sources if source in known)
+        cameras = context.robot.capabilities().body_cameras
+        self._sources = tuple(camera.source for camera in cameras if camera.looks_towards(0.0))
         self._turn = 0
         self._next_s = -math.inf
         self._job: Job[tuple[FloatArray, float]] | None = None

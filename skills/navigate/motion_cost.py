@@ -3,50 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
-from skills.navigate.footprint import SAFE_MARGIN_M, clearance_at
+from skills.navigate.footprint import clearance_at
 from skills.robot import FloatArray
 
 Weights = tuple[float, float, float, float, float, float]
-
-
-@dataclass(frozen=True)
-class PlannerOptions:
-    """Numbers of the planner.
-
-    Speeds (m/s, rad/s) say how dear each way of moving is. Poses keep `margin_m`; nearer than `soft_m` to an obstacle
-    the cost grows up to (1 + soft_weight) fold. A start that is blocked by noise may be left through poses that are no
-    worse, within `escape_m`.
-    """
-
-    forward_m_s: float = 0.8
-    backward_m_s: float = 0.25
-    lateral_m_s: float = 0.25
-    turn_rad_s: float = 0.9
-    margin_m: float = SAFE_MARGIN_M
-    soft_m: float = 0.35
-    soft_weight: float = 3.0
-    escape_m: float = 0.6
-    deepest_start_m: float = 0.2
-    cell_m: float = 0.1
-    headings: int = 16
-    greed: float = 1.3
-
-    def weights(self) -> Weights:
-        """The numbers that a motion's cost depends on, for the compiled loops."""
-        return (
-            self.forward_m_s,
-            self.backward_m_s,
-            self.lateral_m_s,
-            self.turn_rad_s,
-            self.soft_m,
-            self.soft_weight,
-        )
+"""Speeds ahead, back, sideways (m/s) and turning (rad/s), then `soft_m` and `soft_weight` of the planner."""
 
 
 @compiled

@@ -10,7 +10,7 @@ import numpy as np
 
 from skills.api import Costmap, LocalisationEstimate
 from skills.navigate.footprint import Footprint, disc_centres, pose_array
-from skills.navigate.people_watch import SeenPerson
+from skills.perception.people import SeenPerson
 from skills.robot import FloatArray, Pose2D, Robot
 
 __all__ = ["Pace", "PaceKeeper", "SpaceOptions", "WithPeople", "outline_distance_m", "spaced"]

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import NO_WORK_COUNTER, Costmap, WorkCounter
-from skills.estimate.planar import wrap
-from skills.navigate.footprint import Footprint, clearance_at
+from skills.api import NO_WORK_COUNTER, Costmap, PlanningError, WorkCounter
+from skills.geometry import wrap
+from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, clearance_at
 from skills.navigate.lattice import Lattice, Needs, Space, cost_to_go, lattice_moves, search
-from skills.navigate.motion_cost import PlannerOptions, segment_cost
+from skills.navigate.motion_cost import Weights, segment_cost
 from skills.navigate.path import Path
 from skills.navigate.smoothing import clearances, densify, relax, shortcut
 from skills.robot import FloatArray, Pose2D
@@ -21,12 +22,57 @@ from skills.robot import FloatArray, Pose2D
 FIELD_CELL_M = 0.05
 
 
-class PlanningError(RuntimeError):
-    """No way was found; the text is one sentence that says why."""
-
-
 class NoWayError(PlanningError):
     """Start and goal are free, but nothing that the robot fits through joins them."""
+
+
+@dataclass(frozen=True)
+class LatticePlanner:
+    """A lattice over place and heading, searched for the whole footprint, then smoothed.
+
+    Speeds (m/s, rad/s) say how dear each way of moving is. Poses keep `margin_m`; nearer than `soft_m` to an obstacle
+    the cost grows up to (1 + soft_weight) fold. A start that is blocked by noise may be left through poses that are no
+    worse, within `escape_m`. The search covers the box about start and goal, `around_m` wider to all sides.
+    """
+
+    forward_m_s: float = 0.8
+    backward_m_s: float = 0.25
+    lateral_m_s: float = 0.25
+    turn_rad_s: float = 0.9
+    margin_m: float = SAFE_MARGIN_M
+    soft_m: float = 0.35
+    soft_weight: float = 3.0
+    escape_m: float = 0.6
+    deepest_start_m: float = 0.2
+    cell_m: float = 0.1
+    headings: int = 16
+    greed: float = 1.3
+    around_m: float = 8.0
+
+    def weights(self) -> Weights:
+        """The numbers that a motion's cost depends on, for the compiled loops."""
+        return (
+            self.forward_m_s,
+            self.backward_m_s,
+            self.lateral_m_s,
+            self.turn_rad_s,
+            self.soft_m,
+            self.soft_weight,
+        )
+
+    def problem(
+        self,
+        costmap: Costmap,
+        footprint: Footprint,
+        start: Pose2D,
+        goal: Pose2D,
+        *,
+        max_speed_m_s: float,
+        work: WorkCounter = NO_WORK_COUNTER,
+    ) -> Callable[[], Path]:
+        """Sample the costmap now; the call that comes back plans on that sample, and raises PlanningError."""
+        options = replace(self, forward_m_s=min(self.forward_m_s, max_speed_m_s))
+        return partial(solve, problem_of(costmap, footprint, start, goal, options, self.around_m, work))
 
 
 @dataclass(frozen=True)
@@ -37,18 +83,18 @@ class Problem:
     footprint: Footprint
     start: Pose2D
     goal: Pose2D
-    options: PlannerOptions
+    options: LatticePlanner
     work: WorkCounter = NO_WORK_COUNTER
 
 
 def plan_path(
-    costmap: Costmap, footprint: Footprint, start: Pose2D, goal: Pose2D, options: PlannerOptions | None = None
+    costmap: Costmap, footprint: Footprint, start: Pose2D, goal: Pose2D, options: LatticePlanner | None = None
 ) -> Path:
     """The cheapest way from start to goal that the footprint can go. Raises PlanningError.
 
     The path begins and ends exactly at start and goal. A start that is a little in collision may be left.
     """
-    used = options or PlannerOptions()
+    used = options or LatticePlanner()
     try:
         return solve(problem_of(costmap, footprint, start, goal, used))
     except NoWayError:
@@ -60,7 +106,7 @@ def problem_of(
     footprint: Footprint,
     start: Pose2D,
     goal: Pose2D,
-    options: PlannerOptions,
+    options: LatticePlanner,
     margin_m: float = 3.0,
     work: WorkCounter = NO_WORK_COUNTER,
 ) -> Problem:

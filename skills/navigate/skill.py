@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import ClassVar
 
-from skills.api import Cause, Costmap, Failed, Job, Running, Skill, SkillContext, Step, Succeeded
-from skills.estimate.planar import relative
+from skills.api import Cause, Costmap, Failed, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
+from skills.geometry import relative
 from skills.navigate.base import Base
-from skills.navigate.follower import FollowerOptions, PathFollower
 from skills.navigate.footprint import Footprint
-from skills.navigate.low_obstacles import LowObstacleWatch
-from skills.navigate.motion_cost import PlannerOptions
+from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceKeeper, SpaceOptions, spaced
-from skills.navigate.people_watch import PeopleWatch
-from skills.navigate.planner import PlanningError, problem_of, solve
+from skills.perception.people_watch import PeopleOptions, PeopleWatch
 from skills.robot import Pose2D
+from skills.stack import LocalController
 
 _STILL_THERE_M = 1.0
 
@@ -52,6 +50,8 @@ class NavigateOptions:
     still_rad_s: float = 0.05
     after_person_s: float = 14.0
     person_patience_s: float = 45.0
+    low_obstacles: WatchOptions = field(default_factory=WatchOptions)
+    people: PeopleOptions = field(default_factory=PeopleOptions)
     space: SpaceOptions = field(default_factory=SpaceOptions)
 
 
@@ -60,6 +60,7 @@ class Navigate(Skill[NavigateInputs]):
 
     name: ClassVar[str] = "navigate"
     Inputs: ClassVar[type] = NavigateInputs
+    Options: ClassVar[type] = NavigateOptions
     outputs: ClassVar[Mapping[str, type]] = {}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "The robot does not know where it is, or refuses to drive from the start on.",
@@ -68,11 +69,11 @@ class Navigate(Skill[NavigateInputs]):
         Cause.POSTCONDITION: "It stands still, but not where it should.",
     }
     default_timeout_s: ClassVar[float] = 180.0
+    options: NavigateOptions
     max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
 
     def __init__(self, context: SkillContext, options: NavigateOptions | None = None) -> None:
-        super().__init__(context)
-        self._options = options or NavigateOptions()
+        super().__init__(context, options)
         self._base = Base(context)
 
     def begin(self, inputs: NavigateInputs) -> None:
@@ -81,13 +82,13 @@ class Navigate(Skill[NavigateInputs]):
         self._base = Base(self.context)
         self._inputs = inputs
         self._footprint = Footprint.of(self.context.robot.capabilities())
-        self._watch = LowObstacleWatch(self.context)
-        self._people = PeopleWatch(self.context)
-        self._pace = PaceKeeper(self._footprint, self._options.space)
-        self._room_m = self._options.space.room_m
+        self._watch = LowObstacleWatch(self.context, self.options.low_obstacles)
+        self._people = PeopleWatch(self.context, self.options.people)
+        self._pace = PaceKeeper(self._footprint, self.options.space)
+        self._room_m = self.options.space.room_m
         self._person_s = self._person_since_s = -math.inf
         self._phase: Callable[[], Step] = self._localising
-        self._follower: PathFollower | None = None
+        self._follower: LocalController | None = None
         self._job: Job[Path] | None = None
         self._replans = 0
         self._whole_m: float | None = None
@@ -127,7 +128,7 @@ class Navigate(Skill[NavigateInputs]):
             self._lost_since_s = None
             return False
         self._lost_since_s = self._now() if self._lost_since_s is None else self._lost_since_s
-        return self._now() - self._lost_since_s > self._options.localising_patience_s
+        return self._now() - self._lost_since_s > self.options.localising_patience_s
 
     def _localising(self) -> Step:
         """Wait for the first agreement of a scan with the map."""
@@ -141,14 +142,13 @@ class Navigate(Skill[NavigateInputs]):
     def _ask_for_plan(self, start: Pose2D | None = None) -> None:
         """Sample the costmap now and plan in the Worker, from a pose or from here."""
         if not self._people.people():
-            self._room_m = self._options.space.room_m
+            self._room_m = self.options.space.room_m
         speed = max(0.1, self._inputs.max_speed_m_s)
-        options = PlannerOptions(forward_m_s=speed)
         begin, goal = start or self.context.pose(), self._inputs.goal
-        problem = problem_of(self._costmap(begin), self._footprint, begin, goal, options, 8.0, self.context.work)
-        self._job = self.context.worker.submit(
-            lambda: solve(problem), latency_s=self._options.planning_latency_s, name="plan a way"
+        plan = self.context.stack.planner.problem(
+            self._costmap(begin), self._footprint, begin, goal, max_speed_m_s=speed, work=self.context.work
         )
+        self._job = self.context.worker.submit(plan, latency_s=self.options.planning_latency_s, name="plan a path")
 
     def _costmap(self, here: Pose2D) -> Costmap:
         """What is in the way, with room about people as far as `here` and the goal leave it."""
@@ -178,8 +178,8 @@ class Navigate(Skill[NavigateInputs]):
             path = job.result()
         except PlanningError as error:
             return self._plan_failed(str(error))
-        options = replace(FollowerOptions(), max_speed_m_s=self._inputs.max_speed_m_s)
-        self._follower = PathFollower(path, self._footprint, options)
+        controller, speed = self.context.stack.controller, self._inputs.max_speed_m_s
+        self._follower = controller.build(path, self._footprint, max_speed_m_s=speed)
         self._whole_m = self._whole_m or max(self._follower.length_m, 1e-3)
         self._blocked_since_s = self._obstacle = None
         self._best_m, self._best_s = math.inf, self._now()
@@ -191,15 +191,15 @@ class Navigate(Skill[NavigateInputs]):
     def _plan_failed(self, why: str) -> Step | None:
         """Go nearer to people, or wait and try again when something seen may go away; give up at the bound."""
         self._base.stop()
-        if self._people.people() and self._room_m > self._options.space.least_room_m:
-            self._room_m = self._options.space.least_room_m
+        if self._people.people() and self._room_m > self.options.space.least_room_m:
+            self._room_m = self.options.space.least_room_m
             self._phase = self._planning
             return None
         self._replans += not self._people_may_go()
-        if self._obstacle is None or self._replans >= self._options.replans:
+        if self._obstacle is None or self._replans >= self.options.replans:
             seen = f" The way is blocked by something seen at {_xy(self._obstacle)}." if self._obstacle else ""
             return Failed(Cause.PLANNING, why + seen)
-        self._wait_until_s = self._now() + self._options.replan_pause_s
+        self._wait_until_s = self._now() + self.options.replan_pause_s
         self._phase = self._planning
         return None
 
@@ -208,9 +208,9 @@ class Navigate(Skill[NavigateInputs]):
         now_s = self._now()
         if self._people.people():
             gap_s, self._person_s = now_s - self._person_s, now_s
-            self._person_since_s = now_s if gap_s > self._options.after_person_s else self._person_since_s
-        recently = now_s - self._person_s < self._options.after_person_s
-        return recently and now_s - self._person_since_s < self._options.person_patience_s
+            self._person_since_s = now_s if gap_s > self.options.after_person_s else self._person_since_s
+        recently = now_s - self._person_s < self.options.after_person_s
+        return recently and now_s - self._person_since_s < self.options.person_patience_s
 
     def _waiting_sentence(self) -> str:
         place = _xy(self._obstacle) if self._obstacle else "ahead"
@@ -233,7 +233,7 @@ class Navigate(Skill[NavigateInputs]):
         if pace.waiting and pace.person is not None:
             return self._wait_for_person(pace, pace.person.place_W)
         if self._arrived(pose, 0.4):
-            self._wait_until_s = self._now() + self._options.settle_s
+            self._wait_until_s = self._now() + self.options.settle_s
             self._phase = self._settling
             return Running("stopping at the goal", 1.0)
         self._note_block(answer.blocked_at)
@@ -242,9 +242,9 @@ class Navigate(Skill[NavigateInputs]):
             return self._replan(trouble)
         return self._progress(answer.remaining_m)
 
-    def _paced(self, follower: PathFollower, pose: Pose2D) -> Pace:
+    def _paced(self, follower: LocalController, pose: Pose2D) -> Pace:
         """How fast people near the way let the robot go."""
-        ahead = follower.ahead(self._options.space.look_ahead_m)
+        ahead = follower.ahead(self.options.space.look_ahead_m)
         people, most_m_s = self._people.people(), self._inputs.max_speed_m_s
         return self._pace.pace(self._now(), pose, ahead, people, most_m_s, self._inputs.goal)
 
@@ -271,20 +271,20 @@ class Navigate(Skill[NavigateInputs]):
         now = self._now()
         if remaining_m < self._best_m - 0.03:
             self._best_m, self._best_s = remaining_m, now
-        if self._blocked_since_s is not None and now - self._blocked_since_s > self._options.blocked_patience_s:
+        if self._blocked_since_s is not None and now - self._blocked_since_s > self.options.blocked_patience_s:
             return f"The way is blocked by something seen at {_xy(self._obstacle)}."
-        if off_path_m > FollowerOptions().lost_path_m:
+        if off_path_m > self.context.stack.controller.lost_path_m:
             return f"The robot is {off_path_m:.2f} m off its path."
-        if now - self._best_s > self._options.stuck_s:
+        if now - self._best_s > self.options.stuck_s:
             return "The robot does not get on."
         return None
 
     def _replan(self, why: str) -> Step:
         """Plan anew from here; fail when that was done too often."""
         self._replans += 1
-        if self._replans > self._options.replans:
+        if self._replans > self.options.replans:
             self._base.stop()
-            return Failed(Cause.EXECUTION, f"{why} Planning anew {self._options.replans} times did not help.")
+            return Failed(Cause.EXECUTION, f"{why} Planning anew {self.options.replans} times did not help.")
         self._best_m, self._best_s = math.inf, self._now()
         self._blocked_since_s = None
         self._ask_for_plan(self._pose_then())
@@ -295,7 +295,7 @@ class Navigate(Skill[NavigateInputs]):
         if self._follower is None:
             return None
         vx, vy, _ = self.context.robot.odometry().velocity
-        then = self._follower.pose_after(math.hypot(vx, vy) * self._options.planning_latency_s)
+        then = self._follower.pose_after(math.hypot(vx, vy) * self.options.planning_latency_s)
         off = relative(self.context.pose(), then)
         return then if math.hypot(off.x_m, off.y_m) < 0.35 and abs(off.yaw_rad) < 0.3 else None
 
@@ -309,7 +309,7 @@ class Navigate(Skill[NavigateInputs]):
         """Come to rest, then look whether the robot really is there."""
         self._base.drive((0.0, 0.0, 0.0))
         vx, vy, wz = self.context.robot.odometry().velocity
-        still = math.hypot(vx, vy) < self._options.still_m_s and abs(wz) < self._options.still_rad_s
+        still = math.hypot(vx, vy) < self.options.still_m_s and abs(wz) < self.options.still_rad_s
         if not still and self._now() < self._wait_until_s:
             return Running("stopping at the goal", 1.0)
         self._base.stop()

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from skills.api import Surface
-from skills.detect.points import inside_polygon
-from skills.detect.surface_view import SurfaceView
+from skills.geometry import inside_polygon
+from skills.perception.surface_segmentation import SurfaceView
 from skills.robot import FloatArray
 
 CLEARANCE_M = 0.12

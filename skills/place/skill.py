@@ -10,29 +10,28 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.api import Cause, Succeeded, Surface
+from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import COMFORTABLE_M, free_places
-from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill, hand_camera_in_hand
+from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene
-from skills.arm.motion import plan_line, time_path
-from skills.arm.poses import look_configuration, overview_stations
-from skills.arm.routine import PlanningError, Routine, SkillFailure
-from skills.detect.looking import cluster_boxes, surface_boxes
-from skills.detect.surface_view import SurfaceView, view_surface
+from skills.arm.poses import look_configuration, overview_viewpoints
+from skills.arm.routine import Routine, SkillFailure
+from skills.detect.viewpoints import cluster_boxes, surface_boxes
+from skills.geometry import wrap
 from skills.navigate.skill import Navigate, NavigateInputs
+from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import free_spots, spots
-from skills.robot import FloatArray, Pose2D
+from skills.robot import FloatArray, GripperCapabilities, Pose2D
+from skills.stack import ArmPlanner
 
-HAND_TO_THING_M = 0.185
 ABOVE_M = 0.22
 _SURELY_FREE_M = 0.135
 _LOWEST_M = 0.02
-_STEP_M = 0.008
-_CONTACT_M = 0.005
 _RELAX_M = 0.003
-_SEEN_AGAIN_M = 0.12
 _FEEL_S = 0.4
 _OVER_SPOT_M = 0.45
+_TIPS_BEYOND_M = 0.03
+"""The fingertips reach so far below the middle of what is held from above."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +41,25 @@ class PlaceInputs:
     surface: Surface
 
 
+@dataclass(frozen=True)
+class PlaceOptions:
+    """How an object is put down.
+
+    It is lowered in steps of `step_m` until the arm lags by `contact_m`. It must be seen again within `seen_again_m`.
+    """
+
+    step_m: float = 0.008
+    contact_m: float = 0.005
+    seen_again_m: float = 0.12
+
+
 class Place(ArmSkill[PlaceInputs]):
     """Goes nearer when no spot is within reach. Ends with the jaw empty and the arm stowed."""
 
     name = "place"
     Inputs = PlaceInputs
+    Options: ClassVar[type] = PlaceOptions
+    options: PlaceOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held",
         Cause.PLANNING: "no free spot is seen within reach, or the arm finds no way to it",
@@ -109,7 +122,7 @@ class Place(ArmSkill[PlaceInputs]):
         spot = _nearest_spot(surface, self.X_WB())
         pose = self.context.pose()
         offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
-        bearing = (math.atan2(offset[1], offset[0]) - pose.yaw_rad + math.pi) % (2 * math.pi) - math.pi
+        bearing = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
         if np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6:
             return
         context = self.context
@@ -123,12 +136,12 @@ class Place(ArmSkill[PlaceInputs]):
         message = f"looking for a free spot on the {surface.name}"
         X_WB = self.X_WB()
         self.boxes = surface_boxes([surface], X_WB)
-        X_HC = hand_camera_in_hand((yield from self.picture(message)))
+        X_HC = self.hand_camera.X_FC
         p_BT = X_WB.inverse() @ np.array([spot_W[0], spot_W[1], surface.height_m])
         low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return look_configuration(scene, X_HC, overview_stations(self.model, low_BT), low_BT, q)
+            return look_configuration(scene, X_HC, overview_viewpoints(self.model, low_BT), low_BT, q)
 
         yield from self.move_to(goal, message, speed_rad_s=0.9)
         yield from self.clear_view(message)
@@ -150,7 +163,7 @@ class Place(ArmSkill[PlaceInputs]):
         X_BW = X_WB.inverse()
         tops = [X_BW @ np.array([x, y, view.plane.height_m + ABOVE_M]) for x, y in _by_distance(free, X_WB)]
         self.boxes = [*surface_boxes([surface], X_WB), *cluster_boxes(view.clusters, X_WB)]
-        goal = above_goal(tops, carried)
+        goal = above_goal(tops, carried, self.gripper, self.context.stack.arm_planner)
         return (yield from self.move_to(goal, f"bringing the thing over the {surface.name}", speed_rad_s=0.8))
 
     def _lower(self, surface: Surface, q_above_rad: FloatArray) -> Routine[None]:
@@ -167,15 +180,16 @@ class Place(ArmSkill[PlaceInputs]):
         X_BH = self.model.X_BH(q_wanted)
         rest_m = float(X_BH.translation()[2]) - self._hand_z()
         lowest_m = surface.height_m + _LOWEST_M - float(self.X_WB().translation()[2])
+        planner = self.context.stack.arm_planner
         while self._below_hand_m() > lowest_m:
-            X_BH = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, _STEP_M])
+            X_BH = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, self.options.step_m])
             try:
-                path = plan_line(self.model, q_wanted, X_BH)
+                path = planner.line(self.model, q_wanted, X_BH)
             except PlanningError as error:
                 raise SkillFailure(Cause.PLANNING, str(error)) from error
             q_wanted = path[-1]
-            yield from self.follow(time_path(path, speed_rad_s=0.3), message)
-            if self._hand_z() - float(X_BH.translation()[2]) + rest_m > _CONTACT_M:
+            yield from self.follow(planner.timed(path, speed_rad_s=0.3), message)
+            if self._hand_z() - float(X_BH.translation()[2]) + rest_m > self.options.contact_m:
                 yield from self.try_shift_hand(np.array([0.0, 0.0, _RELAX_M]), message)
                 return
 
@@ -198,7 +212,7 @@ class Place(ArmSkill[PlaceInputs]):
         self.boxes = surface_boxes([surface], self.X_WB())
         view = yield from self._look(surface, spot_W)
         off = [float(np.min(np.linalg.norm(c.points.p_W[:, :2] - spot_W, axis=1))) for c in view.clusters]
-        if not off or min(off) > _SEEN_AGAIN_M:
+        if not off or min(off) > self.options.seen_again_m:
             yield from self.try_stow()
             raise SkillFailure(
                 Cause.POSTCONDITION, f"the thing is not seen on the {surface.name} where it was put down"
@@ -209,39 +223,42 @@ class Place(ArmSkill[PlaceInputs]):
 
     def _below_hand_m(self) -> float:
         """Height in B of the thing's middle as it is held."""
-        return float((self.model.X_BH(self.q_rad()) @ np.array([HAND_TO_THING_M, 0.0, 0.0]))[2])
+        return float((self.model.X_BH(self.q_rad()) @ self.p_HT)[2])
 
     def _below_hand_W(self) -> FloatArray:
-        p_BT = self.model.X_BH(self.q_rad()) @ np.array([HAND_TO_THING_M, 0.0, 0.0])
+        p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
         return np.asarray((self.X_WB() @ p_BT)[:2])
 
 
-def above_goal(tops_B: list[FloatArray], carried: RotationMatrix) -> Callable[[ArmScene, FloatArray], FloatArray]:
+def above_goal(
+    tops_B: list[FloatArray], carried: RotationMatrix, gripper: GripperCapabilities, planner: ArmPlanner
+) -> Callable[[ArmScene, FloatArray], FloatArray]:
     """A goal with the thing above the first of some points that the arm can reach, tilted as fits how it is held.
 
     A thing taken from the side (jaw closing level) keeps its tilt; one taken from above is held below the hand again.
     """
     side = abs(carried.matrix()[2, 2]) < 0.5
+    ahead_m = gripper.grip_x_m if side else gripper.tip_x_m - _TIPS_BEYOND_M
 
     def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
         """Arm angles above the first spot that can be reached and gone down to. Raises PlanningError."""
         for p_BT in tops_B:
             azimuth = math.atan2(p_BT[1] - scene.model.p_BS[1], p_BT[0] - scene.model.p_BS[0])
             for rotation in _side(carried, azimuth) if side else _from_above(azimuth):
-                offset = rotation.matrix() @ np.array([HAND_TO_THING_M if side else 0.22, 0.0, 0.0])
+                offset = rotation.matrix() @ np.array([ahead_m, 0.0, 0.0])
                 for q_above in scene.model.inverse(RigidTransform(rotation, p_BT - offset), margin_rad=0.05):
-                    if scene.free(q_above) and _can_lower(scene, q_above):
+                    if scene.free(q_above) and _can_lower(scene, q_above, planner):
                         return q_above
         raise PlanningError("no free spot is within the arm's reach")
 
     return goal
 
 
-def _can_lower(scene: ArmScene, q_rad: FloatArray) -> bool:
+def _can_lower(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner) -> bool:
     X_BH = scene.model.X_BH(q_rad)
     lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M - 0.03])
     try:
-        plan_line(scene.model, q_rad, lowered)
+        planner.line(scene.model, q_rad, lowered)
     except PlanningError:
         return False
     return True

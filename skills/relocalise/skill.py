@@ -12,10 +12,6 @@ from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.navigate.base import Base
 from skills.robot import Scan
 
-SEARCH_LATENCY_S = 1.0
-_TURN_RAD_S = 0.4
-_TURN_RAD = math.pi / 4
-_AGREE_S = 1.0
 _SCAN_PATIENCE_S = 2.0
 
 
@@ -26,11 +22,23 @@ class RelocaliseInputs:
     turns: int = 8
 
 
+@dataclass(frozen=True)
+class RelocaliseOptions:
+    """How long a search takes (s), how fast and how far the robot turns between searches."""
+
+    search_latency_s: float = 1.0
+    turn_rad_s: float = 0.4
+    turn_rad: float = math.pi / 4
+    agree_s: float = 1.0
+
+
 class Relocalise(RoutineSkill[RelocaliseInputs]):
     """A place counts as found once new scans have agreed with it for a second."""
 
     name: ClassVar[str] = "relocalise"
     Inputs: ClassVar[type] = RelocaliseInputs
+    Options: ClassVar[type] = RelocaliseOptions
+    options: RelocaliseOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "there are no new scans, or this robot's localiser cannot search",
         Cause.EXECUTION: "the robot refuses to turn",
@@ -72,7 +80,7 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         belief = localiser.estimate()
         found: LocalisationEstimate | None = yield from self.compute(
             lambda: localiser.search(scan, belief, None),
-            latency_s=SEARCH_LATENCY_S,
+            latency_s=self.options.search_latency_s,
             name="search the map",
             message=message,
         )
@@ -86,9 +94,9 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         context = self.context
         begun_s = context.clock.now()
         while (estimate := localiser.estimate()).localised:
-            if estimate.stamp_s >= begun_s + _AGREE_S:
+            if estimate.stamp_s >= begun_s + self.options.agree_s:
                 return True
-            if context.clock.now() > begun_s + _AGREE_S + _SCAN_PATIENCE_S:
+            if context.clock.now() > begun_s + self.options.agree_s + _SCAN_PATIENCE_S:
                 raise SkillFailure(Cause.PRECONDITION, "there are no new scans to find the place by")
             yield Running("seeing whether scans agree")
         return False
@@ -106,9 +114,9 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
     def _turn(self) -> Routine[None]:
         """An eighth of a turn, slowly, on the spot; then rest."""
         context = self.context
-        end_s = context.clock.now() + _TURN_RAD / _TURN_RAD_S
+        end_s = context.clock.now() + self.options.turn_rad / self.options.turn_rad_s
         while context.clock.now() < end_s:
-            self._base.drive((0.0, 0.0, _TURN_RAD_S))
+            self._base.drive((0.0, 0.0, self.options.turn_rad_s))
             yield Running("turning slowly to see more")
             refusal = self._base.refusal()
             if refusal is not None:

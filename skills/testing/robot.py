@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from skills.arm.kinematics import ArmModel, arm_model
-from skills.estimate.planar import compose
+from skills.geometry import compose
 from skills.robot import (
     ArmTrajectory,
     Battery,
@@ -33,7 +33,7 @@ from skills.robot import (
 from skills.testing.blocks import Block, can_at
 from skills.testing.clock import VirtualClock
 from skills.testing.commands import Commands
-from skills.testing.sensing import CAMERAS, picture, sweep
+from skills.testing.sensing import FRONT_CAMERAS, mount_of, picture, sweep
 
 _ACCELERATION_M_S2 = 2.5
 _BRAKING_M_S2 = 8.0
@@ -44,7 +44,6 @@ _SCAN_PERIOD_S = 0.1
 _TRAJECTORY_START_RAD = 0.25
 _BATTERY_RUNTIME_S = 5400.0
 _CHARGING_S = 600.0
-_HAND_TO_THING_M = 0.185
 _FINGER_M = 0.03
 
 BASE_ONLY = Capabilities(
@@ -56,7 +55,7 @@ BASE_ONLY = Capabilities(
     pitch_range_rad=(-0.3, 0.3),
     arm=None,
     gripper=None,
-    camera_sources=("frontleft", "frontright"),
+    cameras=FRONT_CAMERAS,
     description="",
 )
 """A body that can go about, with two cameras, and no arm."""
@@ -167,9 +166,10 @@ class ScriptedRobot:
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Take a picture with depth now, whichever is asked for. Raises ValueError for an unknown source."""
         self.calls.append("image")
-        if source not in self._capabilities.camera_sources:
+        camera = next((each for each in self._capabilities.cameras if each.source == source), None)
+        if camera is None:
             raise ValueError(f"{self._name} has no camera '{source}'; it has {self._capabilities.camera_sources}")
-        mount = CAMERAS[source]
+        mount = mount_of(camera)
         X_BF = self.arm.X_BH(self.q_rad) if mount.frame == "hand" else RigidTransform()
         edges = {"body": ("odom", self._X_OB())}
         if self._capabilities.arm is not None:
@@ -368,8 +368,9 @@ class ScriptedRobot:
             self._commands.finish("set_gripper", CommandState.DONE)
 
     def _between_fingers_W(self) -> FloatArray:
-        X_WH = self._X_WB() @ self.arm.X_BH(self.q_rad)
-        return np.asarray(X_WH @ np.array([_HAND_TO_THING_M, 0.0, 0.0]))
+        gripper = self._capabilities.gripper
+        grip_m = 0.0 if gripper is None else gripper.grip_x_m
+        return np.asarray(self._X_WB() @ self.arm.X_BH(self.q_rad) @ np.array([grip_m, 0.0, 0.0]))
 
     def _feel(self) -> None:
         """A closing jaw takes the loose block between its fingers, if there is one."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.robot import FloatArray, FrameTree, Image, Intrinsics, Scan
+from skills.robot import CameraCapabilities, FloatArray, FrameTree, Image, Intrinsics, Scan
 from skills.testing.blocks import Block, block_array, cast_rays, colours_of
 
 X_BL = RigidTransform(np.array([-0.2, 0.0, 0.4]))
@@ -33,16 +32,16 @@ class CameraMount:
 
 _BODY_LENS = Intrinsics(80, 60, 41.0, 41.0, 39.5, 29.5)
 _HAND_LENS = Intrinsics(320, 240, 276.0, 276.0, 160.0, 120.0)
-CAMERAS: Mapping[str, CameraMount] = MappingProxyType(
-    {
-        "hand": CameraMount("hand", RigidTransform(_AHEAD, np.array([0.14, 0.02, 0.02])), _HAND_LENS),
-        "frontleft": CameraMount("body", RigidTransform(_DOWN_30, np.array([0.42, 0.0, 0.02])), _BODY_LENS),
-        "frontright": CameraMount("body", RigidTransform(_DOWN_30, np.array([0.42, 0.0, 0.02])), _BODY_LENS),
-        "left": CameraMount("body", RigidTransform(_AHEAD, np.array([-0.16, 0.11, 0.04])), _BODY_LENS),
-        "right": CameraMount("body", RigidTransform(_AHEAD, np.array([-0.16, -0.11, 0.04])), _BODY_LENS),
-        "back": CameraMount("body", RigidTransform(_AHEAD, np.array([-0.42, -0.04, 0.01])), _BODY_LENS),
-    }
-)
+_AT_FRONT = RigidTransform(_DOWN_30, np.array([0.42, 0.0, 0.02]))
+FRONT_CAMERAS = tuple(CameraCapabilities(name, _AT_FRONT) for name in ("frontleft", "frontright"))
+"""The cameras of a body without an arm."""
+
+
+def mount_of(camera: CameraCapabilities) -> CameraMount:
+    """Where a robot's camera sits, with a lens of this module's."""
+    return (
+        CameraMount("hand", camera.X_FC, _HAND_LENS) if camera.on_hand else CameraMount("body", camera.X_FC, _BODY_LENS)
+    )
 
 
 def sweep(

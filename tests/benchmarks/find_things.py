@@ -39,11 +39,11 @@ from plant.simulation import Engine
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.lights import render_parameters
 from skills.api import Detection, Detector, Surface
-from skills.detect.points import inside_polygon
 from skills.detect.skill import Detect, DetectInputs
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
+from skills.geometry import inside_polygon
 from skills.robot import FrameTree, Image, Pose2D
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace

@@ -18,8 +18,8 @@ from pydrake.math import RigidTransform
 
 from executive.cli.assembly import shared_detector
 from skills.api import Detection, LocalisationEstimate
-from skills.detect.sighting import sightings
 from skills.detection import box_overlap
+from skills.perception.detection_3d import sightings
 from tests.benchmarks.position_scenes import Shot, Truth, counts, load, shots
 
 Boxes = Callable[[Shot], tuple[Detection, ...]]

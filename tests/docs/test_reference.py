@@ -33,3 +33,8 @@ def test_every_key_of_a_schema_is_explained(page):
     parts = [schema, *(part for part in schema.get("$defs", {}).values() if "properties" in part)]
     mute = [key for part in parts for key, facts in part["properties"].items() if not facts.get("description")]
     assert mute == []
+
+
+def test_the_schema_of_stack_files_is_current():
+    """Run `python docs/make_reference.py` when this fails."""
+    assert make_reference.STACK_SCHEMA.read_text(encoding="utf-8") == make_reference.stack_schema_text()

@@ -13,8 +13,9 @@ from executive.run.worker import LockStepWorker
 from skills.api import Job, SkillContext
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.localiser import ScanMatchingLocaliser
-from skills.estimate.planar import compose, inverse
+from skills.geometry import compose, inverse
 from skills.robot import (
+    CameraCapabilities,
     Capabilities,
     CommandId,
     CommandState,
@@ -104,7 +105,7 @@ class PlanarRobot:
         self.scale_drift, self.yaw_drift_rad_per_m = 1.01, math.radians(0.3)
         self._rng = np.random.default_rng(seed)
         self._azimuths = np.linspace(-math.pi, math.pi, azimuths, endpoint=False)
-        self._cameras = ("frontleft", "frontright") if cameras else ()
+        self._cameras = tuple(CameraCapabilities(name, X_BC) for name in ("frontleft", "frontright")) if cameras else ()
         self._scan: Scan | None = None
         self._lease = Lease(self.name, "", 0)
         self._commands: dict[CommandId, CommandStatus] = {}
@@ -128,7 +129,7 @@ class PlanarRobot:
         return self._scan
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        if source not in self._cameras:
+        if source not in self.capabilities().camera_sources:
             raise ValueError(f"no camera {source!r}")
         self.images_taken += 1
         u, v = np.meshgrid(np.arange(LENS.width), np.arange(LENS.height))

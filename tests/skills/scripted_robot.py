@@ -30,6 +30,7 @@ from skills.testing.detector import PlainColours
 
 CAPABILITIES = spot_capabilities()
 MODEL = arm_model(CAPABILITIES)
+GRIPPER = CAPABILITIES.gripper
 LENS = Intrinsics(64, 48, 55.2, 55.2, 32.0, 24.0)
 
 
@@ -84,10 +85,7 @@ class ScriptedRobot:
             {
                 "body": ("odom", RigidTransform([0.0, 0.0, self.height_m])),
                 "hand": ("body", hand),
-                "hand_camera": (
-                    "hand",
-                    RigidTransform(np.array([[0, 0, 1, 0.14], [-1, 0, 0, 0.02], [0, -1, 0, 0.02], [0, 0, 0, 1.0]])),
-                ),
+                "hand_camera": ("hand", CAPABILITIES.hand_camera.X_FC),
             }
         )
         if self.things is not None:

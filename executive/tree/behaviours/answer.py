@@ -13,7 +13,7 @@ from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.decorators import ExplainedDecorator
 from executive.tree.behaviours.explained import Explained
 from skills.api import Cause, Failed, ObjectObservation, Publish
-from skills.detect.tally import told_apart
+from skills.detect.counting import told_apart
 from skills.detect.words import counted
 
 ANSWER_TOPIC: Final = "answer"

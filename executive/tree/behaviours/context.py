@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from executive.tree.behaviours.board import Board
@@ -22,6 +22,7 @@ from skills.api import (
 )
 from skills.detection import NO_DETECTOR
 from skills.robot import Clock, Lease, Pose2D, Robot
+from skills.stack import RobotStack, default_stack
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
@@ -57,6 +58,7 @@ class RunContext:
     ask: Ask = nobody_to_ask
     detector: Detector = NO_DETECTOR
     stop_pressed: Callable[[], str | None] = never_pressed
+    stack: RobotStack = field(default_factory=default_stack)
     work: WorkCounter = NO_WORK_COUNTER
 
     def pose(self) -> Pose2D | None:
@@ -81,4 +83,5 @@ class RunContext:
             ask=self.ask,
             detector=self.detector,
             work=self.work,
+            stack=self.stack,
         )

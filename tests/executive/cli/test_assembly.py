@@ -1,32 +1,33 @@
 """What is put together for a run, and what is refused before it begins."""
 
+from dataclasses import replace
+
 import pytest
 from tiny_detector import CLASSES, model_bytes, write_model
 
-from executive.cli import assembly
 from executive.cli.assembly import shared_detector
 from executive.mission.errors import InputError
+from skills.perception.cascade import Cascade
+from skills.stack import default_stack
 
 
-@pytest.fixture
-def model_file(tmp_path, monkeypatch):
-    monkeypatch.setattr(assembly, "MODEL_FILE", tmp_path / "model.onnx")
-    shared_detector.cache_clear()
-    yield tmp_path / "model.onnx"
-    shared_detector.cache_clear()
+def with_detector(file):
+    return replace(default_stack(), detector=Cascade(str(file)))
 
 
-def test_a_process_has_one_detector(model_file):
-    write_model(model_file)
-    assert shared_detector() is shared_detector()
-    assert shared_detector().class_names == CLASSES
+def test_a_process_has_one_detector_of_a_stack(tmp_path):
+    write_model(tmp_path / "model.onnx")
+    stack = with_detector(tmp_path / "model.onnx")
+    assert shared_detector(stack) is shared_detector(stack)
+    assert shared_detector(stack).class_names == CLASSES
 
 
 @pytest.mark.parametrize(("content", "part"), [(None, "there is no such model"), (model_bytes()[:-300], "damaged")])
-def test_a_model_that_cannot_be_used_is_named_before_anything_moves(model_file, content, part):
+def test_a_model_that_cannot_be_used_is_named_before_anything_moves(tmp_path, content, part):
+    file = tmp_path / "model.onnx"
     if content is not None:
-        model_file.write_bytes(content)
+        file.write_bytes(content)
     with pytest.raises(InputError, match=part) as error:
-        shared_detector()
-    assert error.value.file == model_file
+        shared_detector(with_detector(file))
+    assert error.value.file == file
     assert error.value.mend == "make a new one: errand dataset train --data DIR --out DIR"

@@ -1,17 +1,20 @@
 """Where to stand for a thing on a surface."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
-from scripted_robot import CAPABILITIES, MODEL
+from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectObservation, Thing
 from skills.approach.skill import grasp_cost, observed_target
 from skills.approach.standing import free_places, is_comfortable, reachable
+from skills.grasp.planning import GeometricGraspPlanner
 from skills.robot import Pose2D
 
 CAN = ObjectObservation(0.0, Thing("coke"), (2.15, 0.0, 0.807), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
+CANDIDATES = partial(GeometricGraspPlanner().candidates, p_BS=MODEL.p_BS, gripper=GRIPPER)
 
 
 class _Table:
@@ -50,8 +53,8 @@ def test_places_out_of_reach_are_left_out():
 
 def test_a_can_is_within_reach_from_the_best_place_but_not_from_afar():
     best = _poses()[0].pose
-    assert grasp_cost(MODEL, best.transform(0.52), CAN) == 0.0
-    assert grasp_cost(MODEL, Pose2D(0.0, 0.0, 0.0).transform(0.52), CAN) is None
+    assert grasp_cost(MODEL, CANDIDATES, best.transform(0.52), CAN) == 0.0
+    assert grasp_cost(MODEL, CANDIDATES, Pose2D(0.0, 0.0, 0.0).transform(0.52), CAN) is None
 
 
 @pytest.mark.parametrize(
@@ -78,7 +81,7 @@ def test_an_observation_keeps_its_axes_when_the_body_is_turned():
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 1.57, 2.4])
 def test_a_hammer_lying_any_way_is_within_reach_from_some_place(yaw):
     hammer = ObjectObservation(0.0, Thing("hammer"), (2.15, 0.0, 0.765), (0.33, 0.12, 0.03), yaw, 1.0, "bench")
-    found = _poses(lambda pose: grasp_cost(MODEL, pose.transform(0.52), hammer))
+    found = _poses(lambda pose: grasp_cost(MODEL, CANDIDATES, pose.transform(0.52), hammer))
     assert found
 
 

@@ -7,15 +7,16 @@ import pytest
 from pydrake.math import RigidTransform
 
 from plant.spot.capabilities import spot_capabilities
+from skills.api import PlanningError
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
-from skills.arm.motion import plan_joint_path, plan_line, time_path
-from skills.arm.routine import PlanningError
+from skills.arm.motion import RrtConnect
 
 CAPABILITIES = spot_capabilities()
 MODEL = arm_model(CAPABILITIES)
 LEFT = np.array([0.9, -1.6, 1.6, 0.0, 0.4, 0.0])
 RIGHT = np.array([-0.9, -1.6, 1.6, 0.0, 0.4, 0.0])
+PLANNER = RrtConnect()
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,7 @@ def test_an_arm_in_the_body_is_not_free(scene):
 def test_a_box_in_the_arms_place_is_named_as_what_stands_around(scene):
     scene.set_boxes([Box(RigidTransform(MODEL.X_BH(LEFT).translation()), (0.2, 0.2, 0.2))])
     with pytest.raises(PlanningError, match="what stands around"):
-        plan_joint_path(scene, MODEL.stowed_rad, LEFT, np.random.default_rng(1))
+        PLANNER.path(scene, MODEL.stowed_rad, LEFT, np.random.default_rng(1))
 
 
 def test_a_held_box_counts_as_part_of_the_arm(scene):
@@ -56,12 +57,12 @@ def test_a_held_box_counts_as_part_of_the_arm(scene):
 
 
 def test_a_free_motion_is_straight(scene):
-    assert len(plan_joint_path(scene, MODEL.stowed_rad, LEFT, np.random.default_rng(1))) == 2
+    assert len(PLANNER.path(scene, MODEL.stowed_rad, LEFT, np.random.default_rng(1))) == 2
 
 
 def test_a_wall_between_is_gone_round(scene):
     scene.set_boxes([_wall_ahead()])
-    path = plan_joint_path(scene, LEFT, RIGHT, np.random.default_rng(3))
+    path = PLANNER.path(scene, LEFT, RIGHT, np.random.default_rng(3))
     assert not scene.edge_free(LEFT, RIGHT)
     assert all(scene.edge_free(a, b) for a, b in pairwise(path))
     assert np.allclose(path[0], LEFT)
@@ -70,14 +71,14 @@ def test_a_wall_between_is_gone_round(scene):
 
 def test_the_same_seed_plans_the_same_path(scene):
     scene.set_boxes([_wall_ahead()])
-    first, second = (plan_joint_path(scene, LEFT, RIGHT, np.random.default_rng(5)) for _ in range(2))
+    first, second = (PLANNER.path(scene, LEFT, RIGHT, np.random.default_rng(5)) for _ in range(2))
     assert np.array_equal(first, second)
 
 
 def test_timing_keeps_speed_and_acceleration_limits_from_rest_to_rest(scene):
     scene.set_boxes([_wall_ahead()])
-    path = plan_joint_path(scene, LEFT, RIGHT, np.random.default_rng(3))
-    trajectory = time_path(path, speed_rad_s=1.2, acceleration_rad_s2=3.0, scene=scene)
+    path = PLANNER.path(scene, LEFT, RIGHT, np.random.default_rng(3))
+    trajectory = PLANNER.timed(path, scene=scene)
     times = np.arange(0.0, trajectory.times_s[-1], 0.08)
     q = np.stack([np.interp(times, trajectory.times_s, column) for column in trajectory.positions_rad.T], axis=1)
     speeds = np.diff(q, axis=0) / 0.08
@@ -88,14 +89,14 @@ def test_timing_keeps_speed_and_acceleration_limits_from_rest_to_rest(scene):
 
 
 def test_timing_a_motion_of_no_length_is_a_short_stay():
-    trajectory = time_path(np.array([LEFT, LEFT]))
+    trajectory = PLANNER.timed(np.array([LEFT, LEFT]))
     assert np.allclose(trajectory.positions_rad[-1], LEFT)
 
 
 def test_a_straight_line_keeps_the_hands_orientation_and_its_way():
     X_from = MODEL.X_BH(LEFT)
     X_to = RigidTransform(X_from.rotation(), X_from.translation() + [0.0, 0.0, 0.1])
-    hands = [MODEL.X_BH(q) for q in plan_line(MODEL, LEFT, X_to)]
+    hands = [MODEL.X_BH(q) for q in PLANNER.line(MODEL, LEFT, X_to)]
     for hand in hands:
         assert np.allclose(hand.rotation().matrix(), X_from.rotation().matrix(), atol=1e-6)
         assert np.allclose(hand.translation()[:2], X_from.translation()[:2], atol=1e-6)
@@ -105,7 +106,7 @@ def test_a_straight_line_keeps_the_hands_orientation_and_its_way():
 def test_a_straight_line_out_of_reach_is_refused():
     X_to = MODEL.X_BH(LEFT) @ RigidTransform([1.5, 0.0, 0.0])
     with pytest.raises(PlanningError, match="reach"):
-        plan_line(MODEL, LEFT, X_to)
+        PLANNER.line(MODEL, LEFT, X_to)
 
 
 def test_a_straight_line_into_a_box_is_refused(scene):
@@ -113,11 +114,11 @@ def test_a_straight_line_into_a_box_is_refused(scene):
     ahead = RigidTransform(X_from.rotation(), X_from @ np.array([0.15, 0.0, 0.0]))
     scene.set_boxes([Box(RigidTransform(X_from @ np.array([0.38, 0.0, 0.0])), (0.1, 0.1, 0.1))])
     with pytest.raises(PlanningError, match="meets"):
-        plan_line(MODEL, LEFT, ahead, scene)
+        PLANNER.line(MODEL, LEFT, ahead, scene)
 
 
 @pytest.mark.parametrize("way_rad", [0.5, 0.05, 0.01, 0.001])
 def test_timing_takes_about_as_long_as_the_acceleration_needs(way_rad):
-    trajectory = time_path(np.array([LEFT, LEFT + way_rad * np.eye(6)[1]]), speed_rad_s=10.0, acceleration_rad_s2=3.0)
+    trajectory = PLANNER.timed(np.array([LEFT, LEFT + way_rad * np.eye(6)[1]]), speed_rad_s=10.0)
     shortest_s = 2.0 * np.sqrt(way_rad / 3.0)
     assert 0.8 * shortest_s < trajectory.times_s[-1] < 2.5 * shortest_s + 0.1

@@ -7,6 +7,7 @@ import pytest
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.charge.skill import Charge, ChargeInputs
 from skills.robot import Battery
+from skills.stack import default_stack
 
 
 class Dock:
@@ -27,7 +28,7 @@ class Dock:
 
 
 def outcome(dock, level):
-    skill, progress = Charge(SimpleNamespace(robot=dock, clock=dock)), []
+    skill, progress = Charge(SimpleNamespace(robot=dock, clock=dock, stack=default_stack())), []
     skill.begin(ChargeInputs(level))
     while isinstance(step := skill.step(), Running):
         progress.append(step.progress)

@@ -3,16 +3,16 @@
 import json
 
 import numpy as np
+from made_detections import detected_3d
 from pydrake.math import RigidTransform
 from scripted_robot import ScriptedRobot, context_of
-from sighted import sighting
 from table_scene import COKE, TABLE, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate
-from skills.detect.coverage import SurfaceShares
 from skills.detect.messages import coverage_message, detections_message, tracks_message
-from skills.detect.sighting import sightings
-from skills.detect.tracks import TrackBook
+from skills.perception.coverage import SurfaceShares
+from skills.perception.detection_3d import detections_3d
+from skills.perception.tracker import Tracker
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.diag([0.02**2, 0.02**2, 0.0]), True)
 
@@ -20,7 +20,7 @@ PLACE = LocalisationEstimate(0.0, RigidTransform(), np.diag([0.02**2, 0.02**2, 0
 def test_all_detections_are_told_those_with_a_place_with_it():
     image = scene([COKE])
     found = (seen_as("coke", image), Detection("beer", 0.6, (1.0, 1.0, 9.0, 9.0)))
-    placed = sightings(image, PLACE, found[:1], [TABLE])
+    placed = detections_3d(image, PLACE, found[:1], [TABLE])
     message = detections_message(image, found, placed)
     coke, beer = message["detections"]
     assert (coke["class_id"], coke["surface"], len(coke["position_W"])) == (2, "table", 3)
@@ -31,8 +31,8 @@ def test_all_detections_are_told_those_with_a_place_with_it():
 
 def test_messages_are_json_but_for_the_picture():
     context = context_of(ScriptedRobot())
-    book = TrackBook(("coke",))
-    tracks = tracks_message(context, book.update([sighting()], lambda track: True))
+    tracker = Tracker(("coke",))
+    tracks = tracks_message(context, tracker.update([detected_3d()], lambda track: True))
     coverage = coverage_message(context, {"table": SurfaceShares(0.5, 0.25)})
     assert json.loads(json.dumps(tracks))["tracks"][0]["class_name"] == "coke"
     assert json.loads(json.dumps(coverage))["surfaces"]["table"] == {"seen": 0.5, "hidden": 0.25, "out_of_view": 0.25}

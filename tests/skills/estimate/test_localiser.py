@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
-from skills.estimate.planar import compose, inverse
+from skills.geometry import compose, inverse
 from skills.robot import Pose2D
 
 START = Pose2D(1.5, 2.0, 0.0)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from skills.estimate.self_filter import ArmShape, SelfFilter, segment_distance
-from skills.robot import ArmCapabilities, Capabilities, Joints
+from skills.robot import ArmCapabilities, Capabilities, GripperCapabilities, Joints
 
 URDF = """<robot name="r">
   <link name="body"/><link name="upper"/><link name="lower"/>
@@ -11,12 +11,13 @@ URDF = """<robot name="r">
   <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/>
     <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
 </robot>"""
+HAND = GripperCapabilities("jaw", 1.0, 0.1, 50.0, 0.05, 0.1, 0.2, 0.0, 0.02, 0.01, 0.15, 0.08, length_m=0.35)
 OUTLINE = ((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25))
 
 
 def capabilities(arm: bool = True) -> Capabilities:
-    limbs = ArmCapabilities(("shoulder", "elbow"), 1.0, (0.0, 0.0)) if arm else None
-    return Capabilities(OUTLINE, 1.6, 2.0, 0.52, (0.4, 0.6), (-0.3, 0.3), limbs, None, (), URDF)
+    limbs = ArmCapabilities(("shoulder", "elbow"), 1.0, (0.0, 0.0), 5.0) if arm else None
+    return Capabilities(OUTLINE, 1.6, 2.0, 0.52, (0.4, 0.6), (-0.3, 0.3), limbs, HAND, (), URDF)
 
 
 def joints(shoulder: float, elbow: float) -> Joints:

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
-from scripted_robot import MODEL, ScriptedRobot, context_of, outcome
+from scripted_robot import GRIPPER, MODEL, ScriptedRobot, context_of, outcome
 
 from skills.api import Cause, Failed, ObjectObservation, Thing
 from skills.arm.routine import SkillFailure
@@ -18,7 +18,7 @@ CENTRE = (0.85, 0.0)
 def candidates():
     s, t = np.meshgrid(np.linspace(-0.5, 0.5, 60), np.linspace(-0.5, 0.5, 20))
     points = np.column_stack([s.ravel() * 0.2 + CENTRE[0], t.ravel() * 0.03, np.full(s.size, 0.23)])
-    return grasp_candidates(Target(points, CENTRE, 0.0, 0.2, 0.03, 0.03, 0.2, False), MODEL.p_BS)
+    return grasp_candidates(Target(points, CENTRE, 0.0, 0.2, 0.03, 0.03, 0.2, False), MODEL.p_BS, GRIPPER)
 
 
 def test_the_best_grasp_falls_behind_all_that_are_unlike_it():
@@ -69,7 +69,7 @@ class Slippery(Grasp):
 
     def _plan(self, view, thing, avoid):
         yield from self.pause(0.1, "planning")
-        chosen = others_first(grasp_candidates(view.target, MODEL.p_BS), avoid, CENTRE, view.X_WB)[0]
+        chosen = others_first(grasp_candidates(view.target, MODEL.p_BS, GRIPPER), avoid, CENTRE, view.X_WB)[0]
         return type("Plan", (), {"candidate": chosen})()
 
     def _take(self, plan, thing):

@@ -47,7 +47,7 @@ def test_the_thing_is_held_out_near_the_person_but_does_not_touch(y):
 
 def test_poses_before_a_person_face_them_and_the_nearest_comes_first():
     here = Pose2D(0.0, 0.0, 0.0)
-    poses = facing_poses((3.0, 0.0), here)
+    poses = facing_poses((3.0, 0.0), here, 1.5)
     assert math.hypot(poses[0].x_m - 1.5, poses[0].y_m) < 0.01
     for pose in poses:
         off = math.atan2(-pose.y_m, 3.0 - pose.x_m) - pose.yaw_rad

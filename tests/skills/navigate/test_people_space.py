@@ -7,7 +7,7 @@ import pytest
 
 from skills.navigate.footprint import Footprint
 from skills.navigate.people_space import PaceKeeper, SpaceOptions, WithPeople, outline_distance_m, spaced
-from skills.navigate.people_watch import SeenPerson
+from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 
 FOOTPRINT = Footprint.rectangle([(0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25)])

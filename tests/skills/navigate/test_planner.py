@@ -7,12 +7,13 @@ import yaml
 from planar_robot import OUTLINE, TWO_ROOMS, Box, grid_of
 
 import plant
+from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import load_grid_map
 from skills.navigate.footprint import Footprint, footprint_clear, footprint_clearance_m, pose_array
 from skills.navigate.motion_cost import PlannerOptions
 from skills.navigate.path import path_length
-from skills.navigate.planner import NoWayError, PlanningError, plan_path
+from skills.navigate.planner import NoWayError, plan_path
 from skills.robot import Pose2D
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from skills.api import Surface
-from skills.detect.plane import LevelPlane
-from skills.detect.points import PointCloud
-from skills.detect.shape import SeenShape
-from skills.detect.surface_view import Cluster, SurfaceView
+from skills.perception.plane import LevelPlane
+from skills.perception.point_cloud import PointCloud
+from skills.perception.shape import SeenShape
+from skills.perception.surface_segmentation import Cluster, SurfaceView
 from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, spots
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)

@@ -1,0 +1,21 @@
+"""Stack files: the components of a robot and their options, read with file and line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from executive.mission.yaml_source import read_yaml
+from skills.stack import RobotStack, StackError, default_stack, stack_of
+
+__all__ = ["load_stack"]
+
+
+def load_stack(path: Path | None) -> RobotStack:
+    """The stack of a file, or the one that comes with Errand. Raises InputError with file and line."""
+    if path is None:
+        return default_stack()
+    source = read_yaml(path)
+    try:
+        return stack_of(source.data or {})
+    except StackError as error:
+        raise source.error(error.path, error.message, error.hint) from error

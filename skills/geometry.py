@@ -1,0 +1,52 @@
+"""Planar geometry: angles, poses and polygons."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.robot import FloatArray, Pose2D
+
+AngleT = TypeVar("AngleT", float, FloatArray)
+
+
+def wrap(angle_rad: AngleT) -> AngleT:
+    """The same angle, or angles, in [-pi, pi)."""
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def compose(X_AB: Pose2D, X_BC: Pose2D) -> Pose2D:
+    """X_AC."""
+    c, s = math.cos(X_AB.yaw_rad), math.sin(X_AB.yaw_rad)
+    x_m = X_AB.x_m + c * X_BC.x_m - s * X_BC.y_m
+    y_m = X_AB.y_m + s * X_BC.x_m + c * X_BC.y_m
+    return Pose2D(x_m, y_m, wrap(X_AB.yaw_rad + X_BC.yaw_rad))
+
+
+def inverse(X_AB: Pose2D) -> Pose2D:
+    """X_BA."""
+    c, s = math.cos(X_AB.yaw_rad), math.sin(X_AB.yaw_rad)
+    return Pose2D(-c * X_AB.x_m - s * X_AB.y_m, s * X_AB.x_m - c * X_AB.y_m, -X_AB.yaw_rad)
+
+
+def relative(X_WA: Pose2D, X_WB: Pose2D) -> Pose2D:
+    """X_AB of two poses in one frame."""
+    return compose(inverse(X_WA), X_WB)
+
+
+def inside_polygon(
+    xy: FloatArray, polygon: tuple[tuple[float, float], ...], margin_m: float = 0.0
+) -> NDArray[np.bool_]:
+    """Which rows of xy (N, 2) lie in a convex polygon grown by margin_m; corners in either order."""
+    corners = np.asarray(polygon, dtype=float)
+    edges = np.roll(corners, -1, axis=0) - corners
+    area = float(np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - np.roll(corners[:, 0], -1) * corners[:, 1]))
+    lengths = np.linalg.norm(edges, axis=1)
+    keep = np.ones(len(xy), dtype=bool)
+    for corner, edge, length in zip(corners, edges, lengths, strict=True):
+        offset = edge[0] * (xy[:, 1] - corner[1]) - edge[1] * (xy[:, 0] - corner[0])
+        keep &= np.sign(area) * offset / max(float(length), 1e-9) > -margin_m
+    return keep

@@ -1,0 +1,123 @@
+"""People: who was seen where, by camera or LiDAR. In a scan a person is upright, wide as shoulders, and alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+
+from skills.robot import FloatArray, Pose2D, Scan
+
+__all__ = ["SeenPerson", "merged", "people_in_scan"]
+
+_CELL_M = 0.05
+_LOWEST_M = 0.8
+_HIGHEST_M = 1.8
+_WIDTH_M = (0.15, 0.75)
+_ALONE_M = 0.2
+_FEWEST_POINTS = 12
+_FRONT_TO_AXIS_M = 0.1
+_AXIS_SIGMA_M = 0.08
+_OWN_M = (0.1, 0.19, 0.05)
+"""What the robot holds and its arm reach so far beyond its outline: behind, ahead, to the sides."""
+
+
+@dataclass(frozen=True)
+class SeenPerson:
+    """Somebody seen: the upright axis (x, y) in the world (m), its covariance (2, 2), when last and how often.
+
+    `here_W` is where the robot was then, and `missed` how many looks since then should have shown them.
+    """
+
+    place_W: tuple[float, float]
+    covariance: FloatArray
+    score: float
+    stamp_s: float
+    here_W: Pose2D
+    looks: int = 1
+    missed: int = 0
+
+    @property
+    def distance_m(self) -> float:
+        """Distance from where the robot was."""
+        return math.dist(self.place_W, (self.here_W.x_m, self.here_W.y_m))
+
+
+def merged(known: Sequence[SeenPerson], new: SeenPerson, same_m: float) -> tuple[SeenPerson, ...]:
+    """What is known with somebody seen anew: in the place of the nearest within same_m, or as one more.
+
+    The newer place counts: people walk. Two cameras that see one person at once count as one look.
+    """
+    near = [one for one in known if math.dist(one.place_W, new.place_W) <= same_m]
+    if not near:
+        return (*known, new)
+    old = min(near, key=lambda one: math.dist(one.place_W, new.place_W))
+    again = old.looks + (new.stamp_s > old.stamp_s)
+    return tuple(replace(new, looks=again) if one is old else one for one in known)
+
+
+def people_in_scan(
+    scan: Scan, X_WB: RigidTransform, footprint_m: Sequence[tuple[float, float]], furthest_m: float = 3.5
+) -> list[SeenPerson]:
+    """People in a LiDAR scan, the nearest first; what is within and just before the robot's footprint is its own."""
+    points_B = scan.points_B()
+    level = points_B @ scan.X_OB.rotation().matrix().T
+    height = level[:, 2] + scan.X_OB.translation()[2]
+    distance = np.hypot(points_B[:, 0], points_B[:, 1])
+    own = _own(points_B, np.array(footprint_m))
+    near = (height > _LOWEST_M) & (height < _HIGHEST_M) & (distance < furthest_m + 0.5) & ~own
+    clusters = _clusters(points_B[near])
+    people = [
+        _person(scan.stamp_s, X_WB, cluster)
+        for k, cluster in enumerate(clusters)
+        if _person_sized(cluster) and _alone(cluster, [other for j, other in enumerate(clusters) if j != k])
+    ]
+    return sorted((p for p in people if p.distance_m < furthest_m), key=lambda person: person.distance_m)
+
+
+def _own(points_B: FloatArray, corners: FloatArray) -> NDArray[np.bool_]:
+    """Points of the robot's own arm and what it holds."""
+    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+    behind, ahead, aside = _OWN_M
+    x, y = points_B[:, 0], points_B[:, 1]
+    return np.asarray((x > x0 - behind) & (x < x1 + ahead) & (y > y0 - aside) & (y < y1 + aside))
+
+
+def _clusters(points_B: FloatArray) -> list[FloatArray]:
+    """Points (N, 3) joined where they are neighbours on a grid seen from above."""
+    if len(points_B) == 0:
+        return []
+    cells = np.floor((points_B[:, :2] - points_B[:, :2].min(axis=0)) / _CELL_M).astype(np.int64) + 2
+    occupied = np.zeros(cells.max(axis=0) + 3, dtype=np.uint8)
+    occupied[cells[:, 0], cells[:, 1]] = 1
+    count, labels = cv2.connectedComponents(cv2.dilate(occupied, np.ones((3, 3), np.uint8)), connectivity=8)
+    label = labels[cells[:, 0], cells[:, 1]]
+    groups = [points_B[label == k] for k in range(1, count)]
+    return [group for group in groups if len(group) >= 3]
+
+
+def _person_sized(points_B: FloatArray) -> bool:
+    spans = np.ptp(points_B[:, :2] - points_B[:, :2].mean(axis=0), axis=0)
+    width = float(np.hypot(*spans))
+    tall = float(np.ptp(points_B[:, 2])) > 0.1
+    return len(points_B) >= _FEWEST_POINTS and _WIDTH_M[0] < width < _WIDTH_M[1] and tall
+
+
+def _alone(points_B: FloatArray, others: list[FloatArray]) -> bool:
+    """Whether no other cluster is close; walls and cupboards seldom stand alone."""
+    centre = points_B[:, :2].mean(axis=0)
+    reach = float(np.max(np.linalg.norm(points_B[:, :2] - centre, axis=1))) + _ALONE_M
+    return all(float(np.min(np.linalg.norm(other[:, :2] - centre, axis=1))) > reach for other in others)
+
+
+def _person(stamp_s: float, X_WB: RigidTransform, points_B: FloatArray) -> SeenPerson:
+    """Somebody whose front is seen: the axis is a little behind its middle."""
+    centre = points_B[:, :2].mean(axis=0)
+    behind = centre + _FRONT_TO_AXIS_M * centre / max(float(np.linalg.norm(centre)), 1e-6)
+    x, y, _ = (float(value) for value in X_WB @ np.array([*behind, 0.0]))
+    return SeenPerson((x, y), _AXIS_SIGMA_M**2 * np.eye(2), 1.0, stamp_s, Pose2D.from_transform(X_WB))

@@ -1,0 +1,217 @@
+"""Watching for people by the body cameras that look where the robot goes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import Detection, Job, LayeredView, SkillContext
+from skills.geometry import relative
+from skills.perception.detector.camera_images import found_in_grey
+from skills.perception.people import SeenPerson, merged
+from skills.perception.position import position_of
+from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
+
+__all__ = ["PEOPLE_TOPIC", "PeopleOptions", "PeopleWatch", "cameras_towards"]
+
+PEOPLE_TOPIC: Final = "people"
+PERSON: Final = "person"
+_HEIGHTS_M: Final = (0.2, 0.6, 1.0)
+_NEAREST_M: Final = 0.3
+_WELL_INSIDE: Final = 0.35
+_SAME_PLACE_M: Final = 0.05
+_SAME_YAW_RAD: Final = 0.05
+
+
+@dataclass(frozen=True)
+class PeopleOptions:
+    """How often the watch looks (s), how late the answer comes (s), and what counts as a person.
+
+    It looks every `period_s` while somebody may be near: the costmap shows something within `near_m` that the map does
+    not explain, or somebody is known. It looks every `idle_s` otherwise.
+    A person counts once seen twice within `same_m`, at least `least_score` sure; a second look follows the first after
+    `again_s`. Who should be in a picture and is not for `misses` times has gone. Who is out of all pictures is
+    remembered for `memory_s`, and for `beside_s` as long as the costmap knows something within `beside_m` of the place.
+    """
+
+    period_s: float = 0.5
+    idle_s: float = 2.0
+    near_m: float = 5.0
+    again_s: float = 0.2
+    latency_s: float = 0.15
+    least_score: float = 0.5
+    reach_m: float = 4.0
+    same_m: float = 0.7
+    misses: int = 3
+    memory_s: float = 2.0
+    beside_s: float = 10.0
+    beside_m: float = 0.5
+
+
+@dataclass(frozen=True)
+class _Look:
+    """Who is in the pictures of one moment, and the pictures without their pixels: frames and lenses.
+
+    `suspected`: the pictures were taken without depth and show somebody; the next ones are taken with depth, at once.
+    """
+
+    found: tuple[SeenPerson, ...]
+    images: tuple[Image, ...]
+    X_WO: RigidTransform
+    here_W: Pose2D
+    suspected: bool = False
+
+    def shows(self, one: SeenPerson, reach_m: float) -> bool:
+        """Whether somebody who has not moved would be seen: from where they were seen before, or well in a picture."""
+        off = relative(one.here_W, self.here_W)
+        if math.hypot(off.x_m, off.y_m) < _SAME_PLACE_M and abs(off.yaw_rad) < _SAME_YAW_RAD:
+            return True
+        upright_W = np.array([[*one.place_W, height_m] for height_m in _HEIGHTS_M])
+        return any(_inside(image, self.X_WO, upright_W, reach_m) for image in self.images)
+
+
+class PeopleWatch:
+    """Knows who is near while its `step` is called. Idle where the detector knows no people, or without cameras."""
+
+    def __init__(self, context: SkillContext, options: PeopleOptions | None = None) -> None:
+        self._context = context
+        self._options = options or PeopleOptions()
+        knows = PERSON in context.detector.class_names
+        self._cameras = context.robot.capabilities().body_cameras if knows else ()
+        self._looked_s = -math.inf
+        self._soon = self._suspected = False
+        self._job: Job[_Look] | None = None
+        self._seen: tuple[SeenPerson, ...] = ()
+
+    def people(self) -> tuple[SeenPerson, ...]:
+        """Those who count now."""
+        return tuple(one for one in self._seen if one.looks > 1 and self._remembered(one))
+
+    def step(self, velocity: FloatArray) -> None:
+        """Take in what was seen; look again in time, towards a body-frame velocity (3,). Never blocks."""
+        if self._job is not None:
+            if self._job.done():
+                look, self._job = self._job.result(), None
+                self._take(look)
+            return
+        now_s = self._context.clock.now()
+        sources = cameras_towards(velocity, self._cameras)
+        if sources and now_s >= self._looked_s + self._period_s():
+            self._looked_s, self._soon = now_s, False
+            X_WO, here_W = self._context.localiser.estimate().X_WO, self._context.pose()
+            robot, with_depth = self._context.robot, self._suspected or self._somebody_may_be_near()
+            self._job = self._context.worker.sense(
+                lambda: [robot.image(source, depth=with_depth) for source in sources],
+                lambda images: self._look(images, X_WO, here_W, with_depth),
+                latency_s=self._options.latency_s,
+                name="look for people",
+            )
+
+    def _period_s(self) -> float:
+        """How long after the last look the next one follows (s)."""
+        options = self._options
+        if self._soon:
+            return 0.0 if self._suspected else options.again_s
+        return options.period_s if self._somebody_may_be_near() else options.idle_s
+
+    def _somebody_may_be_near(self) -> bool:
+        """Whether somebody is known, or something stands near that the map does not explain, as far as can be told."""
+        costmap, here = self._context.costmap, self._context.pose()
+        if self._seen or not isinstance(costmap, LayeredView):
+            return True
+        return bool(np.any(np.linalg.norm(costmap.seen_m() - (here.x_m, here.y_m), axis=1) < self._options.near_m))
+
+    def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D, with_depth: bool) -> _Look:
+        """People in one picture of each camera; without depth only whether there may be somebody."""
+        found = found_in_grey(self._context.detector, images, PERSON)
+        pairs = [(image, one) for image, ones in zip(images, found, strict=True) for one in ones]
+        if not with_depth:
+            return _Look((), tuple(images), X_WO, here_W, suspected=any(self._is_person(one) for _, one in pairs))
+        seen = [self._placed(image, one, X_WO, here_W) for image, one in pairs]
+        return _Look(tuple(one for one in seen if one is not None), tuple(images), X_WO, here_W)
+
+    def _is_person(self, one: Detection) -> bool:
+        return one.class_name == PERSON and one.score >= self._options.least_score
+
+    def _placed(self, image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D) -> SeenPerson | None:
+        """Where a detected person is; None for other things, and for people out of the reach of depth."""
+        if not self._is_person(one):
+            return None
+        position = position_of(image, one)
+        if position is None:
+            return None
+        p_OC = image.frames.pose(image.camera_frame).translation()
+        if float(np.hypot(*(position.p_OT - p_OC)[:2])) > self._options.reach_m:
+            return None
+        x, y, _ = (float(value) for value in X_WO @ position.p_OT)
+        turn = X_WO.rotation().matrix()
+        covariance = (turn @ position.covariance_O @ turn.T)[:2, :2]
+        return SeenPerson((x, y), covariance, one.score, image.stamp_s, here_W)
+
+    def _take(self, look: _Look) -> None:
+        """Bring what is known up to date, tell of it, and look again soon when somebody is new."""
+        before, stamp_s = self._seen, self._context.clock.now()
+        for one in look.found:
+            stamp_s = one.stamp_s
+            self._seen = merged(self._seen, one, self._options.same_m)
+        self._seen = tuple(self._missed(one, look, stamp_s) for one in self._seen)
+        self._seen = tuple(one for one in self._seen if self._remembered(one))
+        self._suspected = look.suspected
+        self._soon = look.suspected or any(one.looks == 1 for one in self._seen)
+        if look.found or before:
+            self._context.publish(PEOPLE_TOPIC, self._message())
+
+    def _missed(self, one: SeenPerson, look: _Look, stamp_s: float) -> SeenPerson:
+        """Somebody after a look, which counts as a miss when it should have shown them and did not."""
+        due = one.stamp_s < stamp_s and look.shows(one, self._options.reach_m)
+        return replace(one, missed=one.missed + 1) if due else one
+
+    def _remembered(self, one: SeenPerson) -> bool:
+        """Whether somebody is still to be reckoned with."""
+        options = self._options
+        age_s = self._context.clock.now() - one.stamp_s
+        if one.missed >= options.misses or age_s > options.beside_s:
+            return False
+        if age_s <= options.memory_s or one.missed > 0:
+            return True
+        return float(self._context.costmap.clearance_m(np.array([one.place_W]))[0]) < options.beside_m
+
+    def _message(self) -> dict[str, object]:
+        return {
+            "stamp": self._context.clock.now(),
+            "robot": self._context.robot.name,
+            "people": [
+                {
+                    "position_W": [round(value, 3) for value in one.place_W],
+                    "covariance": [round(float(value), 5) for value in one.covariance.ravel()],
+                    "score": round(one.score, 3),
+                    "looks": one.looks,
+                }
+                for one in self._seen
+            ],
+        }
+
+
+def _inside(image: Image, X_WO: RigidTransform, points_W: FloatArray, reach_m: float) -> bool:
+    """Whether any of some points (N, 3) lies well inside a picture, within reach of its camera."""
+    p_C = (X_WO @ image.frames.pose(image.camera_frame)).inverse().multiply(points_W.T)
+    lens, z = image.intrinsics, np.maximum(p_C[2], 1e-6)
+    u, v = p_C[0] / z * lens.fx + lens.cx, p_C[1] / z * lens.fy + lens.cy
+    inside = (np.abs(u / lens.width - 0.5) < _WELL_INSIDE) & (np.abs(v / lens.height - 0.5) < _WELL_INSIDE)
+    return bool(np.any(inside & (p_C[2] > _NEAREST_M) & (p_C[2] < reach_m)))
+
+
+def cameras_towards(velocity: FloatArray, known: Sequence[CameraCapabilities]) -> tuple[str, ...]:
+    """The body cameras that look where a body-frame velocity leads; those ahead when the robot stands or turns."""
+    vx, vy = float(velocity[0]), float(velocity[1])
+    heading_rad = 0.0
+    if abs(vy) > 2.0 * abs(vx):
+        heading_rad = math.copysign(math.pi / 2, vy)
+    elif vx < 0.0:
+        heading_rad = math.pi
+    return tuple(camera.source for camera in known if camera.looks_towards(heading_rad))

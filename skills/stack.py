@@ -1,0 +1,315 @@
+"""The stack of a robot: which localiser, costmap, planners, controller, detector and locomotion it uses, with options.
+
+Each slot is filled by a component. A component is a frozen dataclass that a distribution registers as an entry point in
+the slot's group (`SLOTS`), ours in `pyproject.toml` in the same way. Its fields are the options that a stack file may
+set, its docstring explains them, and it keeps the slot's protocol below.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
+
+import numpy as np
+
+from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Pose2D
+
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
+
+    from skills.api import Costmap, Detector, Localiser, WorkCounter
+    from skills.arm.collision import ArmScene
+    from skills.arm.kinematics import ArmModel
+    from skills.estimate.grid_map import GridMap
+    from skills.grasp.candidates import GraspCandidate, Target
+    from skills.grasp.planning import GraspPlan, Surroundings
+    from skills.navigate.follower import Drive
+    from skills.navigate.footprint import Footprint
+    from skills.navigate.path import Path as WayPath
+
+__all__ = ["DEFAULT_FILE", "SLOTS", "RobotStack", "StackError", "default_stack", "plain", "stack_of", "stack_schema"]
+
+SLOTS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "localiser": "errand.localisers",
+        "costmap": "errand.costmaps",
+        "planner": "errand.planners",
+        "controller": "errand.controllers",
+        "arm_planner": "errand.arm_planners",
+        "grasp_planner": "errand.grasp_planners",
+        "detector": "errand.detectors",
+        "locomotion": "errand.locomotions",
+    }
+)
+"""The slots of a stack file, and the entry-point group of each."""
+SKILLS: Final = "skills"
+SKILL_GROUP: Final = "errand.skills"
+USE: Final = "use"
+DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
+
+
+class LocaliserComponent(Protocol):
+    """Makes the localiser of one robot."""
+
+    def build(self, grid: GridMap, start: Pose2D, *, surely: bool) -> Localiser:
+        """A localiser on a surveyed grid, told where the robot starts; not `surely` when it may have been moved."""
+
+
+class CostmapComponent(Protocol):
+    """Makes the costmap of one robot."""
+
+    def build(self, keepout: GridMap) -> Costmap:
+        """A costmap on a surveyed keep-out grid."""
+
+
+class GlobalPlanner(Protocol):
+    """Plans paths of the base."""
+
+    def problem(
+        self,
+        costmap: Costmap,
+        footprint: Footprint,
+        start: Pose2D,
+        goal: Pose2D,
+        *,
+        max_speed_m_s: float,
+        work: WorkCounter = ...,
+    ) -> Callable[[], WayPath]:
+        """Sample the costmap now; the call that comes back plans on that sample, in any thread.
+
+        That call raises PlanningError, and counts in `work` what it computes.
+        """
+
+
+class LocalController(Protocol):
+    """Follows one path."""
+
+    length_m: float
+
+    def command(
+        self,
+        pose: Pose2D,
+        velocity: tuple[float, float, float],
+        last: FloatArray,
+        costmap: Costmap,
+        most_m_s: float = np.inf,
+    ) -> Drive:
+        """The velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,)."""
+
+    def ahead(self, way_m: float) -> FloatArray:
+        """The path's poses (N, 3) from where the robot was last, so far on."""
+
+    def pose_after(self, way_m: float) -> Pose2D:
+        """The path's pose so far on from where the robot was last."""
+
+
+class ControllerComponent(Protocol):
+    """Makes a controller for each path; farther off than `lost_path_m` the path is given up."""
+
+    lost_path_m: float
+
+    def build(self, path: WayPath, footprint: Footprint, *, max_speed_m_s: float) -> LocalController:
+        """A controller that follows a path."""
+
+
+class ArmPlanner(Protocol):
+    """Plans and times motions of the arm. A path is an array (K, J) of joint angles."""
+
+    def path(
+        self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
+    ) -> FloatArray:
+        """A free path from start to goal. Raises PlanningError when an end is blocked or no path was found."""
+
+    def line(
+        self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
+    ) -> FloatArray:
+        """Joint path along which the hand moves straight to X_BH_to, with its orientation. Raises PlanningError."""
+
+    def timed(
+        self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
+    ) -> ArmTrajectory:
+        """Time a path from rest to rest, at its usual speed unless said; corners are rounded where `scene` is given."""
+
+
+class GraspPlanner(Protocol):
+    """Finds grasps and the motions to them."""
+
+    def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
+        """Grasps, the best first; empty when the object is too wide. p_BS is the shoulder."""
+
+    def plan(
+        self,
+        scene: ArmScene,
+        q_start_rad: FloatArray,
+        candidates: Sequence[GraspCandidate],
+        around: Surroundings,
+        arm_planner: ArmPlanner,
+        rng: np.random.Generator,
+    ) -> GraspPlan:
+        """The best candidate that can be carried out. Raises PlanningError when there is none."""
+
+
+class DetectorComponent(Hashable, Protocol):
+    """Loads a detector."""
+
+    def build(self) -> Detector:
+        """The detector, loaded. Raises ValueError when its model cannot be used."""
+
+
+@dataclass(frozen=True)
+class RobotStack:
+    """The components of one robot and the options of its skills by the skill's name. `names` are the components'."""
+
+    localiser: LocaliserComponent
+    costmap: CostmapComponent
+    planner: GlobalPlanner
+    controller: ControllerComponent
+    arm_planner: ArmPlanner
+    grasp_planner: GraspPlanner
+    detector: DetectorComponent
+    locomotion: Any
+    names: Mapping[str, str]
+    skills: Mapping[str, Any] = field(default_factory=dict)
+
+
+class StackError(ValueError):
+    """A stack cannot be used as it is written: where (keys from the top), what is wrong, and what would fit."""
+
+    def __init__(self, path: tuple[str | int, ...], message: str, hint: str = "") -> None:
+        super().__init__(f"{'.'.join(map(str, path)) or 'the stack'}: {message}")
+        self.path, self.message, self.hint = path, message, hint
+
+
+@cache
+def default_stack() -> RobotStack:
+    """The stack that comes with the project."""
+    import yaml
+
+    return stack_of(yaml.safe_load(DEFAULT_FILE.read_text(encoding="utf-8")))
+
+
+def stack_of(data: Any) -> RobotStack:
+    """The stack of a file's data; slots and skills that it leaves out are as in the default. Raises StackError."""
+    _known((), data, (*SLOTS, SKILLS))
+    chosen = {slot: data.get(slot, {}) for slot in SLOTS}
+    parts = {slot: _component(slot, given) for slot, given in chosen.items()}
+    skills = data.get(SKILLS) or {}
+    _known((SKILLS,), skills, sorted(skill_options()))
+    options = {name: _typed((SKILLS, name), skill_options()[name], given or {}) for name, given in skills.items()}
+    return RobotStack(
+        **{slot: part for slot, (_, part) in parts.items()},
+        names={slot: name for slot, (name, _) in parts.items()},
+        skills=options,
+    )
+
+
+def _component(slot: str, given: Any) -> tuple[str, Any]:
+    """The name and the component of one slot. Raises StackError."""
+    if not isinstance(given, Mapping):
+        raise StackError((slot,), "should be a mapping", f"write '{slot}: {{{USE}: NAME}}', then the options")
+    known = components(slot)
+    name = given.get(USE, next(iter(known), None))
+    if name not in known:
+        raise StackError((slot, USE), f"there is no {slot} {name!r}", f"known are {', '.join(known)}")
+    return name, _typed((slot,), known[name], {key: value for key, value in given.items() if key != USE})
+
+
+@cache
+def components(slot: str) -> Mapping[str, type]:
+    """The components that are installed for a slot by name, the default one first. Raises StackError."""
+    return MappingProxyType({name: _loaded(slot, name, SLOTS[slot]) for name in _names(slot)})
+
+
+def _names(slot: str) -> list[str]:
+    import yaml
+
+    first = yaml.safe_load(DEFAULT_FILE.read_text(encoding="utf-8"))[slot][USE]
+    return sorted({entry.name for entry in entry_points(group=SLOTS[slot])}, key=lambda name: (name != first, name))
+
+
+def _loaded(slot: str, name: str, group: str) -> type:
+    (entry, *_) = entry_points(group=group, name=name)
+    try:
+        component: type = entry.load()
+    except Exception as defect:
+        raise StackError((slot,), f"cannot load {entry.value} ({defect})", "uninstall that distribution") from defect
+    if not (dataclasses.is_dataclass(component) and component.__dataclass_params__.frozen):  # type: ignore[attr-defined]
+        raise StackError((slot,), f"{entry.value} is no frozen dataclass", "put @dataclass(frozen=True) above it")
+    return component
+
+
+@cache
+def skill_options() -> Mapping[str, type]:
+    """The options class of each installed skill that has one."""
+    skills = {entry.name: entry.load() for entry in entry_points(group=SKILL_GROUP)}
+    found = {name: skill.Options for name, skill in sorted(skills.items()) if hasattr(skill, "Options")}
+    return MappingProxyType({name: kind for name, kind in found.items() if dataclasses.fields(kind)})
+
+
+def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:
+    """Options of a dataclass from a file's data. Raises StackError."""
+    from pydantic import TypeAdapter, ValidationError
+
+    _check_keys(path, kind, given)
+    try:
+        return TypeAdapter(kind).validate_python(given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise StackError((*path, *first["loc"]), first["msg"], f"it reads {first['input']!r} now"[:120]) from error
+
+
+def _check_keys(path: tuple[str | int, ...], kind: type, given: Any) -> None:
+    """Refuse keys that are no fields, also in the dataclasses inside. Raises StackError."""
+    _known(path, given, [each.name for each in dataclasses.fields(kind)])
+    for name, inner in get_type_hints(kind).items():
+        if dataclasses.is_dataclass(inner) and isinstance(inner, type) and name in given:
+            _check_keys((*path, name), inner, given[name])
+
+
+def _known(path: tuple[str | int, ...], given: Any, known: Sequence[str]) -> None:
+    if not isinstance(given, Mapping):
+        raise StackError(path, "should be a mapping of keys to values", f"known keys are {', '.join(known)}")
+    for key in given:
+        if key not in known:
+            raise StackError((*path, key), f"unknown key {key!r}", f"known keys are {', '.join(known)}")
+
+
+def plain(stack: RobotStack) -> dict[str, Any]:
+    """The resolved stack with all options, as plain data that `stack_of` takes again."""
+    slots = {slot: {USE: stack.names[slot], **_plain(getattr(stack, slot))} for slot in SLOTS}
+    skills = {name: _plain(stack.skills.get(name) or kind()) for name, kind in skill_options().items()}
+    return {**slots, SKILLS: skills}
+
+
+def _plain(options: Any) -> dict[str, Any]:
+    from pydantic import TypeAdapter
+
+    data: dict[str, Any] = TypeAdapter(type(options)).dump_python(options, mode="json")
+    return data
+
+
+def stack_schema() -> dict[str, Any]:
+    """The JSON schema of stack files, for editors and the reference."""
+    defs: dict[str, Any] = {}
+    slots = {slot: {"anyOf": [_schema(kind, defs, name) for name, kind in components(slot).items()]} for slot in SLOTS}
+    skills = {name: _schema(kind, defs) for name, kind in skill_options().items()}
+    properties = {**slots, SKILLS: {"type": "object", "properties": skills, "additionalProperties": False}}
+    about = {"title": "RobotStack", "description": "The components of one robot, each with its options."}
+    return {**about, "type": "object", "properties": properties, "additionalProperties": False, "$defs": defs}
+
+
+def _schema(kind: type, defs: dict[str, Any], name: str | None = None) -> dict[str, Any]:
+    """The schema of one options class; what it refers to is added to `defs`."""
+    from pydantic import TypeAdapter
+
+    schema = TypeAdapter(kind).json_schema()
+    defs.update({inner: {**part, "additionalProperties": False} for inner, part in schema.pop("$defs", {}).items()})
+    chosen = {} if name is None else {USE: {"const": name, "description": "The component's name."}}
+    properties = {**chosen, **schema.get("properties", {})}
+    return {**schema, "properties": properties, "additionalProperties": False}

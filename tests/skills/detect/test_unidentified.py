@@ -1,0 +1,52 @@
+"""What is worth a closer look."""
+
+from dataclasses import replace
+
+import numpy as np
+from made_detections import detected_3d
+from pydrake.math import RigidTransform
+from table_scene import BLUE, COKE, GREY, TABLE, Can, scene
+
+from skills.detect.unidentified import unnamed
+from skills.perception.surface_segmentation import view_surface
+from skills.perception.tracker import Tracker
+
+BOX = Can(1.1, 0.25, 0.06, 0.10, GREY)
+
+
+def clusters(*things):
+    view = view_surface(scene(things), RigidTransform(), TABLE)
+    assert view is not None
+    return view.clusters
+
+
+def track_at(x, y, **seen):
+    tracker = Tracker(("coke", "beer", "hammer", "wrench", "cube"))
+    return tracker.update([replace(detected_3d(**seen), position_W=np.array([x, y, 0.8]))], lambda track: True)
+
+
+def test_what_has_a_track_is_named():
+    left = unnamed(clusters(COKE, BOX), track_at(COKE.x, COKE.y), ("coke",))
+    assert [round(one.shape.centre[1], 1) for one in left] == [0.2]
+
+
+def test_what_may_be_meant_though_it_is_likelier_something_else_is_not_named():
+    # what it was taken for, and how many clusters are left of the one that stands there
+    rows = [("coke", (), 0), ("beer", (("coke", 0.4),), 1), ("beer", (("hammer", 0.4),), 0), ("beer", (), 0)]
+    for name, rivals, expected in rows:
+        tracks = track_at(COKE.x, COKE.y, name=name, score=0.76, rivals=rivals)
+        assert len(unnamed(clusters(COKE), tracks, ("coke",))) == expected, (name, rivals)
+
+
+def test_what_is_too_large_or_small_for_the_class_is_passed_over():
+    tall = Can(1.1, 0.25, 0.06, 0.39, BLUE)
+    assert len(unnamed(clusters(COKE, tall), (), ("person",))) == 1
+    assert len(unnamed(clusters(COKE, tall), (), ("person", "coke"))) == 2
+
+
+def test_a_place_that_was_seen_twice_counts_once():
+    assert len(unnamed([*clusters(COKE), *clusters(COKE)], (), ("coke",))) == 1
+
+
+def test_an_empty_table_has_nothing_to_look_at():
+    assert unnamed(clusters(), (), ("coke",)) == []

@@ -1,6 +1,0 @@
-"""Lets the tests here import the stand-in robot that lies one folder up."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))

@@ -1,0 +1,56 @@
+"""How much of a surface was seen."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+from table_scene import GREY, TABLE, Can, scene
+
+from skills.api import Surface
+from skills.arm.poses import camera_pose
+from skills.perception.coverage import Coverage, SurfaceShares
+
+AWAY = Surface("shelf", ((-3.0, -0.5), (-2.0, -0.5), (-2.0, 0.5), (-3.0, 0.5)), 0.75)
+
+
+def shares(*images, surfaces=(TABLE,)):
+    coverage = Coverage(surfaces)
+    for image in images:
+        coverage.add(image, RigidTransform())
+    return coverage.shares()
+
+
+def test_an_empty_table_is_seen_as_far_as_the_picture_holds_it():
+    share = shares(scene([]))["table"]
+    assert share.seen > 0.7
+    assert share.hidden == 0.0
+    assert share.out_of_view == pytest.approx(1.0 - share.seen)
+
+
+def test_what_stands_on_it_hides_a_part():
+    assert shares(scene([Can(0.9, 0.0, 0.1, 0.3, GREY)]))["table"].hidden > 0.02
+
+
+def test_two_pictures_add_up():
+    left = scene([], X_WC=camera_pose(np.array([0.5, 0.0, 1.15]), np.array([1.1, 0.5, 0.75])))
+    right = scene([], X_WC=camera_pose(np.array([0.5, 0.0, 1.15]), np.array([1.1, -0.5, 0.75])))
+    assert shares(left, right)["table"].seen > shares(left)["table"].seen + 0.1
+
+
+def test_a_part_seen_once_stays_seen():
+    hidden = scene([Can(0.9, 0.0, 0.1, 0.3, GREY)])
+    assert shares(scene([]), hidden)["table"] == shares(scene([]))["table"]
+
+
+def test_without_depth_nothing_is_seen():
+    image = scene([])
+    image.depth_m[:] = np.nan
+    assert shares(image)["table"] == SurfaceShares(0.0, 0.0)
+
+
+def test_a_surface_elsewhere_is_out_of_view():
+    assert shares(scene([]), surfaces=(TABLE, AWAY))["shelf"].out_of_view == 1.0
+
+
+def test_the_shares_in_words():
+    assert str(SurfaceShares(0.8, 0.15)) == "80 % seen, 15 % hidden, 5 % out of view"
+    assert str(SurfaceShares(1.0, 0.0)) == "100 % seen"

@@ -1,0 +1,116 @@
+"""Detections with a place in the world."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
+from table_scene import BLUE, CAMERA, COKE, LENS, RED, TABLE, Can, scene, seen_as
+
+from skills.api import Detection, LocalisationEstimate, Surface
+from skills.detect.viewpoints import in_plain_view
+from skills.perception.detection_3d import depth_ahead_m, detections_3d, observation, place_covariance, surface_below
+
+SURE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
+COKE_W = np.array([COKE.x, COKE.y, 0.8075])
+
+
+def only(image, place=SURE, surfaces=(TABLE,), name="coke"):
+    (found,) = detections_3d(image, place, [seen_as(name, image)], surfaces)
+    return found
+
+
+def test_a_detection_gets_place_size_surface_and_colours():
+    found = only(scene([COKE]))
+    assert found.position_W == pytest.approx(COKE_W, abs=0.006)
+    assert (found.surface, found.class_name, found.stamp_s) == ("table", "coke", 1.5)
+    assert np.all(np.median(found.colours, axis=0) == RED)
+
+
+def test_the_place_follows_the_localisation():
+    turned = RigidTransform(RollPitchYaw(0.0, 0.0, 0.5), [1.0, 2.0, 0.0])
+    place = LocalisationEstimate(0.0, turned, np.zeros((3, 3)), True)
+    found = only(scene([COKE]), place, ())
+    assert found.position_W == pytest.approx(turned @ COKE_W, abs=0.006)
+    assert found.yaw_rad == pytest.approx(0.5)
+
+
+def test_the_localisations_uncertainty_is_added_to_the_place_in_the_world():
+    unsure = LocalisationEstimate(0.0, RigidTransform(), np.diag([0.03**2, 0.01**2, 0.0]), True)
+    found = only(scene([COKE]), unsure)
+    added = found.place_covariance - found.covariance
+    assert np.diag(added) == pytest.approx([0.03**2, 0.01**2, 0.0])
+
+
+def test_an_uncertain_heading_moves_what_is_far_sideways():
+    added = place_covariance(np.array([2.0, 0.0, 0.8]), np.zeros(3), np.diag([0.0, 0.0, 0.01**2]))
+    assert np.sqrt(np.diag(added)) == pytest.approx([0.0, 0.02, 0.0])
+
+
+def test_a_detection_without_depth_or_of_a_class_without_form_is_left_out():
+    image = scene([COKE])
+    image.depth_m[:] = 0.0
+    assert detections_3d(image, SURE, [seen_as("coke", image)], [TABLE]) == ()
+    assert detections_3d(scene([COKE]), SURE, [Detection("unicorn", 0.9, (1.0, 1.0, 9.0, 9.0))], [TABLE]) == ()
+
+
+# class -> whether it can span 0.6 m, where the longest are (class_forms.yaml) 0.30, 0.36, 0.60 and 1.00 m long
+@pytest.mark.parametrize(("name", "possible"), [("coke", False), ("beer", False), ("wrench", True), ("hammer", True)])
+def test_what_spans_far_more_than_such_things_do_is_left_out(name, possible):
+    image = scene([COKE])
+    u0, v0, u1, v1 = seen_as("coke", image).box
+    half_px = 0.3 * LENS.fx / float(np.linalg.norm(COKE_W - CAMERA))
+    middle = 0.5 * (u0 + u1)
+    wide = Detection(name, 0.9, (middle - half_px, v0, middle + half_px, v1))
+    assert bool(detections_3d(image, SURE, [wide], [TABLE])) is possible
+
+
+SHELF = Surface("shelf", TABLE.polygon_W, 0.40)
+
+
+@pytest.mark.parametrize(
+    ("p_W", "base_m", "name"),
+    [
+        ((1.0, 0.0, 0.8), 0.76, "table"),
+        ((1.0, 0.0, 0.5), 0.42, "shelf"),
+        ((1.0, 0.0, 0.6), 0.60, None),
+        ((0.78, 0.0, 0.8), 0.75, "table"),
+        ((0.5, 0.0, 0.8), 0.75, None),
+        ((0.5, 0.0, 0.1), 0.02, "floor"),
+    ],
+)
+def test_what_a_thing_rests_on(p_W, base_m, name):
+    assert surface_below(np.array(p_W), base_m, (TABLE, SHELF)) == name
+
+
+def test_an_observation_tells_what_was_seen():
+    seen = observation(only(scene([COKE])), ("red",))
+    assert str(seen.thing) == "red coke"
+    assert seen.position_W == pytest.approx(tuple(COKE_W), abs=0.006)
+    assert (seen.score, seen.surface) == (0.9, "table")
+
+
+def test_depth_ahead_is_that_of_the_points_and_of_what_is_there():
+    image = scene([COKE], noise_m=0.0)
+    points = np.array([[1.2, 0.3, 0.75], [COKE.x + 0.2, COKE.y, 0.76], [-1.0, 0.0, 0.75]])
+    depth, seen = depth_ahead_m(image, RigidTransform(), points)
+    assert depth[0] == pytest.approx(seen[0], abs=0.005)
+    assert np.isnan(depth[2])
+    assert np.isnan(seen[2])
+
+
+def test_a_thing_in_plain_view_should_be_seen_and_one_behind_another_should_not():
+    tall = Can(COKE.x, COKE.y, 0.05, 0.3, BLUE)
+    image = scene([tall])
+    assert in_plain_view(image, RigidTransform(), np.array([1.2, 0.3, 0.8]))
+    assert not in_plain_view(image, RigidTransform(), np.array([COKE.x + 0.15, COKE.y - 0.02, 0.8]))
+    assert not in_plain_view(image, RigidTransform(), np.array([-1.0, 0.0, 0.8]))
+
+
+def test_a_long_thing_beside_another_is_not_taken_for_it():
+    disk = Can(1.02, 0.16, 0.06, 0.012, RED)  # as flat as a wrench
+    before = Can(0.94, 0.115, 0.03, 0.10, BLUE)
+    image = scene([disk, before])
+    found = [seen_as("wrench", image), seen_as("coke", image, BLUE)]
+    wrench, coke = detections_3d(image, SURE, found, [TABLE])
+    assert wrench.position_W[:2] == pytest.approx([disk.x, disk.y], abs=0.03)
+    assert wrench.position_W[2] < TABLE.height_m + 0.02
+    assert coke.position_W[:2] == pytest.approx([before.x, before.y], abs=0.01)

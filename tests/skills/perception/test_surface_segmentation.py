@@ -1,0 +1,117 @@
+"""What is seen of surfaces in analytic scenes."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+from table_scene import BLUE, CAMERA, COKE, RED, TABLE, Can, scene, seen_as
+
+from skills.api import Detection, LocalisationEstimate, Surface
+from skills.perception.detection_3d import detections_3d
+from skills.perception.surface_segmentation import cluster_of, parted, view_surface
+from skills.robot import Image
+
+PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
+
+
+def viewed(image, X_WO=None, surface=TABLE):
+    view = view_surface(image, X_WO or RigidTransform(), surface)
+    assert view is not None
+    return view
+
+
+def test_a_can_is_one_cluster_where_it_stands():
+    (cluster,) = viewed(scene([COKE])).clusters
+    assert cluster.shape.round
+    assert cluster.shape.centre == pytest.approx((0.95, -0.1), abs=0.008)
+    assert cluster.shape.length_m == pytest.approx(0.066, abs=0.01)
+    assert cluster.shape.height_m == pytest.approx(0.115, abs=0.008)
+    assert cluster.base_m == pytest.approx(0.75, abs=0.004)
+
+
+def test_the_box_in_the_picture_holds_the_can():
+    image = scene([COKE])
+    (cluster,) = viewed(image).clusters
+    u0, v0, u1, v1 = cluster.box
+    red = np.argwhere(np.all(image.colour == RED, axis=-1))
+    assert abs(u0 - red[:, 1].min()) <= 3
+    assert abs(u1 - red[:, 1].max()) <= 3
+    assert abs(v0 - red[:, 0].min()) <= 3
+    assert 0 <= red[:, 0].max() - v1 <= 6
+
+
+def test_two_cans_are_two_clusters():
+    image = scene([COKE, Can(1.1, 0.2, 0.033, 0.115, RED)])
+    assert sorted(round(cluster.shape.centre[1], 1) for cluster in viewed(image).clusters) == [-0.1, 0.2]
+
+
+def test_a_localisation_error_shifts_the_can_as_a_whole():
+    wrong = RigidTransform([0.02, -0.02, 0.02])
+    (cluster,) = viewed(scene([COKE]), X_WO=wrong).clusters
+    assert cluster.shape.centre == pytest.approx((0.97, -0.12), abs=0.008)
+    assert cluster.base_m == pytest.approx(0.77, abs=0.004)
+
+
+def test_an_empty_table_has_no_clusters():
+    assert viewed(scene([])).clusters == ()
+
+
+def test_more_depth_noise_gives_no_ghosts():
+    assert viewed(scene([], noise_m=0.006)).clusters == ()
+
+
+def test_a_surface_out_of_the_picture_is_not_judged():
+    away = Surface("shelf", ((-3.0, -0.5), (-2.0, -0.5), (-2.0, 0.5), (-3.0, 0.5)), 0.75)
+    assert view_surface(scene([COKE]), RigidTransform(), away) is None
+
+
+def test_a_grey_picture_has_clusters_without_colour():
+    image = scene([COKE])
+    grey = Image(**{**image.__dict__, "colour": None})
+    (cluster,) = viewed(grey).clusters
+    assert np.ptp(cluster.points.colours, axis=1).max() == 0
+
+
+def test_the_cluster_of_a_detection_is_the_one_in_its_box():
+    blue = Can(0.95, 0.12, 0.033, 0.115, BLUE)
+    image = scene([COKE, blue])
+    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
+    cluster = cluster_of(viewed(image).clusters, detected)
+    assert cluster.shape.centre == pytest.approx((blue.x, blue.y), abs=0.008)
+
+
+def test_a_detection_beside_all_clusters_has_none():
+    image = scene([COKE, Can(0.95, 0.12, 0.033, 0.115, BLUE)])
+    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
+    only_red = tuple(c for c in viewed(image).clusters if c.shape.centre[1] < 0.0)
+    assert cluster_of(only_red, detected) is None
+
+
+def test_a_thing_that_touches_another_is_cut_out_of_their_cluster():
+    beside = Can(COKE.x, COKE.y + 0.068, 0.033, 0.115, BLUE)
+    image = scene([COKE, beside])
+    view = viewed(image)
+    assert len(view.clusters) == 1
+    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image)], [TABLE])
+    alone = parted(view, detected)
+    assert len(alone.clusters) == 2
+    assert cluster_of(alone.clusters, detected).shape.centre == pytest.approx((COKE.x, COKE.y), abs=0.012)
+
+
+def test_a_thing_for_itself_stays_whole():
+    image = scene([COKE])
+    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image)], [TABLE])
+    view = viewed(image)
+    assert parted(view, detected) is view
+
+
+def test_a_box_that_leaves_out_the_top_of_a_thing_does_not_part_it():
+    image = scene([Can(0.95, -0.1, 0.033, 0.24, RED)])
+    u0, v0, u1, v1 = seen_as("beer", image).box
+    low = Detection("beer", 0.8, (u0, v0 + 0.4 * (v1 - v0), u1, v1))
+    (detected,) = detections_3d(image, PLACE, [low], [TABLE])
+    view = viewed(image)
+    assert parted(view, detected) is view
+
+
+def test_the_camera_is_where_the_scene_has_it():
+    assert scene([]).frames.pose("hand_camera").translation() == pytest.approx(CAMERA)

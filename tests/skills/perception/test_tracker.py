@@ -1,0 +1,198 @@
+"""Tracks over several views."""
+
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+from made_detections import detected_3d
+
+from skills.perception.tracker import Tracker
+
+CLASSES = ("beer", "coke", "hammer")
+
+
+def tracker_of(*pictures, in_view=True):
+    """A tracker that has taken in pictures, each a list of detections."""
+    tracker = Tracker(CLASSES)
+    for seen in pictures:
+        tracker.update(seen, lambda track: in_view)
+    return tracker
+
+
+LEFT, RIGHT = (0.0, 0.1, 1.0), (0.0, -0.1, 1.0)
+
+
+def test_two_views_from_different_places_confirm_a_track():
+    (track,) = tracker_of([detected_3d(eye=LEFT)], [detected_3d(1.01, eye=RIGHT)]).snapshot()
+    assert track.confirmed
+    assert (track.views, track.class_name) == (2, "coke")
+
+
+def test_two_views_from_one_place_do_not():
+    (track,) = tracker_of([detected_3d(eye=LEFT)], [detected_3d(eye=LEFT)]).snapshot()
+    assert (track.views, track.confirmed) == (1, False)
+
+
+def test_places_are_fused_by_how_sure_they_are():
+    (track,) = tracker_of([detected_3d(1.00, sigma=0.01)], [detected_3d(1.04, sigma=0.03)]).snapshot()
+    assert 1.0 < track.position_W[0] < 1.015
+    assert track.covariance[0, 0] < 0.01**2 + 0.012**2
+
+
+def test_more_views_make_a_place_surer():
+    sigmas = [tracker_of(*[[detected_3d()]] * count).snapshot()[0].covariance.trace() for count in (1, 2, 4, 8)]
+    assert sigmas == sorted(sigmas, reverse=True)
+
+
+def test_fused_places_err_as_their_covariance_says():
+    rng = np.random.default_rng(5)
+    errors = []
+    for _ in range(300):
+        seen = [[detected_3d(1.0 + rng.normal(0, 0.02), rng.normal(0, 0.02), sigma=0.02)] for _ in range(4)]
+        (track, *_) = tracker_of(*seen).snapshot()
+        off = track.position_W[:2] - [1.0, 0.0]
+        errors.append(off @ np.linalg.solve(track.covariance[:2, :2], off))
+    assert 0.8 < np.mean(errors) < 2.2  # two for two dimensions, less for the jitter that is allowed for
+
+
+def test_what_is_far_off_is_another_thing():
+    assert len(tracker_of([detected_3d(1.0)], [detected_3d(1.3)]).snapshot()) == 2
+
+
+def test_two_things_in_one_picture_are_never_one_track():
+    close = [detected_3d(1.0), detected_3d(1.03)]
+    assert len(tracker_of(close, close).snapshot()) == 2
+
+
+def test_one_thing_that_is_detected_as_two_is_the_surer_one():
+    both = [detected_3d(name="beer", score=0.55), detected_3d(1.01, name="coke", score=0.8)]
+    (track,) = tracker_of(both, both).snapshot()
+    assert track.class_name == "coke"
+
+
+def test_a_thing_of_another_class_is_another_thing_unless_it_is_at_the_very_place():
+    sure = [[detected_3d()], [detected_3d()], [detected_3d()]]
+    assert len(tracker_of(*sure, [detected_3d(1.04, name="hammer")]).snapshot()) == 2
+    assert len(tracker_of(*sure, [detected_3d(1.005, name="hammer")]).snapshot()) == 1
+
+
+def test_class_belief_follows_the_scores_of_all_views():
+    (track,) = tracker_of(
+        [detected_3d(score=0.55, name="beer")], [detected_3d(score=0.9)], [detected_3d(score=0.9)]
+    ).snapshot()
+    assert track.class_name == "coke"
+    assert track.classes["coke"] > 0.9
+    assert sum(track.classes.values()) == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_class_that_was_only_likely_at_first_may_win():
+    # wrench-like from afar, 0.6 to 0.35; plainly a hammer from near
+    far = detected_3d(name="coke", score=0.6, rivals=(("hammer", 0.35),))
+    (track,) = tracker_of([far]).snapshot()
+    assert track.class_name == "coke"
+    assert track.classes["hammer"] > track.classes["beer"]
+    (track,) = tracker_of([far], [detected_3d(name="hammer", score=0.9)]).snapshot()
+    assert track.class_name == "hammer"
+    assert track.classes["hammer"] > 0.8
+
+
+def test_what_should_be_seen_again_and_is_not_loses_belief_and_is_forgotten():
+    # odds 9 of a score of 0.9, times 0.15 / 0.88 for each picture that should show it
+    beliefs = [t.belief for n in range(3) for t in tracker_of([detected_3d(score=0.9)], *[[]] * n).snapshot()]
+    assert beliefs == pytest.approx([0.9, 0.605, 0.207], abs=0.001)
+    assert tracker_of([detected_3d(score=0.9)], *[[]] * 3).snapshot() == ()
+
+
+@pytest.mark.parametrize("score", [0.5, 0.7, 0.9])
+def test_what_was_seen_once_is_there_as_likely_as_its_score_says(score):
+    assert tracker_of([detected_3d(score=score)]).snapshot()[0].belief == pytest.approx(score)
+
+
+def test_what_was_seen_very_often_is_never_past_doubt():
+    (track,) = tracker_of(*[[detected_3d(score=0.97)]] * 40).snapshot()
+    assert track.belief == 0.999
+    (track,) = tracker_of(*[[detected_3d(score=0.97)]] * 40, [], []).snapshot()
+    assert track.belief < 0.97
+
+
+def test_what_is_out_of_view_keeps_its_belief():
+    (track,) = tracker_of([detected_3d()], [], [], in_view=False).snapshot()
+    assert (track.belief, track.missed) == (0.9, 0)
+
+
+def test_what_was_taken_for_something_else_when_last_seen_is_not_confirmed():
+    # twice surely a beer, then a coke: still likelier a beer
+    seen = [[detected_3d(name="beer", eye=LEFT)], [detected_3d(name="beer", eye=RIGHT)]]
+    doubt = [detected_3d(name="coke", score=0.55, eye=LEFT)]
+    (track,) = tracker_of(*seen, doubt).snapshot()
+    assert (track.class_name, track.confirmed) == ("beer", False)
+    (track,) = tracker_of(*seen, doubt, seen[0]).snapshot()
+    assert (track.class_name, track.confirmed) == ("beer", True)
+
+
+def test_a_track_that_was_confirmed_and_then_missed_is_no_longer_confirmed():
+    seen = [[detected_3d(eye=LEFT)], [detected_3d(eye=RIGHT)]]
+    assert tracker_of(*seen).snapshot()[0].confirmed
+    assert not tracker_of(*seen, [], []).snapshot()[0].confirmed
+
+
+def test_the_latest_and_the_surest_detection_are_kept():
+    (track,) = tracker_of([detected_3d(score=0.95, stamp=1.0)], [detected_3d(score=0.7, stamp=2.0)]).snapshot()
+    assert (track.last_seen_s, track.best.stamp_s) == (2.0, 1.0)
+
+
+def test_a_snapshot_does_not_change_afterwards():
+    tracker = tracker_of([detected_3d()])
+    before = tracker.snapshot()
+    tracker.update([detected_3d(1.01)], lambda track: True)
+    assert before[0].position_W[0] == 1.0
+    with pytest.raises(FrozenInstanceError):
+        before[0].belief = 1.0
+
+
+def test_what_is_seen_faintly_begins_no_track():
+    assert tracker_of([detected_3d(score=0.45)]).snapshot() == ()
+
+
+# scores           odds: s / (1 - s), then times the root of that over those of 0.25    belief  views  confirmed
+# 0.5, 0.3         1 x 1.134                                                           0.53    2      no
+# 0.5, 0.4         1 x 1.414                                                           0.59    2      no
+# 0.5, 0.5         1 x 1.732                                                           0.63    2      yes
+# 0.6, 0.4         1.5 x 1.414                                                         0.68    2      yes
+@pytest.mark.parametrize(
+    ("scores", "belief", "confirmed"),
+    [((0.5, 0.3), 0.53, False), ((0.5, 0.4), 0.59, False), ((0.5, 0.5), 0.63, True), ((0.6, 0.4), 0.68, True)],
+)
+def test_a_faint_detection_supports_a_track_a_little(scores, belief, confirmed):
+    pictures = [[detected_3d(score=score, eye=(0.0, 0.1 * k, 1.0))] for k, score in enumerate(scores)]
+    (track,) = tracker_of(*pictures).snapshot()
+    assert track.belief == pytest.approx(belief, abs=0.005)
+    assert (track.views, track.confirmed) == (len(scores), confirmed)
+
+
+# the faint detection   seen last at   told
+# of the same class    2 s            what was seen surely
+# of another           1 s            the same
+@pytest.mark.parametrize(("name", "last_seen_s"), [("coke", 2.0), ("beer", 1.0)])
+def test_a_faint_detection_tells_only_that_the_thing_is_still_there(name, last_seen_s):
+    seen = [detected_3d(score=0.8, stamp=1.0)], [detected_3d(name=name, score=0.4, stamp=2.0)]
+    (track,) = tracker_of(*seen).snapshot()
+    assert (track.last_seen_s, track.missed) == (last_seen_s, 0)
+    assert (track.latest.class_name, track.latest.detection.score) == ("coke", 0.8)
+
+
+def test_a_faint_detection_takes_no_track_from_a_sure_one():
+    (track,) = tracker_of(
+        [detected_3d(score=0.8)], [detected_3d(1.0, score=0.4), detected_3d(1.02, score=0.7)]
+    ).snapshot()
+    assert track.latest.detection.score == 0.7
+
+
+def test_the_order_of_the_detections_of_a_picture_does_not_matter():
+    both = [detected_3d(1.0), detected_3d(1.2)]
+    places = [sorted(t.position_W[0] for t in tracker_of(both, seen).snapshot()) for seen in (both, both[::-1])]
+    assert places[0] == pytest.approx(places[1])
+
+
+def test_an_empty_book_has_no_tracks():
+    assert tracker_of([], []).snapshot() == ()

@@ -1,0 +1,42 @@
+"""Every skill runs on a robot that is no Spot, with its suite."""
+
+from pathlib import Path
+
+import pytest
+from wheeled_toy import TOY
+
+from executive.testing.skill_test import load_skill_tests
+from executive.testing.suite import PARTS, SuiteCase
+from executive.testing.trial import carry_out, scripted, scripted_maker
+from executive.tree.registry import built_in_skills
+from skills.testing.fault_kinds import STANDARD_FAULTS
+
+SKILLS = built_in_skills()
+
+
+def well(name):
+    """The tests of a skill in which all goes well, with their indices."""
+    path = Path(__file__).parent / name / f"{name}.skilltest.yaml"
+    file = load_skill_tests(path, SKILLS, [*STANDARD_FAULTS])
+    return file, [n for n, test in enumerate(file.tests) if test.expect.outcome == "success" and not test.faults]
+
+
+@pytest.mark.parametrize("name", sorted(SKILLS))
+def test_what_goes_well_with_spot_goes_well_with_the_toy(name):
+    file, indices = well(name)
+    assert indices
+    trials = [carry_out(file, n, SKILLS[name], {"scripted": scripted_maker(TOY)}) for n in indices]
+    assert [trial.report() for trial in trials if trial.differences] == []
+
+
+@pytest.mark.parametrize("part", sorted(PARTS))
+@pytest.mark.parametrize("name", sorted(SKILLS))
+def test_the_suite_of_every_skill(name, part):
+    file, (n, *_) = well(name)
+    test = file.tests[n]
+    case = SuiteCase(
+        SKILLS[name],
+        file.inputs(n, SKILLS[name]),
+        lambda: scripted(TOY, test.robot or file.robot, test.world or file.world),
+    )
+    assert list(PARTS[part](case)) == []

@@ -9,15 +9,14 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.mission.command import Command, Task, Thing
+from executive.mission.command import START, Command, Task, Thing
 from executive.mission.knowledge import Knowledge, Pose
 from executive.run.outcome import RobotResult
 from executive.run.snapshot import Snapshot
 from executive.tree.behaviours.board import Constant
 from executive.tree.compiler import CompiledTree, StepPart
-from executive.tree.compiling.plans import SkillPlan
 from executive.tree.compiling.search import surfaces_to_search
-from executive.tree.compiling.steps import START
+from executive.tree.node import NodeSpec
 from plant.referee import Promise, PromiseKind, Region
 from skills.robot import Pose2D
 
@@ -68,9 +67,9 @@ def _below(path_id: str, base: str) -> bool:
     return path_id == base or path_id.startswith(f"{base}/")
 
 
-def _driven(skill: SkillPlan, robot: str) -> Iterator[Promise]:
+def _driven(skill: NodeSpec, robot: str) -> Iterator[Promise]:
     """The robot where a drive on its own was to lead."""
-    goal = dict(skill.inputs).get("goal")
+    goal = skill.options["inputs"].get("goal")
     if skill.name == NAVIGATE and isinstance(goal, Constant) and isinstance(goal.value, Pose2D):
         pose = Pose(x=goal.value.x_m, y=goal.value.y_m, yaw=goal.value.yaw_rad)
         name = f"({pose.x:.2f}, {pose.y:.2f})"

@@ -13,7 +13,7 @@ from executive.cli.mission_run import run_request
 from executive.cli.shown import control_for, show_files, show_run
 from executive.mission.errors import InputError
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.tree.compiling.workshop import slug
+from executive.tree.compiling.builder import slug
 
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
 

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["InputError", "Problems", "did_you_mean", "listing"]
+__all__ = ["InputError", "Problems", "SourceLine", "did_you_mean", "listing"]
+
+
+@dataclass(frozen=True)
+class SourceLine:
+    """A line (from 1) of a file that the user wrote."""
+
+    file: Path
+    line: int
 
 
 class InputError(Exception):
@@ -31,6 +40,13 @@ class InputError(Exception):
         self.file = None if file is None else Path(file)
         self.line = line
         super().__init__(str(self))
+
+    @classmethod
+    def at(cls, source: SourceLine | None, message: str, *, mend: str = "") -> InputError:
+        """An error in a line, where that is known."""
+        if source is None:
+            return cls(message, mend=mend)
+        return cls(message, mend=mend, file=source.file, line=source.line)
 
     def __str__(self) -> str:
         """One line: "file:line: what; mend"."""

@@ -24,7 +24,7 @@ from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.workshop import slug
+from executive.tree.compiling.builder import slug
 from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
 from skills.detection import NO_DETECTOR
 from skills.robot import Clock, LeaseError, Robot

@@ -19,7 +19,7 @@ from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.workshop import slug, start_key
+from executive.tree.compiling.builder import slug, start_key
 from skills.api import Cause
 from skills.robot import Pose2D
 

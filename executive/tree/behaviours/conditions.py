@@ -5,12 +5,12 @@ A condition answers with None when it holds, `Failed` when it does not, and `Wai
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from executive.mission.file.model import StaleData
 from executive.tree.behaviours.context import RunContext
 from skills.api import Cause, Failed
 from skills.robot import Pose2D
@@ -34,14 +34,6 @@ class Condition(Protocol):
 
     def violated(self, context: RunContext) -> Verdict:
         """What speaks against going on, None when nothing does. Called before each tick of the subtree."""
-
-
-class StaleData(enum.Enum):
-    """What a condition makes of a reading that is older than it may be."""
-
-    WAIT = "wait"  # stand still until there is a new one, and fail when the patience is over
-    FAIL = "fail"  # count it as violated at once
-    ACCEPT = "accept"  # judge by what there is
 
 
 @dataclass(frozen=True)

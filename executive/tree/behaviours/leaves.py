@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -10,8 +12,9 @@ from py_trees.common import Status
 
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import Explained
+from executive.tree.node import NodeKind
 from skills.api import Cause, Surface
-from skills.robot import Clock
+from skills.robot import Clock, Pose2D
 
 
 class RememberPose(Explained, Behaviour):
@@ -129,3 +132,14 @@ def distance_to_polygon_m(point: tuple[float, float], polygon: Sequence[tuple[fl
 
 def _xy(point: tuple[float, float]) -> str:
     return f"({point[0]:.2f}, {point[1]:.2f}) m"
+
+
+KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
+    {
+        "remember": NodeKind(RememberPose, ("context",), writes=lambda options: {options["key"]: Pose2D}),
+        "pause": NodeKind(Pause, ("clock",)),
+        "surfaces near": NodeKind(
+            SurfacesNear, ("context",), writes=lambda options: {options["key"]: tuple[Surface, ...]}
+        ),
+    }
+)

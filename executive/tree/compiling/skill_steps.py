@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from executive.mission.errors import did_you_mean, listing
+from executive.mission.errors import SourceLine, did_you_mean, listing
 from executive.mission.file.model import SkillCall
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
-from executive.tree.compiling.plans import SkillPlan, Source
-from executive.tree.compiling.workshop import Registry, slug
+from executive.tree.compiling.builder import Registry, skill_spec, slug
+from executive.tree.node import NodeSpec
 from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_value
 from executive.tree.types import field_types
 from skills.api import Skill
@@ -21,12 +21,12 @@ __all__ = ["skill_plan"]
 def skill_plan(
     call: SkillCall,
     path_id: str,
-    source: Source | None,
+    source: SourceLine | None,
     *,
     knowledge: Knowledge,
     registry: Registry,
     names: dict[str, str],
-) -> SkillPlan:
+) -> NodeSpec:
     """The leaf of a skill step. `names` are the outputs of earlier steps and their blackboard keys; its own are added.
 
     Raises:
@@ -36,15 +36,7 @@ def skill_plan(
     inputs = _inputs(call, skill, knowledge, names)
     outputs = {port: f"{path_id}/{slug(port)}" for port in _given_ports(call, skill)}
     names.update({call.gives[port]: key for port, key in outputs.items()})
-    return SkillPlan(
-        path_id=path_id,
-        name=call.skill,
-        source=source,
-        skill=skill,
-        inputs=tuple(inputs.items()),
-        outputs=tuple(outputs.items()),
-        limit_s=skill.default_timeout_s,
-    )
+    return skill_spec(skill, call.skill, path_id, source, inputs, outputs)
 
 
 def _registered(call: SkillCall, registry: Registry) -> type[Skill[Any]]:

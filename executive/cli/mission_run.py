@@ -87,7 +87,7 @@ def run_request(
     finally:
         log.close()
     tree = result.trees.get(tree.robot_name, tree)
-    verdict = judge(simulation, tree, request.knowledge, result.worst)
+    verdict = judge(simulation, tree, result.worst)
     view = node_view(tree.root, result.worst.states)
     (out / "tree.svg").write_text(to_svg(folded_to(view, DRAWN_NODES), title=request.mission.name), encoding="utf-8")
     draw_answer(souvenirs, out)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
+
+from py_trees.common import Status
 
 from executive.mission.command import START, Command, Task
 from executive.mission.errors import InputError, Problems, SourceLine
 from executive.mission.file.model import Mission, MissionStep, StepPolicy
-from executive.mission.knowledge import Knowledge
+from executive.mission.goal import GoalCondition, command_goal, drive_goal
+from executive.mission.knowledge import Knowledge, Pose
+from executive.tree.behaviours.board import Constant
 from executive.tree.compiling.builder import PlanBuilder, Registry, slug, start_key
 from executive.tree.compiling.policies import PolicyFrame, needs_way_back, under_policy
 from executive.tree.compiling.search import surfaces_elsewhere
@@ -17,9 +21,11 @@ from executive.tree.compiling.skill_steps import skill_plan
 from executive.tree.compiling.steps import step_plan
 from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
 from executive.tree.node import NodeSpec
+from skills.robot import Pose2D
 
 __all__ = ["Assembled", "StepPart", "assemble", "step_name"]
 
+NAVIGATE: Final = "navigate"
 NO_POLICY: Final = StepPolicy()
 _SKIPPING: Final = frozenset({"skip", "ask"})
 
@@ -28,15 +34,20 @@ _SKIPPING: Final = frozenset({"skip", "ask"})
 class StepPart:
     """A part of a mission with something to show for it: a command, or a skill on its own.
 
-    `path_id` is that of its subtree. `excused` are pairs of path ids: when the first succeeded although the second
-    failed, the part was skipped. `elsewhere` are the surfaces on which a thing may be found that is not in its place.
+    `path_id` is that of its subtree, `goal` what is to be so when it is done; of skills on their own only a drive to a
+    fixed pose has one. `excused` are pairs of path ids: when the first succeeded although the second failed, the part
+    was skipped.
     """
 
     path_id: str
     command: Command | None = None
-    skill: NodeSpec | None = None
+    goal: GoalCondition | None = None
     excused: tuple[tuple[str, str], ...] = ()
-    elsewhere: tuple[str, ...] = ()
+
+    def was_skipped(self, statuses: Mapping[str, Status]) -> bool:
+        """Whether a node above let its failure pass; `statuses` are those at the end, by path id."""
+        ends = ((statuses.get(above), statuses.get(below)) for above, below in self.excused)
+        return (Status.SUCCESS, Status.FAILURE) in ends
 
 
 @dataclass(frozen=True)
@@ -129,7 +140,9 @@ class _Assembler:
                 if item.command is not None and following is not None and are_trips(item.command, following):
                     done = item.number + 1
                     trips = trips_plan(self._command_builder(item, base), following)
-                    parts = tuple(StepPart(trips.path_id, command) for command in (item.command, following))
+                    commands = (item.command, following)
+                    goals = (command_goal(command, self.knowledge) for command in commands)
+                    parts = tuple(map(StepPart, (trips.path_id,) * 2, commands, goals))
                     made += Assembled((trips,), parts)
                 else:
                     made += self._item(item, following, base)
@@ -151,11 +164,12 @@ class _Assembler:
                 registry=self.registry,
                 names=self.names,
             )
-            return Assembled((leaf,), (StepPart(path_id, skill=leaf),))
+            return Assembled((leaf,), (StepPart(path_id, goal=_drive_goal(leaf)),))
         builder = replace(self._command_builder(item, base), avoided=_goals(following, self.knowledge))
         refuse_several(builder)
-        part = StepPart(builder.path_id, builder.command, elsewhere=_elsewhere(builder))
-        return Assembled((step_plan(builder),), (part,))
+        node = step_plan(builder)
+        goal = command_goal(builder.command, self.knowledge, _elsewhere(builder))
+        return Assembled((node,), (StepPart(builder.path_id, builder.command, goal),))
 
     def _used(self, step: MissionStep, used: Mission, base: str) -> Assembled:
         """The subtree of a mission that a step uses."""
@@ -206,6 +220,14 @@ def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
         return ()
     name = knowledge.thing(command.object.name) or command.object.name
     return surfaces_elsewhere(knowledge, name, builder.place(command.goal), builder.avoided)
+
+
+def _drive_goal(leaf: NodeSpec) -> GoalCondition | None:
+    """Where a drive on its own is to lead."""
+    pose = leaf.options["inputs"].get("goal")
+    if leaf.name != NAVIGATE or not isinstance(pose, Constant) or not isinstance(pose.value, Pose2D):
+        return None
+    return drive_goal(Pose(x=pose.value.x_m, y=pose.value.y_m, yaw=pose.value.yaw_rad))
 
 
 def _under(body: Assembled, policy: StepPolicy, frame: PolicyFrame) -> Assembled:

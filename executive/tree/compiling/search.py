@@ -8,6 +8,7 @@ from typing import Final
 
 from executive.mission.command import Thing
 from executive.mission.errors import listing
+from executive.mission.goal import surfaces_to_search
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.board import FromBoard, SurfaceOfSighting, beside
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
@@ -21,16 +22,6 @@ NO_PORTS: Final[Ports] = MappingProxyType({})
 MOST_ELSEWHERE: Final = 3
 MOST_ASIDE: Final = 2
 ASIDE_M: Final = 0.45
-
-
-def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
-    """The surfaces to look at, those where the thing usually is first; without a place, all that there are.
-
-    A usual place may be a room: then its surfaces count as usual.
-    """
-    inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
-    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
-    return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
 
 
 def surfaces_elsewhere(

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Final
 
 from executive.mission.command import START, Command, Task
+from executive.mission.goal import surfaces_to_search
 from executive.tree.compiling.builder import PlanBuilder
-from executive.tree.compiling.search import surfaces_to_search
 from executive.tree.compiling.steps import carry_plan, grasp_plan
 from executive.tree.node import NodeSpec
 

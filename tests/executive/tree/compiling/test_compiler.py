@@ -4,10 +4,10 @@ import pytest
 
 from executive.mission.command import parse_command
 from executive.mission.errors import InputError, SourceLine
+from executive.mission.goal import surfaces_to_search
 from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import Step, compile_commands
-from executive.tree.compiling.search import surfaces_to_search
 from executive.tree.estimate import expected
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
 from skills.robot import Pose2D

@@ -2,7 +2,7 @@
 
 import pytest
 
-from executive.cli.promises import promises_of
+from executive.cli.goal_conditions import promises_of
 from executive.mission.errors import InputError
 from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import Constant
@@ -42,7 +42,7 @@ def test_each_trip_grasps_and_puts_down(compiled, run_tree, script, robot):
 
 def test_the_promise_is_one_of_two_things(compiled, run_tree, knowledge, script):
     tree = compiled(*TWO)
-    grasped, placed = promises_of(tree, knowledge=knowledge, result=run_tree(tree).robots[0])
+    grasped, placed = promises_of(tree, run_tree(tree).robots[0])
     assert (grasped.kind, grasped.count, placed.kind, placed.count) == (PromiseKind.GRASPED, 2, PromiseKind.PLACED, 2)
 
 

@@ -31,7 +31,7 @@ class GoalKind(enum.Enum):
 
 @dataclass(frozen=True)
 class Area:
-    """A part of the world: corners seen from above, (x, y) in order, and heights (m) from where to where (None: any)."""
+    """A part of the world: corners seen from above, (x, y) in order, and heights (m) from low to high (None: any)."""
 
     name: str
     polygon: tuple[tuple[float, float], ...]

@@ -6,10 +6,11 @@ import pytest
 from py_trees.common import Status
 
 from executive.mission.command import parse_command
+from executive.mission.request import Request
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
-from executive.store.missions import MissionStore, Order
+from executive.store.missions import MissionStore
 from executive.store.records import Memory, StepRecord
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import Step, compile_commands
@@ -26,7 +27,7 @@ FETCH_AND_ASK = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
     "Take [drink] to [start] and do [Nothing] to [Nothing]",
 )
-ORDER = Order("fetch drink", "flat", "Alice", 3, "out", (), "print", sentence="fetch me a drink")
+REQUEST = Request("fetch me a drink", seed=3, name="fetch drink", world_name="flat", robot="Alice", fingerprint="print")
 
 
 class KilledError(BaseException):
@@ -110,7 +111,7 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
 
     def one_life(texts, *, kill_after=None, kill_when=None, lag=0):
         missions = store.missions()
-        mission = missions[0] if missions else store.add(ORDER, queued=False)
+        mission = missions[0] if missions else store.add(REQUEST, queued=False)
         steps = [Step(parse_command(text)) for text in texts]
         tree = compile_commands("fetch drink", steps, knowledge=knowledge, registry=handling, robot_name="Alice")
         journal, recollection = store.journal(mission.id), None

@@ -80,15 +80,19 @@ class RunReport:
     def lines(self) -> tuple[str, ...]:
         """The two verdicts and the figures, with rich markup."""
         cause = f" ({self.cause})" if self.cause else ""
-        seen = "the mission is fulfilled" if self.seen.success else "the mission is not fulfilled"
-        saw = f"[bold]The referee saw:[/bold] {_mark(self.seen.success)} {seen}: {escape(self.seen.why)}"
-        events = tuple(escape(f"  {event}") for event in self.seen.events)
+        figures = (
+            f"{self.sim_time_s:.1f} s simulated in {self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), "
+            f"{self.ticks} ticks"
+        )
+        claims = f"[bold]The tree claims:[/bold] {_mark(self.claimed)} {self.outcome}{cause}: {escape(self.message)}"
+        if self.referee is None:
+            return claims, figures
+        seen = "the mission is fulfilled" if self.referee.success else "the mission is not fulfilled"
         return (
-            f"[bold]The tree claims:[/bold] {_mark(self.claimed)} {self.outcome}{cause}: {escape(self.message)}",
-            *(() if self.referee is None else (saw,)),
-            f"{self.seen.collisions} collisions, {self.seen.drops} drops; {self.sim_time_s:.1f} s simulated in "
-            f"{self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), {self.ticks} ticks",
-            *events,
+            claims,
+            f"[bold]The referee saw:[/bold] {_mark(self.referee.success)} {seen}: {escape(self.referee.why)}",
+            f"{self.referee.collisions} collisions, {self.referee.drops} drops; {figures}",
+            *(escape(f"  {event}") for event in self.referee.events),
         )
 
 

@@ -22,9 +22,9 @@ from executive.mission.mission import MissionFile, load_mission, mission_from_fi
 from executive.tree.check import PlannedWays, check_tree
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.estimate import Estimate, load_estimates
+from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
 from executive.view.collapse import folded_to
-from executive.view.model import node_view
 from executive.view.text import to_rich
 from plant.worlds.world import World
 

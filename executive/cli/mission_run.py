@@ -24,8 +24,8 @@ from executive.run.runner import Observer, Progress, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
+from executive.tree.node_view import NodeView, node_view
 from executive.view.collapse import DRAWN_NODES, folded_to
-from executive.view.model import NodeView, node_view
 from executive.view.svg import to_svg
 
 

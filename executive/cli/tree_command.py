@@ -17,10 +17,10 @@ from executive.cli.requests import prepare
 from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.record.history import read_history
+from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.btcpp import to_btcpp
 from executive.view.collapse import DRAWN_NODES, MANY_NODES, folded_below, folded_to
 from executive.view.mermaid import to_mermaid
-from executive.view.model import NodeView, node_view, to_json
 from executive.view.svg import to_svg
 from executive.view.text import to_text
 

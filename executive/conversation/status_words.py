@@ -11,7 +11,7 @@ from py_trees.common import Status
 from executive.mission.knowledge import Corner, Knowledge
 from executive.run.control import ControlState, Mode
 from executive.run.runner import Progress
-from executive.run.snapshot import NodeState, Snapshot
+from executive.tree.snapshot import NodeState, Snapshot
 from skills.robot import Pose2D
 
 __all__ = ["doing_in_words", "place_in_words"]

@@ -10,12 +10,12 @@ from typing import Any, Final
 
 from executive.mission.request import Request
 from executive.run.journal import TickNote
-from executive.run.snapshot import Transition
 from executive.store.database import transaction
 from executive.store.recollection import Recollection
 from executive.store.records import row_of
 from executive.store.values import to_text
 from executive.tree.compiler import CompiledTree
+from executive.tree.snapshot import Transition
 from skills.robot import Pose2D
 
 MOVED_M: Final = 0.02

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from executive.cli import entry, main
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
-from executive.view.model import node_view
+from executive.tree.node_view import node_view
 
 FETCH = "Hey Alice, can you fetch me a drink from the kitchen"
 

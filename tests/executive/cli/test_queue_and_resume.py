@@ -15,11 +15,11 @@ from executive.mission.command import Command
 from executive.mission.errors import InputError
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
-from executive.run.snapshot import NodeState, Transition
 from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
+from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
-from executive.view.model import node_view
+from executive.tree.snapshot import NodeState, Transition
 
 
 class GoneError(BaseException):

@@ -11,8 +11,8 @@ from py_trees.common import Status
 from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.run.journal import TickNote
-from executive.run.snapshot import NodeState, Transition
 from executive.store.missions import MissionState, MissionStore
+from executive.tree.snapshot import NodeState, Transition
 from skills.api import Cause
 from skills.robot import Pose2D
 

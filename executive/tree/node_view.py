@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from executive.mission.errors import SourceLine
-from executive.run.snapshot import NodeState
 from executive.tree.node import NodeSpec
-from executive.view.ports import Port, ports_of
+from executive.tree.ports import Port, ports_of
+from executive.tree.snapshot import NodeState
 
 
 @dataclass(frozen=True)

@@ -45,27 +45,9 @@ __all__ = [
     "mission_from_commands",
     "mission_from_file",
     "mission_from_meaning",
-    "mission_from_sentence",
     "overridden",
     "understood",
 ]
-
-
-def mission_from_sentence(
-    sentence: str,
-    *,
-    parser: DependencyParser,
-    knowledge: Knowledge,
-    world: str = DEFAULT_WORLD,
-    require_wake: bool = False,
-) -> Mission:
-    """The mission that a sentence asks for.
-
-    Raises:
-        InputError: the sentence is refused, leaves a question open or is not for this robot; the message says why.
-    """
-    meant = understood(sentence, parser=parser, knowledge=knowledge, require_wake=require_wake)
-    return mission_from_meaning(meant, world=world, robot_name=knowledge.robot.name)
 
 
 def understood(

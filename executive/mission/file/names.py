@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from executive.mission.command import START, Command, Thing, parse_command
-from executive.mission.errors import InputError, Problems, did_you_mean, listing
+from executive.mission.errors import InputError, Problems, listing, suggestion
 from executive.mission.file.model import KeyPath
 from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge
@@ -50,8 +50,7 @@ def _unknown_names(file: MissionFile, path: KeyPath, command: Command, knowledge
 def _unknown(
     file: MissionFile, path: KeyPath, kind: str, name: str, known: Sequence[str], knowledge: Knowledge
 ) -> InputError:
-    near = did_you_mean(name, knowledge.spellings(known))
-    mend = f"did you mean {near!r}?" if near else f"known are {listing(known)}"
+    mend = suggestion(name, knowledge.spellings(known), f"known are {listing(known)}")
     return file.error(path, f"unknown {kind} {name!r}", mend)
 
 

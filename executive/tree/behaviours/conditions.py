@@ -30,7 +30,8 @@ class Condition(Protocol):
     """Something that must hold while a subtree runs."""
 
     def begin(self, context: RunContext) -> None:
-        """The subtree starts anew."""
+        """The subtree starts anew. Nothing is remembered unless a condition says so."""
+        return
 
     def violated(self, context: RunContext) -> Verdict:
         """What speaks against going on, None when nothing does. Called before each tick of the subtree."""
@@ -134,14 +135,11 @@ class Localised:
         return Failed(Cause.PRECONDITION, "the robot does not know where it is")
 
 
-class BatteryAbove:
+class BatteryAbove(Condition):
     """The state of charge (0 to 1) is at least `least`; PRECONDITION when not."""
 
     def __init__(self, least: float) -> None:
         self._least = least
-
-    def begin(self, context: RunContext) -> None:
-        """Nothing is remembered."""
 
     def violated(self, context: RunContext) -> Verdict:
         """A failure when the charge is below."""
@@ -151,11 +149,8 @@ class BatteryAbove:
         return Failed(Cause.PRECONDITION, f"the battery is at {charge:.0%}, less than {self._least:.0%}")
 
 
-class StopReleased:
+class StopReleased(Condition):
     """No stop button is pressed. The mission stands still as long as one is."""
-
-    def begin(self, context: RunContext) -> None:
-        """Nothing is remembered."""
 
     def violated(self, context: RunContext) -> Verdict:
         """Waiting while it is pressed."""
@@ -163,11 +158,8 @@ class StopReleased:
         return None if pressed is None else Waiting(pressed)
 
 
-class LeaseHeld:
+class LeaseHeld(Condition):
     """Nobody else may move the robot. The mission stands still as long as somebody does."""
-
-    def begin(self, context: RunContext) -> None:
-        """Nothing is remembered."""
 
     def violated(self, context: RunContext) -> Verdict:
         """Waiting while another holds the lease."""
@@ -177,7 +169,7 @@ class LeaseHeld:
         return Waiting(f"{held.holder} holds the lease of {context.robot.name}")
 
 
-class BatteryReserve:
+class BatteryReserve(Condition):
     """The charge (0 to 1) is at least `low`, and enough for the way to the dock; PRECONDITION when not.
 
     The way is taken as twice the distance as the crow flies, at `per_m` of charge for each metre.
@@ -185,9 +177,6 @@ class BatteryReserve:
 
     def __init__(self, low: float, dock: Pose2D, per_m: float = 0.0008) -> None:
         self._low, self._dock, self._per_m = low, dock, per_m
-
-    def begin(self, context: RunContext) -> None:
-        """Nothing is remembered."""
 
     def violated(self, context: RunContext) -> Verdict:
         """A failure when the charge is below."""

@@ -110,14 +110,11 @@ class NotAfter:
 
 
 @dataclass(frozen=True)
-class TimeLeft:
+class TimeLeft(Condition):
     """Time is left: `limit_s` counts from `begun_s` on the robot's clock; TIMEOUT when not."""
 
     limit_s: float
     begun_s: float
-
-    def begin(self, context: RunContext) -> None:
-        """The time goes on from the run's beginning."""
 
     def violated(self, context: RunContext) -> Verdict:
         """A failure when the time is over."""

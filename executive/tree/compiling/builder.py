@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from executive.mission.command import Command
-from executive.mission.errors import InputError, SourceLine, did_you_mean, listing
+from executive.mission.errors import InputError, SourceLine, listing, suggestion
 from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
 from executive.tree.behaviours.recovery import Recovery, Trigger
@@ -134,9 +134,7 @@ class PlanBuilder:
         """
         known = self.knowledge.place(name)
         if known is None:
-            near = did_you_mean(name, self.knowledge.place_names())
-            mend = f"did you mean '{near}'?" if near else f"known are {listing(self.knowledge.place_names())}"
-            raise self.error(f"the place '{name}' is not known", mend)
+            raise self.error(f"the place '{name}' is not known", suggestion(name, self.knowledge.place_names()))
         return known
 
     def classes(self, name: str) -> tuple[str, ...]:
@@ -147,9 +145,7 @@ class PlanBuilder:
         """
         classes = self.knowledge.classes(self.knowledge.thing(name) or name)
         if not classes:
-            near = did_you_mean(name, self.knowledge.thing_names())
-            mend = f"did you mean '{near}'?" if near else f"known are {listing(self.knowledge.thing_names())}"
-            raise self.error(f"the thing '{name}' is not known", mend)
+            raise self.error(f"the thing '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
         return classes
 
     def error(self, message: str, mend: str) -> InputError:

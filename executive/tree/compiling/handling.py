@@ -17,10 +17,10 @@ from __future__ import annotations
 from typing import Final
 
 from executive.mission.command import Thing
+from executive.mission.geometry import inside
 from executive.tree.behaviours.board import BesideBoard, FromBoard, FromBoardOr, beside
 from executive.tree.behaviours.recovery import Recovery
 from executive.tree.compiling.builder import PlanBuilder, after
-from executive.tree.compiling.geometry import inside
 from executive.tree.compiling.search import detect_plan
 from executive.tree.node import NodeSpec
 from skills.api import Cause, Surface

@@ -8,11 +8,11 @@ from typing import Final
 
 from executive.mission.command import Thing
 from executive.mission.errors import listing
+from executive.mission.geometry import inside
 from executive.mission.goal import surfaces_to_search
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.board import FromBoard, SurfaceOfSighting, beside
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
-from executive.tree.compiling.geometry import inside
 from executive.tree.node import NodeSpec
 from skills.api import Cause
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from executive.mission.errors import SourceLine, did_you_mean, listing
+from executive.mission.errors import SourceLine, listing, suggestion
 from executive.mission.file.model import SkillCall
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
@@ -41,8 +41,7 @@ def skill_plan(
 
 def _registered(call: SkillCall, registry: Registry) -> type[Skill[Any]]:
     if call.skill not in registry:
-        near = did_you_mean(call.skill, registry)
-        mend = f"did you mean '{near}'?" if near else f"registered are {listing(sorted(registry))}"
+        mend = suggestion(call.skill, registry, f"registered are {listing(sorted(registry))}")
         raise call.error(("skill",), f"there is no skill '{call.skill}'", mend)
     return registry[call.skill]
 
@@ -68,9 +67,8 @@ def _inputs(
 
 def _named_output(call: SkillCall, path: tuple[str | int, ...], name: Any, names: Mapping[str, str]) -> FromBoard:
     if not isinstance(name, str) or name not in names:
-        near = did_you_mean(str(name), names)
-        known = f"known are {listing(names)}" if names else "name one with 'gives: {PORT: NAME}' in an earlier step"
-        mend = f"did you mean '{near}'?" if near else known
+        none = None if names else "name one with 'gives: {PORT: NAME}' in an earlier step"
+        mend = suggestion(str(name), names, none)
         raise call.error(("with", *path), f"no earlier step gives '{name}'", mend)
     return FromBoard(names[name])
 
@@ -78,8 +76,7 @@ def _named_output(call: SkillCall, path: tuple[str | int, ...], name: Any, names
 def _given_ports(call: SkillCall, skill: type[Skill[Any]]) -> tuple[str, ...]:
     for port in call.gives:
         if port not in skill.outputs:
-            near = did_you_mean(port, skill.outputs)
             known = f"its outputs are {listing(skill.outputs)}" if skill.outputs else "it has none"
-            mend = f"did you mean '{near}'?" if near else known
+            mend = suggestion(port, skill.outputs, known)
             raise call.error(("gives", port), f"{call.skill} has no output port '{port}'", mend)
     return tuple(call.gives)

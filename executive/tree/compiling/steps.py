@@ -8,10 +8,10 @@ from types import MappingProxyType
 from typing import Final
 
 from executive.mission.command import START, Task, Thing
+from executive.mission.geometry import inside
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.requirements import Holds
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
-from executive.tree.compiling.geometry import inside
 from executive.tree.compiling.handling import go_near_plan, pick_up_plan, tidied, tuck_plan, unless_dropped
 from executive.tree.compiling.search import (
     look_plans,

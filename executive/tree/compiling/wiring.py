@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from executive.mission.errors import InputError, did_you_mean
+from executive.mission.errors import InputError, suggestion
 from executive.tree.behaviours.board import Binding, Constant, FromBoard, FromBoardOr
 from executive.tree.kinds import writes
 from executive.tree.node import NodeSpec
@@ -42,11 +42,7 @@ def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, s
             yield f"input port '{field.name}' has no value", f"give it a {describe_type(types[field.name])}"
     for port, binding in inputs.items():
         if port not in types:
-            near = did_you_mean(port, types)
-            yield (
-                f"there is no input port '{port}'",
-                f"did you mean '{near}'?" if near else f"known: {', '.join(types)}",
-            )
+            yield f"there is no input port '{port}'", suggestion(port, types, f"known: {', '.join(types)}")
         else:
             yield from _misfit(port, binding, types[port], written)
     for port in outputs:

@@ -12,13 +12,13 @@ from executive.language.questions import Answerer, ClarifyingQuestion, QuestionP
 __all__ = ["answerer", "ask_at_terminal"]
 
 
-def answerer(given: Iterable[str], policy: QuestionPolicy | None) -> Answerer:
+def answerer(given: Iterable[str], policy: QuestionPolicy | None, ask: Answerer | None) -> Answerer:
     """Who answers: `given` are answers to the questions in their order; the policy says what becomes of further ones.
 
-    Unless it does, who sits at the terminal is asked, while in scripts the sentence is refused.
+    Unless it does, `ask` is called where somebody sits at the terminal, while in scripts the sentence is refused.
     """
     left = iter(given)
-    further = answer_by(policy or QuestionPolicy.ASK, ask_at_terminal if _somebody_is_there() else None)
+    further = answer_by(policy or QuestionPolicy.ASK, ask if _somebody_is_there() else None)
 
     def answer(question: ClarifyingQuestion) -> str | None:
         return next(left, None) or further(question)

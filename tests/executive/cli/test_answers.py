@@ -47,7 +47,7 @@ def test_an_answer_that_does_not_help_is_refused():
 def test_who_sits_at_the_terminal_is_asked(monkeypatch, capsys):
     monkeypatch.setattr(answers, "_somebody_is_there", lambda: True)
     monkeypatch.setattr("sys.stdin", io.StringIO("2\n"))
-    assert answerer((), None)(QUESTION) == "2"
+    assert answerer((), None, ask_at_terminal)(QUESTION) == "2"
     assert "[1] kitchen table  [2] coffee table" in capsys.readouterr().err
 
 

@@ -13,18 +13,12 @@ from executive.language import DependencyParser, Understanding, load_parser
 from executive.language.questions import Answerer
 from executive.mission.command import parse_command
 from executive.mission.errors import InputError
+from executive.mission.file.model import DEFAULT_WORLD, Mission
+from executive.mission.file.overrides import overridden
+from executive.mission.file.resolve import load_mission, mission_from_file
+from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge
-from executive.mission.mission import (
-    DEFAULT_WORLD,
-    Mission,
-    MissionFile,
-    load_mission,
-    mission_from_commands,
-    mission_from_file,
-    mission_from_meaning,
-    overridden,
-    understood,
-)
+from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills

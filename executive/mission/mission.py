@@ -1,7 +1,4 @@
-"""Missions: a name, a world, and steps. They come from a sentence or from a YAML file.
-
-The schema of the files is `executive.mission.file.schema`.
-"""
+"""Missions of what was said: from a sentence to its meaning, from commands to a mission. Those of files: `file`."""
 
 from __future__ import annotations
 
@@ -13,41 +10,10 @@ from executive.language.asking import understand_asking
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
 from executive.mission.command import Command
 from executive.mission.errors import InputError
-from executive.mission.file.model import (
-    DEFAULT_WORLD,
-    Mission,
-    MissionStep,
-    OnFailure,
-    OperatorQuestion,
-    SkillCall,
-    SourceLine,
-    StepGuards,
-    StepPolicy,
-)
-from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import load_mission, mission_from_file
-from executive.mission.file.schema import MissionFile, StepFile
+from executive.mission.file.model import Mission, MissionStep
 from executive.mission.knowledge import Knowledge
 
-__all__ = [
-    "DEFAULT_WORLD",
-    "Mission",
-    "MissionFile",
-    "MissionStep",
-    "OnFailure",
-    "OperatorQuestion",
-    "SkillCall",
-    "SourceLine",
-    "StepFile",
-    "StepGuards",
-    "StepPolicy",
-    "load_mission",
-    "mission_from_commands",
-    "mission_from_file",
-    "mission_from_meaning",
-    "overridden",
-    "understood",
-]
+__all__ = ["mission_from_commands", "mission_from_meaning", "understood"]
 
 
 def understood(

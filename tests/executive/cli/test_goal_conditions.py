@@ -4,8 +4,8 @@ import pytest
 
 from executive.cli.goal_conditions import promise_of, promises_of
 from executive.mission.command import parse_command
+from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from executive.mission.goal import command_goal
-from executive.mission.mission import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from executive.tree.compiler import compile_mission
 from plant.referee import PromiseKind
 

@@ -5,14 +5,9 @@ import pytest
 from executive.language import load_parser
 from executive.mission.command import parse_command
 from executive.mission.errors import InputError
+from executive.mission.file.resolve import load_mission, mission_from_file
 from executive.mission.knowledge import load_knowledge
-from executive.mission.mission import (
-    load_mission,
-    mission_from_commands,
-    mission_from_file,
-    mission_from_meaning,
-    understood,
-)
+from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
 
 WORLD = Path(__file__).parents[1] / "language" / "world.yaml"
 MISSION = """\

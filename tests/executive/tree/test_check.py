@@ -7,7 +7,7 @@ import pytest
 
 from executive.mission.command import parse_command
 from executive.mission.errors import SourceLine
-from executive.mission.mission import Mission, MissionStep, SkillCall
+from executive.mission.file.model import Mission, MissionStep, SkillCall
 from executive.tree.check import Abilities, PlannedWays, check_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.estimate import Way, load_estimates

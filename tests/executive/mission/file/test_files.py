@@ -3,8 +3,8 @@
 import pytest
 
 from executive.mission.errors import InputError
-from executive.mission.file.resolve import MAX_STEPS
-from executive.mission.mission import load_mission, mission_from_file, overridden
+from executive.mission.file.overrides import overridden
+from executive.mission.file.resolve import MAX_STEPS, load_mission, mission_from_file
 from executive.tree.behaviours.board import Constant, FromBoard
 from skills.robot import Pose2D
 

@@ -3,7 +3,7 @@
 import pytest
 
 from executive.mission.command import parse_command
-from executive.mission.mission import Mission, MissionStep, OnFailure, OperatorQuestion, StepGuards, StepPolicy
+from executive.mission.file.model import Mission, MissionStep, OnFailure, OperatorQuestion, StepGuards, StepPolicy
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
+from executive.cli.artifacts import Artifacts
 from executive.cli.durable import Durable
 from executive.cli.report import RefereeReport
-from executive.cli.souvenirs import Souvenirs
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.compiler import CompiledTree
@@ -45,5 +45,5 @@ class Backend(Protocol):
     def judge(self, tree: CompiledTree, result: RobotResult) -> RefereeReport | None:
         """What a referee saw; None where there is none."""
 
-    def leave(self, souvenirs: Souvenirs, out: Path) -> Path | None:
+    def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Write what was recorded into a folder; the recording's path, None where there is none."""

@@ -9,12 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
 
+from executive.cli.artifacts import Artifacts, draw_answer
 from executive.cli.backend import Backend
 from executive.cli.durable import Durable
 from executive.cli.page_view import PageView, log_map
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Prepared
-from executive.cli.souvenirs import Souvenirs, draw_answer
 from executive.cli.warm_up import warm_up
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
@@ -58,7 +58,7 @@ def run_request(
     entry = backend.entry(tree, durable)
     warm_up(entry)
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
-    souvenirs = Souvenirs(log)
+    artifacts = Artifacts(log)
     try:
         if page is not None:
             page.begin(log, backend.show_live())
@@ -69,7 +69,7 @@ def run_request(
                 [entry],
                 clock=clock,
                 worker=LockStepWorker(clock),
-                publish=souvenirs,
+                publish=artifacts,
                 settings=RunSettings(seed=request.seed),
                 control=heeded,
                 observer=both(observer, page),
@@ -82,8 +82,8 @@ def run_request(
     view = node_view(tree.root, result.worst.states)
     (out / "tree.svg").write_text(to_svg(folded_to(view, DRAWN_NODES), title=prepared.mission.name), encoding="utf-8")
     referee = backend.judge(tree, result.worst)
-    draw_answer(souvenirs, out)
-    recording = backend.leave(souvenirs, out)
+    draw_answer(artifacts, out)
+    recording = backend.leave(artifacts, out)
     if page is not None:
         page.end(recording)
     return Finished(_report(prepared, tree, result, referee, log=str(log.path)), view)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from executive.cli.artifacts import Artifacts, draw_artifacts
 from executive.cli.assembly import judge, run_entry, simulate, take_up_plant
 from executive.cli.backend import Scene
 from executive.cli.durable import Durable
@@ -12,7 +13,6 @@ from executive.cli.mission_run import Finished, run_request
 from executive.cli.page_view import PageView
 from executive.cli.report import RefereeReport
 from executive.cli.requests import Prepared
-from executive.cli.souvenirs import Souvenirs, draw_souvenirs
 from executive.run.control import Control
 from executive.run.outcome import RobotResult
 from executive.run.runner import Observer, RunEntry
@@ -57,12 +57,12 @@ class SimulatedBackend:
         events = self._simulation.referee.events
         return RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops, events)
 
-    def leave(self, souvenirs: Souvenirs, out: Path) -> Path | None:
+    def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Write recording and pictures, where the run was recorded."""
         if not self._record:
             return None
         self._simulation.save_recording(out / "recording.html")
-        draw_souvenirs(souvenirs, self._simulation, self._robot_name, out)
+        draw_artifacts(artifacts, self._simulation, self._robot_name, out)
         return out / "recording.html"
 
 

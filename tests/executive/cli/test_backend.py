@@ -36,7 +36,7 @@ class ScriptedBackend:
     def judge(self, tree, result):
         self.asked.append((tree.mission_name, result.outcome))
 
-    def leave(self, souvenirs, out):
+    def leave(self, artifacts, out):
         return None
 
 

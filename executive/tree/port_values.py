@@ -20,7 +20,7 @@ from typing import Any, Final, Union
 from executive.mission.command import thing
 from executive.mission.errors import listing, suggestion
 from executive.mission.knowledge import Knowledge
-from executive.tree.types import describe_type, field_types
+from executive.tree.types import describe_type, field_types, required
 from skills.api import Surface, Thing
 from skills.robot import Pose2D
 
@@ -161,11 +161,9 @@ def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
             raise PortValueError((*path, str(key)), what, suggestion(str(key), plain))
         read[name] = port_value(item, hints[name], knowledge, (*path, str(key)))
     filled = {**_DEFAULTS.get(record, {}), **read}
-    for field in dataclasses.fields(record):
-        optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
-        if field.name not in filled and not optional:
-            missing = _UNIT.sub("", field.name)
-            raise PortValueError(path, f"'{missing}' is missing", f"give {listing(plain)}")
+    for name in required(record):
+        if name not in filled:
+            raise PortValueError(path, f"'{_UNIT.sub('', name)}' is missing", f"give {listing(plain)}")
     try:
         return record(**filled)
     except (ValueError, TypeError) as error:

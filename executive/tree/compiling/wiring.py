@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -10,7 +9,7 @@ from executive.mission.errors import InputError, suggestion
 from executive.tree.behaviours.board import Binding, Constant, FromBoard, FromBoardOr
 from executive.tree.kinds import writes
 from executive.tree.node import NodeSpec
-from executive.tree.types import assignable, conforms, describe_type, field_types
+from executive.tree.types import assignable, conforms, describe_type, field_types, required
 
 
 def check_wiring(root: NodeSpec) -> None:
@@ -36,10 +35,9 @@ def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, s
     """What is wrong with one skill's ports, and the mend."""
     skill, inputs, outputs = (node.options[key] for key in ("skill", "inputs", "outputs"))
     types = field_types(skill.Inputs)
-    for field in dataclasses.fields(skill.Inputs):
-        optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
-        if field.name not in inputs and not optional:
-            yield f"input port '{field.name}' has no value", f"give it a {describe_type(types[field.name])}"
+    for name in required(skill.Inputs):
+        if name not in inputs:
+            yield f"input port '{name}' has no value", f"give it a {describe_type(types[name])}"
     for port, binding in inputs.items():
         if port not in types:
             yield f"there is no input port '{port}'", suggestion(port, types, f"known: {', '.join(types)}")

@@ -31,7 +31,7 @@ def ports_of(spec: NodeSpec) -> tuple[Port, ...]:
 
 
 def _skill_ports(options: Mapping[str, Any]) -> Iterator[Port]:
-    skill, bound = options["skill"], options["inputs"]
+    skill, bound = options["skill"], options.get("inputs", {})
     types = field_types(skill.Inputs)
     for field in dataclasses.fields(skill.Inputs):
         kind = describe_type(types[field.name])
@@ -42,7 +42,7 @@ def _skill_ports(options: Mapping[str, Any]) -> Iterator[Port]:
                 yield Port(field.name, plain(value), kind)
             case _:
                 yield Port(field.name, _default(field), kind)
-    for name, key in options["outputs"].items():
+    for name, key in options.get("outputs", {}).items():
         yield Port(name, key, describe_type(skill.outputs.get(name, Any)), output=True, on_board=True)
 
 

@@ -10,7 +10,6 @@ from py_trees.common import Status
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.journal import Journal, TickNote
 from executive.run.outcome import Outcome, RobotResult
-from executive.run.snapshot import NodeState, Observed, Snapshot, Transition, activities, transitions
 from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import Explained
@@ -18,7 +17,8 @@ from executive.tree.behaviours.gate import Gate
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
-from executive.view.model import node_view
+from executive.tree.node_view import node_view
+from executive.tree.snapshot import NodeState, Observed, Snapshot, Transition, activities, transitions
 from skills.api import Cause
 from skills.robot import Pose2D
 

@@ -14,7 +14,7 @@ from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.plans import SequencePlan, SkillPlan, TimeoutPlan
+from executive.tree.node import NodeSpec
 from skills.api import Running, Skill, Succeeded
 from skills.robot import CommandId, Gripper, Lease, Odometry
 from skills.testing.clock import VirtualClock
@@ -82,10 +82,10 @@ def mission():
     steps = []
     for number in range(LEAVES):
         base = f"alice/bench/{number}"
-        leaf = SkillPlan(path_id=f"{base}/limit/light", name="light", skill=Light, limit_s=60.0)
-        limit = TimeoutPlan(path_id=f"{base}/limit", name="in time", child=leaf, limit_s=90.0)
-        steps.append(SequencePlan(path_id=base, name=str(number), steps=(limit,)))
-    return CompiledTree("Alice", "bench", (), SequencePlan(path_id="alice/bench", name="bench", steps=tuple(steps)))
+        leaf = NodeSpec("skill", f"{base}/limit/light", "light", {"skill": Light, "limit_s": 60.0})
+        limit = NodeSpec("timeout", f"{base}/limit", "in time", {"limit_s": 90.0}, (leaf,))
+        steps.append(NodeSpec("sequence", base, str(number), children=(limit,)))
+    return CompiledTree("Alice", "bench", (), NodeSpec("sequence", "alice/bench", "bench", children=tuple(steps)))
 
 
 def ticks_of_a_run(path):

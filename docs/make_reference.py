@@ -13,8 +13,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge
-from executive.mission.mission import MissionFile
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.registry import built_in_skills
 from executive.tree.types import describe_type, field_types

@@ -1,4 +1,7 @@
-"""The import rule: executive -> skills; plant -> skills.robot only; skills imports neither; only executive.cli all."""
+"""The import rule: executive -> skills; plant -> skills.robot only; skills imports neither; only executive.cli all.
+
+The homes of executive import each other one way, from the last of `HOMES` to the first.
+"""
 
 import ast
 from collections.abc import Iterator
@@ -8,6 +11,22 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("executive", "skills", "plant")
+WORDS = ("class_ids", "command", "errors", "geometry", "knowledge", "yaml_source")
+HOMES = (
+    tuple(f"executive.mission.{name}" for name in WORDS),
+    ("executive.language",),
+    ("executive.speech",),
+    ("executive.mission",),
+    ("executive.tree",),
+    ("executive.record",),
+    ("executive.run",),
+    ("executive.store",),
+    ("executive.conversation",),
+    ("executive.view",),
+    ("executive.testing",),
+    ("executive.cli",),
+)
+"""The lowest first; what both the language and the missions speak of stands below both."""
 
 
 def modules(package: str) -> list[Path]:
@@ -64,3 +83,43 @@ def test_no_module_breaks_the_import_rule(package: str) -> None:
 )
 def test_the_check_finds_breaches(path: str, source: str, expected: list[str]) -> None:
     assert breaches(ROOT / path, source) == expected
+
+
+def rank(name: str) -> int | None:
+    """How high a module of executive stands; None for one that has no home."""
+    return next((number for number, homes in enumerate(HOMES) if within(name, *homes)), None)
+
+
+def upward(path: Path, source: str) -> list[str]:
+    """The modules of executive that a module imports although they stand above it, or have no home."""
+    own = rank(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    names = [name for name in imported(source) if within(name, "executive")]
+    return [name for name in names if own is None or (above := rank(name)) is None or above > own]
+
+
+def test_the_homes_of_executive_import_each_other_one_way() -> None:
+    paths = [path for path in modules("executive") if path.parent != ROOT / "executive"]
+    found = {str(path.relative_to(ROOT)): upward(path, path.read_text()) for path in paths}
+    assert {path: names for path, names in found.items() if names} == {}
+
+
+def test_the_root_of_executive_holds_no_modules() -> None:
+    assert [path.name for path in (ROOT / "executive").glob("*.py")] == ["__init__.py"]
+
+
+@pytest.mark.parametrize(
+    ("path", "source", "expected"),
+    [
+        (
+            "executive/mission/command.py",
+            "from executive.language import understand",
+            ["executive.language.understand"],
+        ),
+        ("executive/mission/mission.py", "from executive.language import understand", []),
+        ("executive/tree/estimate.py", "def f():\n    import executive.run.runner", ["executive.run.runner"]),
+        ("executive/tree/estimate.py", "from executive.attic import old", ["executive.attic.old"]),
+        ("executive/view/svg.py", "from executive.tree.node_view import NodeView", []),
+    ],
+)
+def test_the_check_finds_imports_upward(path: str, source: str, expected: list[str]) -> None:
+    assert upward(ROOT / path, source) == expected

@@ -3,37 +3,27 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Iterable
 
 import typer
 
 from executive.language.questions import Answerer, ClarifyingQuestion, QuestionPolicy, answer_by
 
-__all__ = ["NO_ANSWERS", "Answers", "ask_at_terminal"]
+__all__ = ["answerer", "ask_at_terminal"]
 
 
-@dataclass(frozen=True)
-class Answers:
-    """Answers given beforehand, for the questions in their order, and what becomes of further ones.
+def answerer(given: Iterable[str], policy: QuestionPolicy | None, ask: Answerer | None) -> Answerer:
+    """Who answers: `given` are answers to the questions in their order; the policy says what becomes of further ones.
 
-    Unless `policy` says, a mission file's own counts; and where that says nothing, who sits at the terminal is asked,
-    while in scripts the sentence is refused.
+    Unless it does, `ask` is called where somebody sits at the terminal, while in scripts the sentence is refused.
     """
+    left = iter(given)
+    further = answer_by(policy or QuestionPolicy.ASK, ask if _somebody_is_there() else None)
 
-    given: tuple[str, ...] = ()
-    policy: QuestionPolicy | None = None
+    def answer(question: ClarifyingQuestion) -> str | None:
+        return next(left, None) or further(question)
 
-    def answerer(self, own: QuestionPolicy | None) -> Answerer:
-        """Who answers; `own` is the policy of a mission file."""
-        left = iter(self.given)
-        policy = self.policy or own or QuestionPolicy.ASK
-        further = answer_by(policy, ask_at_terminal if _somebody_is_there() else None)
-
-        def answer(question: ClarifyingQuestion) -> str | None:
-            return next(left, None) or further(question)
-
-        return answer
+    return answer
 
 
 def ask_at_terminal(question: ClarifyingQuestion) -> str | None:
@@ -48,6 +38,3 @@ def ask_at_terminal(question: ClarifyingQuestion) -> str | None:
 
 def _somebody_is_there() -> bool:
     return sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
-
-
-NO_ANSWERS: Final = Answers()

@@ -6,9 +6,8 @@ from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
-from executive.cli.promises import promises_of
+from executive.cli.goal_conditions import promises_of
 from executive.mission.errors import InputError
-from executive.mission.knowledge import Knowledge
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.check import Abilities, PlannedWays
@@ -91,9 +90,9 @@ def take_up_plant(simulation: Simulation, path: Path, *, label: str | None) -> N
         raise InputError(str(error)) from error
 
 
-def judge(simulation: Simulation, tree: CompiledTree, knowledge: Knowledge, result: RobotResult) -> Verdict:
-    """What the referee says of the mission's promises."""
-    verdict: Verdict = simulation.referee.judge(promises_of(tree, knowledge=knowledge, result=result))
+def judge(simulation: Simulation, tree: CompiledTree, result: RobotResult) -> Verdict:
+    """What the referee says of the mission's goal conditions."""
+    verdict: Verdict = simulation.referee.judge(promises_of(tree, result))
     return verdict
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -14,19 +14,16 @@ from rich.markup import escape
 
 from executive.cli.assembly import abilities_of, itinerary_of
 from executive.cli.output import BAD_INPUT, console_for, print_json
-from executive.cli.worlds import knowledge_of, open_world
-from executive.language import DependencyParser, load_parser
+from executive.cli.requests import prepare
+from executive.language import load_parser
 from executive.mission.errors import InputError
-from executive.mission.knowledge import Knowledge
-from executive.mission.mission import MissionFile, load_mission, mission_from_file, overridden
+from executive.mission.request import Request
 from executive.tree.check import PlannedWays, check_tree
-from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, load_estimates
-from executive.tree.registry import installed_skills
+from executive.tree.node_view import node_view
 from executive.view.collapse import folded_to
-from executive.view.model import node_view
 from executive.view.text import to_rich
-from plant.worlds.world import World
 
 SHOWN_NODES: Final = 40
 
@@ -48,59 +45,35 @@ class CheckedFile:
         return not self.errors
 
 
-@dataclass
 class Checker:
-    """Checks files; parser, worlds and planned ways are shared among them. `world` stands in for the files' own."""
+    """Checks files; the parser and the ways planned in each world are shared among them.
 
-    world: str | None = None
-    _worlds: dict[str, _Opened] = field(default_factory=dict)
+    `world` stands in for the files' own.
+    """
 
-    @cached_property
-    def parser(self) -> DependencyParser:
-        """The language's parser."""
-        return load_parser()
+    def __init__(self, world: str | None = None) -> None:
+        self._world, self._parser = world, cache(load_parser)
+        self._ways: dict[Path, PlannedWays] = {}
 
     def check(self, file: Path) -> CheckedFile:
         """Check one file; raises nothing for what stands in it."""
         tree: CompiledTree | None = None
         try:
-            loaded = load_mission(file)
-            opened = self._open(loaded)
-            knowledge = overridden(loaded, opened.knowledge)
-            mission = mission_from_file(loaded, parser=self.parser, knowledge=knowledge)
-            tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
+            prepared = prepare(Request(file=file, world=self._world), parser=self._parser, ask=None)
+            tree, world = prepared.tree, prepared.world
+            if world.folder not in self._ways:
+                self._ways[world.folder] = itinerary_of(world)
         except InputError as error:
-            return CheckedFile(file, _placed(file, (error, *error.others)))
+            return CheckedFile(file, _placed(file, (error, *error.others)), tree)
         checked = check_tree(
             tree,
-            knowledge=knowledge,
-            start=opened.world.start,
+            knowledge=prepared.knowledge,
+            start=world.start,
             abilities=abilities_of(),
-            itinerary=opened.ways,
+            itinerary=self._ways[world.folder],
             estimates=load_estimates(),
         )
         return CheckedFile(file, _placed(file, checked.errors), tree, checked.estimate)
-
-    def _open(self, loaded: MissionFile) -> _Opened:
-        name = self.world or loaded.world
-        if name not in self._worlds:
-            try:
-                world = open_world(name)
-            except InputError as error:
-                if self.world is not None:
-                    raise
-                raise loaded.error(("world",), error.message, error.mend) from error
-            self._worlds[name] = _Opened(world, knowledge_of(world), itinerary_of(world))
-        return self._worlds[name]
-
-
-@dataclass(frozen=True)
-class _Opened:
-    """A world with what is known of it."""
-
-    world: World
-    knowledge: Knowledge
-    ways: PlannedWays
 
 
 def check(

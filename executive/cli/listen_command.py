@@ -17,8 +17,8 @@ from executive.cli.output import BAD_INPUT, console_for, refusals
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Status, Understanding, load_parser
 from executive.mission.errors import InputError
+from executive.mission.file.model import DEFAULT_WORLD
 from executive.mission.knowledge import Knowledge
-from executive.mission.mission import DEFAULT_WORLD
 from executive.speech.activity import load_detector
 from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import HeardUtterance, Listener, Recording

@@ -14,10 +14,10 @@ from rich.text import Text
 from executive.cli.keys import HELP, Keys, keys_pressed, prompt_lines
 from executive.run.control import Control
 from executive.run.runner import Observer, Progress
-from executive.run.snapshot import NodeState, Snapshot
 from executive.tree.compiler import CompiledTree
+from executive.tree.node_view import node_view
+from executive.tree.snapshot import NodeState, Snapshot
 from executive.view.looks import Looks
-from executive.view.model import node_view
 from executive.view.text import to_rich
 
 REFRESH_S = 0.2

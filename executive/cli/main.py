@@ -12,21 +12,20 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from executive.cli.answers import Answers
-from executive.cli.durable import STORE, Asked, give_up_broken, kept, new_run, run_arguments
+from executive.cli.durable import STORE, give_up_broken, kept, new_run, run_arguments
 from executive.cli.listen_command import hear_request
-from executive.cli.mission_run import Finished, run_request
+from executive.cli.mission_run import Finished
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.page_view import PageView, queueing
-from executive.cli.requests import Request
+from executive.cli.requests import Prepared, prepare
 from executive.cli.shown import control_for, show_files, show_run
+from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.language.questions import QuestionPolicy
-from executive.mission.stack_file import load_stack
+from executive.mission.request import Request
 from executive.record.profile import Profile, lines
 from executive.store.missions import MissionStore
-from skills.stack import RobotStack
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]
@@ -39,7 +38,7 @@ Questions = Annotated[
 ]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
-PageOf = Callable[[Request], PageView | None]
+PageOf = Callable[[Prepared], PageView | None]
 
 
 def run(
@@ -68,25 +67,16 @@ def run(
     kept_in = store or out / STORE
     timing = Profile() if profile else None
 
-    def page_of(request: Request) -> PageView | None:
-        later = queueing(request, world=world, store=kept_in, out=out, seed=seed)
-        return PageView(request, console, port=view_port, later=later) if wants_page else None
+    def page_of(prepared: Prepared) -> PageView | None:
+        later = queueing(prepared, store=kept_in, out=out)
+        return PageView(prepared, console, port=view_port, later=later) if wants_page else None
 
     with refusals():
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=not no_wake, console=console)
-        finished, page = _run_kept(
-            Asked(file, say, world, not no_wake, Answers(tuple(answer or ()), questions)),
-            seed,
-            out,
-            kept_in,
-            record=not no_record,
-            quiet=quiet,
-            console=console,
-            page=page_of,
-            profile=timing,
-            stack=load_stack(stack),
-        )
+        asked = Request(say, file, world, not no_wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
+        begin = partial(run_simulated, profile=timing)
+        finished, page = _run_kept(asked, kept_in, begin, quiet=quiet, console=console, page=page_of)
     if timing is not None:
         for line in lines(timing.table()):
             console.print(line, markup=False)
@@ -107,16 +97,15 @@ def evaluate(
     no_wake: NoWake = False,
     answer: Answer = None,
     questions: Questions = None,
+    stack: STACK = None,
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
     as_json: AsJson = False,
 ) -> None:
     """Run a mission at many seeds and count what the trees claim and what the referee saw."""
     with refusals():
         chosen = seed_range(seeds)
-        asked = Asked(file, say, world, not no_wake, Answers(tuple(answer or ()), questions))
-        request = asked.request()
-        request.compile()
-    arguments = run_arguments(asked, request)
+        asked = Request(say, file, world, not no_wake, tuple(answer or ()), questions, stack=stack)
+        arguments = run_arguments(asked, prepare(asked))
     console = console_for(as_json)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as bar:
@@ -136,47 +125,25 @@ def evaluate(
 
 
 def _run_kept(
-    asked: Asked,
-    seed: int,
-    out: Path,
-    store: Path,
-    *,
-    record: bool,
-    quiet: bool,
-    console: Console,
-    page: PageOf,
-    profile: Profile | None,
-    stack: RobotStack,
+    asked: Request, store: Path, begin: Callable[..., Finished], *, quiet: bool, console: Console, page: PageOf
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
-    request = asked.request()
-    compiled = request.compile()
-    shown = page(request)
+    prepared = prepare(asked)
+    shown = page(prepared)
     with MissionStore(store) as missions, missions.claimed():
-        mission = missions.add(asked.order(request, compiled, seed=seed, out=out, record=record), queued=False)
+        mission = missions.add(prepared.request.from_anywhere(), queued=False)
         for broken in give_up_broken(missions, mission):
             console.print(
-                f"Mission {broken.id} ({broken.order.name}) had been broken off; it is given up.", markup=False
+                f"Mission {broken.id} ({broken.request.name}) had been broken off; it is given up.", markup=False
             )
         with kept(missions, mission) as ended:
             control = control_for(console, quiet=quiet) if shown is None else shown.control
             durable = new_run(missions, mission)
-            start = partial(
-                run_request,
-                request,
-                compiled,
-                seed=seed,
-                out=out,
-                record=record,
-                page=shown,
-                durable=durable,
-                profile=profile,
-                stack=stack,
-            )
+            start = partial(begin, prepared, page=shown, durable=durable)
             talk = None if shown is None else shown.conversation
-            finished = show_run(start, request, compiled, console, control=control, quiet=quiet, conversation=talk)
+            finished = show_run(start, prepared, console, control=control, quiet=quiet, conversation=talk)
             ended(finished.report)
-    show_files(out, console)
+    show_files(asked.out, console)
     return finished, shown
 
 

@@ -1,4 +1,4 @@
-"""Runs one request from beginning to end: plant, tree, log, verdicts, and what is left in the output folder."""
+"""Runs one request from beginning to end on a backend: tree, log, verdicts, and what is left in the output folder."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
 from types import FrameType
 
-from executive.cli.assembly import judge, run_entry, simulate
+from executive.cli.artifacts import Artifacts, draw_answer
+from executive.cli.backend import Backend
 from executive.cli.durable import Durable
 from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
 from executive.cli.report import RefereeReport, RunReport
-from executive.cli.requests import Request
-from executive.cli.souvenirs import Souvenirs, draw_answer, draw_souvenirs
+from executive.cli.requests import Prepared
 from executive.cli.warm_up import warm_up
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
@@ -29,10 +28,9 @@ from executive.run.runner import Observer, Progress, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
+from executive.tree.node_view import NodeView, node_view
 from executive.view.collapse import DRAWN_NODES, folded_to
-from executive.view.model import NodeView, node_view
 from executive.view.svg import to_svg
-from skills.stack import RobotStack, default_stack
 
 
 @dataclass(frozen=True)
@@ -44,53 +42,43 @@ class Finished:
 
 
 def run_request(
-    request: Request,
-    tree: CompiledTree,
+    prepared: Prepared,
+    backend: Backend,
     *,
-    seed: int,
-    out: Path,
-    record: bool,
     observer: Observer | None = None,
     control: Control | None = None,
     page: PageView | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
-    stack: RobotStack | None = None,
 ) -> Finished:
-    """Run a compiled request in the plant and write log, tree, recording and pictures into `out`.
+    """Run a request on a backend and write log, tree and what that has recorded into its folder.
 
     The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it;
     with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
-    `stack` is what the robot uses.
 
     Raises:
         InputError: the world cannot be used.
     """
-    stack = stack or default_stack()
-    robot_name = request.mission.robot_name
-    simulation = simulate(request.world, seed=seed, robot_name=robot_name, record=record, stack=stack)
-    entry = run_entry(simulation, request.world, tree, stack, believed=None if durable is None else durable.pose)
-    if durable is not None:
-        entry = replace(entry, journal=durable.journal)
-        durable.begin(simulation)
+    request, tree, out, clock = prepared.request, prepared.tree, prepared.request.out, backend.clock
+    entry = backend.entry(tree, durable)
     warm_up(entry)
-    clock, work = simulation.clock, Work()
+    work = Work()
     entry = replace(entry, detector=CountedDetector(entry.detector, work))
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
-    souvenirs = Souvenirs(log)
+    artifacts = Artifacts(log)
     try:
         if page is not None:
-            page.begin(log, simulation)
-        log_map(log, request)
-        announce(log, clock, tree, request.knowledge, world=request.world.name, seed=seed)
+            page.begin(log, backend.show_live())
+        log_map(log, prepared)
+        announce(log, clock, tree, prepared.knowledge, world=prepared.world.name, seed=request.seed)
         with cancelled_by_signals(control or Control(pace=None)) as heeded, LockStepWorker(clock) as worker:
-            begin = run if profile is None else profiled(profile, run, simulation, entry, worker)
+            begin = run if profile is None else profiled(profile, run, backend, entry, worker)
             result = begin(
                 [entry],
                 clock=clock,
                 worker=worker,
-                publish=souvenirs if profile is None else profile.timed("log", souvenirs),
-                settings=RunSettings(seed=seed),
+                publish=artifacts if profile is None else profile.timed("log", artifacts),
+                settings=RunSettings(seed=request.seed),
                 control=heeded,
                 observer=both(observer, page),
                 work=work,
@@ -100,22 +88,19 @@ def run_request(
             durable.journal.keep_world()  # the next mission begins where this one ended
             for trouble in durable.journal.troubles:
                 log(ERROR_TOPIC, {"node": tree.robot_name, "what": "keep the mission's state", "traceback": trouble})
-        counts = work.totals({**simulation.work(), "bytes_logged": log.bytes})
+        counts = work.totals({**backend.work(), "bytes_logged": log.bytes})
         log(WORK, counts)
     finally:
         log.close()
     tree = result.trees.get(tree.robot_name, tree)
-    verdict = judge(simulation, tree, request.knowledge, result.worst)
     view = node_view(tree.root, result.worst.states)
-    (out / "tree.svg").write_text(to_svg(folded_to(view, DRAWN_NODES), title=request.mission.name), encoding="utf-8")
-    draw_answer(souvenirs, out)
-    if record:
-        simulation.save_recording(out / "recording.html")
-        draw_souvenirs(souvenirs, simulation, request.mission.robot_name, out)
+    (out / "tree.svg").write_text(to_svg(folded_to(view, DRAWN_NODES), title=prepared.mission.name), encoding="utf-8")
+    referee = backend.judge(tree, result.worst)
+    draw_answer(artifacts, out)
+    recording = backend.leave(artifacts, out)
     if page is not None:
-        page.end(out / "recording.html" if record else None)
-    referee = RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops, simulation.referee.events)
-    report = _report(request, tree, result, referee, seed=seed, log=log.path)
+        page.end(recording)
+    report = _report(prepared, tree, result, referee, log=str(log.path))
     return Finished(replace(report, work=counts), view)
 
 
@@ -133,7 +118,7 @@ def both(*observers: Observer | None) -> Observer | None:
 
 
 def _report(
-    request: Request, tree: CompiledTree, result: RunResult, referee: RefereeReport, *, seed: int, log: Path
+    prepared: Prepared, tree: CompiledTree, result: RunResult, referee: RefereeReport | None, *, log: str
 ) -> RunReport:
     worst = result.worst
     return RunReport(
@@ -142,13 +127,13 @@ def _report(
         message=worst.message,
         referee=referee,
         commands=tuple(map(str, tree.commands)),
-        world=request.world.name,
-        seed=seed,
+        world=prepared.world.name,
+        seed=prepared.request.seed,
         sim_time_s=round(result.sim_time_s, 3),
         wall_time_s=round(result.wall_time_s, 3),
         real_time_factor=round(result.sim_time_s / max(result.wall_time_s, 1e-6), 2),
         ticks=result.ticks,
-        log=str(log),
+        log=log,
     )
 
 

@@ -8,12 +8,13 @@ from typing import Any
 
 from rich.console import Console
 
-from executive.cli.durable import Asked
+from executive.cli.backend import Scene
 from executive.cli.replay_command import served, wait
-from executive.cli.requests import Request
+from executive.cli.requests import Prepared, prepare
 from executive.cli.talk import LateParser, conversation_of
 from executive.conversation import ReplyKind
 from executive.mission.errors import InputError
+from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.record.schemas import MAP
 from executive.record.surroundings import map_message
@@ -24,8 +25,6 @@ from executive.view.actions import Action, RefusedError, asked_json, control_act
 from executive.view.feed import Feed
 from executive.view.server import PageContent, PageServer
 from executive.view.watch import ControlWatch, ProgressWatch
-from plant.live_scene import LiveScene
-from plant.simulation import Simulation
 from skills.estimate.grid_map import load_grid_map
 
 
@@ -33,27 +32,26 @@ class PageView:
     """The page of one run: `begin` before it, called as an observer while it runs, `end` and `stay` after it."""
 
     def __init__(
-        self, request: Request, console: Console, *, port: int = 0, later: Callable[[str], str] | None = None
+        self, prepared: Prepared, console: Console, *, port: int = 0, later: Callable[[str], str] | None = None
     ) -> None:
         """`later` queues a sentence and says so; without it the page offers no queue."""
-        self._request, self._console, self._port, self._later = request, console, port, later
+        self._console, self._port, self._later = console, port, later
         self.control = Control(attended=True)
         self._feed = Feed()
         self._progress = ProgressWatch(self._feed)
         self._parser = LateParser()
-        self.conversation = conversation_of(request, self.control, self._parser)
+        self.conversation = conversation_of(prepared, self.control, self._parser)
         self.conversation.listen(lambda waiting: self._feed.tell("asked", asked_json(waiting)))
         self._server: PageServer | None = None
         self._watch: ControlWatch | None = None
 
-    def begin(self, log: EventLog, simulation: Simulation) -> None:
+    def begin(self, log: EventLog, scene: Scene | None) -> None:
         """Serve the page and print its address. Raises InputError when the port is taken."""
         log.listen(self._feed)
         self._parser.load_ahead()
-        scene = simulation.show_live()
         sentences = {"say": said(self._hear), **({} if self._later is None else {"queue": said(self._later)})}
-        actions = {**control_actions(self.control), **sentences, "ease": easing(scene)}
-        content = PageContent(self._feed, actions, scene_url=scene.url)
+        actions = {**control_actions(self.control), **sentences, **({} if scene is None else {"ease": easing(scene)})}
+        content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)
         self._server = served(content, self._port)
         self._watch = ControlWatch(self.control, self._feed)
         self._console.print(f"The page: {self._server.url}", markup=False)
@@ -106,21 +104,21 @@ def said(do: Callable[[str], str]) -> Action:
     return say
 
 
-def queueing(request: Request, *, world: str | None, store: Path, out: Path, seed: int) -> Callable[[str], str]:
-    """Keeps a sentence in a store, as `errand queue add` does, in the world of a request (named `world` if it was)."""
+def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], str]:
+    """Keeps a sentence in a store, as `errand queue add` does, for the world and the seed of a request."""
+    before = prepared.request
 
     def later(sentence: str) -> str:
-        asked = Asked(say=sentence, world=world or request.world.name)
-        understood = asked.request()
-        order = asked.order(understood, understood.compile(), seed=seed, out=out, record=True)
+        asked = Request(sentence, world=before.world or before.world_name, seed=before.seed, out=out)
+        request = prepare(asked).request.from_anywhere()
         with MissionStore(store) as missions:
-            number = missions.add(order, queued=True).id
-        return f"queued as mission {number}: {'; '.join(order.commands)} (errand queue run --out {out})"
+            number = missions.add(request, queued=True).id
+        return f"queued as mission {number}: {'; '.join(request.commands)} (errand queue run --out {out})"
 
     return later
 
 
-def easing(scene: LiveScene) -> Action:
+def easing(scene: Scene) -> Action:
     """An action for a browser that draws slowly: the scene is refreshed less often."""
 
     def ease(_: Mapping[str, Any]) -> str:
@@ -130,7 +128,7 @@ def easing(scene: LiveScene) -> Action:
     return ease
 
 
-def log_map(log: EventLog, request: Request) -> None:
+def log_map(log: EventLog, prepared: Prepared) -> None:
     """Write the surveyed map into the log, so that the log stands alone."""
-    grid = load_grid_map(request.world.scan_map_path)
-    log(MAP, map_message(grid, request.knowledge, world=request.world.name))
+    grid = load_grid_map(prepared.world.scan_map_path)
+    log(MAP, map_message(grid, prepared.knowledge, world=prepared.world.name))

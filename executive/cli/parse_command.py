@@ -15,7 +15,7 @@ from executive.language import Status, Understanding, explain, load_parser, pars
 from executive.language.explain_svg import arcs_svg
 from executive.language.explain_text import explanation_lines
 from executive.mission.errors import InputError
-from executive.mission.mission import DEFAULT_WORLD
+from executive.mission.file.model import DEFAULT_WORLD
 
 __all__ = ["parse"]
 

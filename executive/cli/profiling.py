@@ -1,15 +1,15 @@
-"""`errand run --profile`: times the calls of a simulated run that lead from one subsystem into another."""
+"""`errand run --profile`: times the calls of a run that lead from one subsystem into another."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+from executive.cli.backend import Backend
 from executive.record.profile import Profile
 from executive.record.work import CountedDetector
 from executive.run.runner import RunEntry
 from executive.run.worker import LockStepWorker
-from plant.simulation import Simulation
 
 __all__ = ["profiled"]
 
@@ -17,16 +17,12 @@ __all__ = ["profiled"]
 def profiled(
     profile: Profile,
     run: Callable[..., Any],
-    simulation: Simulation,
+    backend: Backend,
     entry: RunEntry,
     worker: LockStepWorker,
 ) -> Callable[..., Any]:
     """The run with its parts timed; what none of them takes is the executive's own."""
-    profile.attach("plant", simulation.clock, "advance")
-    profile.attach("referee", simulation.referee, "observe")
-    profile.attach("joint control", entry.robot, "control")
-    profile.attach("LiDAR and other sensors", entry.robot, "sense")
-    profile.attach("rendering", entry.robot, "image")
+    backend.time_parts(profile)
     profile.attach("localiser", entry.localiser, "update")
     profile.attach("costmap", entry.costmap, "update", "add_points", "clearance_m")
     if isinstance(entry.detector, CountedDetector):

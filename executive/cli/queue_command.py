@@ -9,9 +9,11 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from executive.cli.durable import STORE, Asked
+from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.queue_run import run_queue
+from executive.cli.requests import prepare
+from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore, StoredMission
 
 __all__ = ["queue"]
@@ -38,12 +40,11 @@ def add(
 ) -> None:
     """Queue a sentence or a mission file, checked."""
     with refusals():
-        asked = Asked(file, say, world, not no_wake)
-        request = asked.request()
-        order = asked.order(request, request.compile(), seed=seed, out=out, record=not no_record)
+        asked = Request(say, file, world, require_wake=not no_wake, seed=seed, out=out, record=not no_record)
+        request = prepare(asked).request.from_anywhere()
         with MissionStore(store or out / STORE) as missions:
-            mission = missions.add(order, queued=True)
-    console_for(as_json).print(f"Mission {mission.id} is queued: {order.name}", markup=False)
+            mission = missions.add(request, queued=True)
+    console_for(as_json).print(f"Mission {mission.id} is queued: {request.name}", markup=False)
     if as_json:
         print_json(_told(mission))
 
@@ -55,9 +56,9 @@ def show(out: Out = Path("out"), store: Store = None, as_json: AsJson = False) -
         known = missions.missions()
     table = Table("mission", "state", "name", "world", "seed", "commands", "message")
     for each in known:
-        order = each.order
-        commands = "\n".join(order.commands)
-        row = (str(each.id), _state(each), order.name, order.world_name, str(order.seed), commands, each.message)
+        asked = each.request
+        commands = "\n".join(asked.commands)
+        row = (str(each.id), _state(each), asked.name, asked.world_name, str(asked.seed), commands, each.message)
         table.add_row(*map(escape, row))
     console_for(as_json).print(table)
     if as_json:
@@ -95,6 +96,6 @@ def _state(mission: StoredMission) -> str:
 
 
 def _told(mission: StoredMission) -> dict[str, Any]:
-    order = mission.order
-    told = {"mission": mission.id, "state": mission.state.value, "name": order.name, "world": order.world_name}
-    return {**told, "seed": order.seed, "commands": list(order.commands), "message": mission.message}
+    asked = mission.request
+    told = {"mission": mission.id, "state": mission.state.value, "name": asked.name, "world": asked.world_name}
+    return {**told, "seed": asked.seed, "commands": list(asked.commands), "message": mission.message}

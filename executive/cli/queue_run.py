@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
 from rich.console import Console
 
-from executive.cli.durable import asked_again, kept, new_run, next_run, plant_file, same_world
-from executive.cli.mission_run import run_request
+from executive.cli.durable import as_it_was, kept, new_run, next_run, plant_file, same_world
+from executive.cli.requests import prepare
 from executive.cli.shown import control_for, show_files, show_run
+from executive.cli.simulated import run_simulated
 from executive.mission.errors import InputError
 from executive.store.missions import MissionState, MissionStore, StoredMission
-from executive.tree.compiling.workshop import slug
+from executive.tree.compiling.builder import slug
 
 _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCELLED, MissionState.ERROR)
 
@@ -27,7 +28,7 @@ def run_queue(missions: MissionStore, console: Console, *, quiet: bool) -> list[
     results: list[dict[str, Any]] = []
     broken = missions.missions(MissionState.RUNNING)
     if broken:
-        what = f"mission {broken[-1].id} ({broken[-1].order.name}) was broken off"
+        what = f"mission {broken[-1].id} ({broken[-1].request.name}) was broken off"
         raise InputError(what, mend="`errand resume` goes on with it and then with the queue", file=missions.path)
     while queued := [each for each in missions.missions(MissionState.QUEUED) if each.queued]:
         results.append(start_of(missions, queued[0], console, quiet=quiet))
@@ -42,16 +43,16 @@ def start_of(missions: MissionStore, mission: StoredMission, console: Console, *
     Raises:
         InputError: its file, its world or the plant's state cannot be used.
     """
-    order = mission.order
-    request = asked_again(mission, missions.path).request()
-    tree = request.compile()
-    out = Path(order.out) / f"{mission.id:03d}-{slug(order.name)}" if mission.queued else Path(order.out)
+    prepared = prepare(as_it_was(mission, missions.path))
+    asked = mission.request
+    out = asked.out / f"{mission.id:03d}-{slug(asked.name)}" if mission.queued else asked.out
+    prepared = replace(prepared, request=replace(prepared.request, out=out))
     before = _before(missions, mission) if mission.queued else None
     durable = new_run(missions, mission) if before is None else next_run(missions, mission, before)
-    console.print(f"Mission {mission.id}: {order.name}", markup=False, style="bold")
+    console.print(f"Mission {mission.id}: {asked.name}", markup=False, style="bold")
     with kept(missions, mission) as ended:
-        start = partial(run_request, request, tree, seed=order.seed, out=out, record=order.record, durable=durable)
-        finished = show_run(start, request, tree, console, control=control_for(console, quiet=quiet), quiet=quiet)
+        start = partial(run_simulated, prepared, durable=durable)
+        finished = show_run(start, prepared, console, control=control_for(console, quiet=quiet), quiet=quiet)
         ended(finished.report)
     show_files(out, console)
     return {**finished.report.to_json(), "mission": mission.id, "achieved": finished.report.achieved}

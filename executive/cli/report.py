@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
 from rich.markup import escape
 
@@ -20,17 +20,21 @@ class RefereeReport:
     events: tuple[str, ...] = ()
 
 
+NOT_JUDGED: Final = RefereeReport(False, "there is no referee", 0, 0)
+
+
 @dataclass(frozen=True)
 class RunReport:
     """One run, with the keys that scripts rely on.
 
-    Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name.
+    Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name. `referee` is None
+    where nobody but the robot saw what happened.
     """
 
     outcome: str
     cause: str | None
     message: str
-    referee: RefereeReport
+    referee: RefereeReport | None
     commands: tuple[str, ...]
     world: str
     seed: int
@@ -48,38 +52,49 @@ class RunReport:
 
     @property
     def achieved(self) -> bool:
-        """The tree says so and the referee agrees."""
-        return self.claimed and self.referee.success
+        """The tree says so, and the referee agrees where there is one."""
+        return self.claimed and (self.referee is None or self.referee.success)
+
+    @property
+    def seen(self) -> RefereeReport:
+        """What the referee saw: nothing where there is none."""
+        return self.referee or NOT_JUDGED
 
     @property
     def false_claim(self) -> bool:
         """The tree says so and the referee does not agree."""
-        return self.claimed and not self.referee.success
+        return self.claimed and not self.achieved
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values; the referee's events are for people only."""
         values = {**asdict(replace(self, work={})), "commands": list(self.commands), "work": dict(self.work)}
-        del values["referee"]["events"]
+        if self.referee is not None:
+            del values["referee"]["events"]
         return values
 
     @staticmethod
     def from_json(values: Mapping[str, Any]) -> RunReport:
         """A report that another process has printed."""
         fields = {key: values[key] for key in RunReport.__dataclass_fields__}
-        referee = RefereeReport(**fields.pop("referee"))
+        referee = None if values["referee"] is None else RefereeReport(**values["referee"])
         return RunReport(**{**fields, "referee": referee, "commands": tuple(values["commands"])})
 
     def lines(self) -> tuple[str, ...]:
         """The two verdicts and the figures, with rich markup."""
         cause = f" ({self.cause})" if self.cause else ""
+        figures = (
+            f"{self.sim_time_s:.1f} s simulated in {self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), "
+            f"{self.ticks} ticks"
+        )
+        claims = f"[bold]The tree claims:[/bold] {_mark(self.claimed)} {self.outcome}{cause}: {escape(self.message)}"
+        if self.referee is None:
+            return claims, figures
         seen = "the mission is fulfilled" if self.referee.success else "the mission is not fulfilled"
-        events = tuple(escape(f"  {event}") for event in self.referee.events)
         return (
-            f"[bold]The tree claims:[/bold] {_mark(self.claimed)} {self.outcome}{cause}: {escape(self.message)}",
+            claims,
             f"[bold]The referee saw:[/bold] {_mark(self.referee.success)} {seen}: {escape(self.referee.why)}",
-            f"{self.referee.collisions} collisions, {self.referee.drops} drops; {self.sim_time_s:.1f} s simulated in "
-            f"{self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), {self.ticks} ticks",
-            *events,
+            f"{self.referee.collisions} collisions, {self.referee.drops} drops; {figures}",
+            *(escape(f"  {event}") for event in self.referee.events),
         )
 
 

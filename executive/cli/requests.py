@@ -1,90 +1,92 @@
-"""What the user asks for, a sentence or a mission file, in one world."""
+"""From what the user asks for to what can be run: the one place where a sentence or a mission file is understood."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from executive.cli.answers import NO_ANSWERS, Answers
+from executive.cli.answers import answerer, ask_at_terminal
 from executive.cli.worlds import knowledge_of, open_world
-from executive.language import Understanding, load_parser
+from executive.language import DependencyParser, Understanding, load_parser
+from executive.language.questions import Answerer
 from executive.mission.command import parse_command
 from executive.mission.errors import InputError
+from executive.mission.file.model import DEFAULT_WORLD, Mission
+from executive.mission.file.overrides import overridden
+from executive.mission.file.resolve import load_mission, mission_from_file
+from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge
-from executive.mission.mission import (
-    DEFAULT_WORLD,
-    Mission,
-    MissionFile,
-    load_mission,
-    mission_from_commands,
-    mission_from_file,
-    mission_from_meaning,
-    overridden,
-    understood,
-)
+from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
+from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
 from plant.worlds.world import World
 
+__all__ = ["Prepared", "fingerprint", "prepare", "replacing"]
+
 
 @dataclass(frozen=True)
-class Request:
-    """A mission, the world that it runs in, and what is known of that; `meant` is the sentence that it comes from."""
+class Prepared:
+    """A request that was understood: its mission, compiled, the world that it runs in, and what is known of that.
 
+    `meant` is what its sentence means, where it has one.
+    """
+
+    request: Request
     mission: Mission
     world: World
     knowledge: Knowledge
+    tree: CompiledTree
     meant: Understanding | None = None
 
-    def compile(self) -> CompiledTree:
-        """The mission's tree. Raises InputError."""
-        return compile_mission(self.mission, knowledge=self.knowledge, registry=installed_skills())
 
+def prepare(
+    request: Request,
+    *,
+    parser: Callable[[], DependencyParser] | None = None,
+    ask: Answerer | None = ask_at_terminal,
+) -> Prepared:
+    """Understand a request, and compile it.
 
-def said(text: str, *, world: str | None, require_wake: bool, answers: Answers = NO_ANSWERS) -> Request:
-    """The request of a sentence; `answers` are to the questions that it leaves open.
+    Args:
+        request: what the user asks for.
+        parser: loads the language's parser; loaded anew unless given.
+        ask: who is asked where somebody sits at a terminal and the request's policy allows it; None: nobody.
 
     Raises:
-        InputError: the world is unknown or its knowledge broken, or the sentence was not understood.
+        InputError: with file and line where it has a file: it or the world or its knowledge is broken, a sentence is
+            not understood, or the mission cannot be carried out.
     """
-    opened = open_world(world or DEFAULT_WORLD)
-    knowledge = knowledge_of(opened)
+    if not request.only_commands and (request.file is None) == (request.sentence is None):
+        raise InputError("a mission file or --say is needed, and not both", mend='try: --say "Hey Alice, ..."')
+    if request.file is not None:
+        return _filed(request, request.file, parser or load_parser, ask)
+    world = open_world(request.world or request.world_name or DEFAULT_WORLD)
+    knowledge = knowledge_of(world)
+    if request.sentence is None:
+        return _prepared(request, _commanded(request, world), world, knowledge)
     meant = understood(
-        text, parser=load_parser(), knowledge=knowledge, require_wake=require_wake, answer=answers.answerer(None)
+        request.sentence,
+        parser=(parser or load_parser)(),
+        knowledge=knowledge,
+        require_wake=request.require_wake,
+        answer=answerer(request.answers, request.questions, ask),
     )
-    mission = mission_from_meaning(meant, world=opened.name, robot_name=knowledge.robot.name)
-    return Request(mission, opened, knowledge, meant)
+    mission = mission_from_meaning(meant, world=world.name, robot_name=knowledge.robot.name)
+    return _prepared(replace(request, sentence=meant.text), mission, world, knowledge, meant)
 
 
-def commanded(commands: Sequence[str], *, name: str, robot: str, world: str | None) -> Request:
-    """The request of a mission of which only the commands are known, as text.
-
-    Raises:
-        InputError: the world is unknown or its knowledge broken, or a command is none.
-    """
-    opened = open_world(world or DEFAULT_WORLD)
-    knowledge = knowledge_of(opened)
-    try:
-        read = [parse_command(command) for command in commands]
-    except ValueError as error:
-        raise InputError(f"the mission '{name}' cannot be read: {error}", mend="give it again") from error
-    mission = mission_from_commands(read, world=opened.name, robot_name=robot)
-    return Request(replace(mission, name=name), opened, knowledge)
-
-
-def filed(file: Path, *, world: str | None, answers: Answers = NO_ANSWERS) -> Request:
-    """The request of a mission file; `world` stands in for the file's own, `answers` are to open questions.
-
-    Raises:
-        InputError: with file and line: the file is broken, its world unknown, or a step not understood.
-    """
+def _filed(request: Request, file: Path, parser: Callable[[], DependencyParser], ask: Answerer | None) -> Prepared:
+    """That of a mission file; the request's world stands in for the file's own."""
     loaded = load_mission(file)
-    opened = open_world(world) if world is not None else _own_world(loaded)
-    knowledge = overridden(loaded, knowledge_of(opened))
-    answer = answers.answerer(loaded.questions)
-    mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
-    return Request(mission, opened, knowledge)
+    world = open_world(request.world) if request.world is not None else _own_world(loaded)
+    knowledge = overridden(loaded, knowledge_of(world))
+    answer = answerer(request.answers, request.questions or loaded.questions, ask)
+    mission = mission_from_file(loaded, parser=parser(), knowledge=knowledge, answer=answer)
+    text = file.read_text(encoding="utf-8")
+    return _prepared(replace(request, text=text), mission, world, knowledge)
 
 
 def _own_world(loaded: MissionFile) -> World:
@@ -92,3 +94,36 @@ def _own_world(loaded: MissionFile) -> World:
         return open_world(loaded.world)
     except InputError as error:
         raise loaded.error(("world",), error.message, error.mend) from error
+
+
+def _commanded(request: Request, world: World) -> Mission:
+    """The mission of commands in their text form."""
+    try:
+        read = [parse_command(command) for command in request.commands]
+    except ValueError as error:
+        raise InputError(f"the mission '{request.name}' cannot be read: {error}", mend="give it again") from error
+    return replace(mission_from_commands(read, world=world.name, robot_name=request.robot), name=request.name)
+
+
+def _prepared(
+    request: Request, mission: Mission, world: World, knowledge: Knowledge, meant: Understanding | None = None
+) -> Prepared:
+    tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
+    compiled = _of_tree(replace(request, world_name=world.name, robot=mission.robot_name), tree)
+    return Prepared(compiled, mission, world, knowledge, tree, meant)
+
+
+def replacing(request: Request, tree: CompiledTree) -> Request:
+    """The request of a mission that takes another's place by a correction, of which the commands are known."""
+    return _of_tree(replace(request, sentence=None, file=None, text=None), tree)
+
+
+def _of_tree(request: Request, tree: CompiledTree) -> Request:
+    commands = tuple(map(str, tree.commands))
+    return replace(request, name=tree.mission_name, commands=commands, fingerprint=fingerprint(tree))
+
+
+def fingerprint(tree: CompiledTree) -> str:
+    """Equal for trees of the same nodes."""
+    nodes = "\n".join(f"{node.kind} {node.path_id}" for node in tree.root.walk())
+    return hashlib.sha256(nodes.encode()).hexdigest()[:16]

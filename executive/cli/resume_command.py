@@ -9,11 +9,11 @@ from typing import Annotated, Any, Final
 import typer
 from rich.console import Console
 
-from executive.cli.durable import STORE, TakenUp, kept, take_up
-from executive.cli.mission_run import Finished, run_request
+from executive.cli.durable import STORE, kept, take_up
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.queue_run import run_queue, start_of
 from executive.cli.shown import control_for, show_files, show_past, show_run
+from executive.cli.simulated import run_simulated
 from executive.mission.errors import InputError, listing
 from executive.store.missions import MissionState, MissionStore, StoredMission
 
@@ -61,28 +61,19 @@ def _broken_off(missions: MissionStore, number: int | None) -> StoredMission:
 
 def _go_on(missions: MissionStore, mission: StoredMission, console: Console, *, quiet: bool) -> dict[str, Any]:
     """Go on with one mission; its report with what was done with its past."""
-    order, out = mission.order, Path(mission.order.out)
+    name = mission.request.name
     if not missions.has_steps(mission.id):
-        console.print(f"Mission {mission.id} ({order.name}) had not begun; it begins now.", markup=False)
+        console.print(f"Mission {mission.id} ({name}) had not begun; it begins now.", markup=False)
         return start_of(missions, mission, console, quiet=quiet)
     taken = take_up(missions, mission)
-    console.print(f"Mission {mission.id} ({order.name}) goes on.", markup=False)
+    console.print(f"Mission {mission.id} ({name}) goes on.", markup=False)
     with kept(missions, mission) as ended:
-        start = _start(taken, mission, out)
-        finished = show_run(
-            start, taken.request, taken.tree, console, control=control_for(console, quiet=quiet), quiet=quiet
-        )
+        start = partial(run_simulated, taken.prepared, durable=taken.durable)
+        finished = show_run(start, taken.prepared, console, control=control_for(console, quiet=quiet), quiet=quiet)
         ended(finished.report)
     console.print("What became of its past:")
     show_past(taken.recollection.told, console)
-    show_files(out, console)
+    show_files(mission.request.out, console)
     report = finished.report
     told = list(taken.recollection.told)
     return {**report.to_json(), "mission": mission.id, "achieved": report.achieved, "resumed": told}
-
-
-def _start(taken: TakenUp, mission: StoredMission, out: Path) -> partial[Finished]:
-    order = mission.order
-    return partial(
-        run_request, taken.request, taken.tree, seed=order.seed, out=out, record=order.record, durable=taken.durable
-    )

@@ -11,12 +11,11 @@ from rich.console import Console
 
 from executive.cli.live import live_view
 from executive.cli.mission_run import Finished, both
-from executive.cli.requests import Request
+from executive.cli.requests import Prepared
 from executive.cli.talk import LateParser, conversation_of
 from executive.conversation import Conversation
 from executive.run.control import Control
 from executive.run.runner import Observer
-from executive.tree.compiler import CompiledTree
 from executive.view.text import to_rich
 
 
@@ -35,8 +34,7 @@ def control_for(console: Console, *, quiet: bool) -> Control:
 
 def show_run(
     start: Start,
-    request: Request,
-    tree: CompiledTree,
+    prepared: Prepared,
     console: Console,
     *,
     control: Control,
@@ -44,17 +42,17 @@ def show_run(
     conversation: Conversation | None = None,
 ) -> Finished:
     """Run it, shown on the console and controlled from there; `conversation` is one that goes on elsewhere, too."""
-    for told in request.mission.notes:
+    for told in prepared.mission.notes:
         console.print(f"{told}.", markup=False)
-    for command in request.mission.commands:
+    for command in prepared.mission.commands:
         console.print(str(command), markup=False)
     parser = LateParser()
-    talk = conversation or conversation_of(request, control, parser)
-    talk.begun(tree, memory=None if request.meant is None else request.meant.memory)
+    talk = conversation or conversation_of(prepared, control, parser)
+    talk.begun(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
     if quiet:
         finished = start(control=control, observer=None if conversation is None else talk.observe)
     else:
-        with live_view(tree, console, control, say=lambda text: talk.hear(text).text) as observer:
+        with live_view(prepared.tree, console, control, say=lambda text: talk.hear(text).text) as observer:
             if control.attended and conversation is None:
                 parser.load_ahead()
             finished = start(control=control, observer=both(observer, talk.observe))

@@ -88,7 +88,7 @@ def totals(reports: Sequence[RunReport]) -> dict[str, Any]:
     return {
         "runs": [report.to_json() for report in reports],
         "successes": sum(report.claimed for report in reports),
-        "referee_successes": sum(report.referee.success for report in reports),
+        "referee_successes": sum(report.seen.success for report in reports),
         "false_claims": sum(report.false_claim for report in reports),
     }
 
@@ -99,10 +99,10 @@ def rows(reports: Sequence[RunReport]) -> Iterator[tuple[str, ...]]:
         yield (
             str(report.seed),
             report.outcome,
-            "yes" if report.referee.success else "no",
-            str(report.referee.collisions),
-            str(report.referee.drops),
+            "yes" if report.seen.success else "no",
+            str(report.seen.collisions),
+            str(report.seen.drops),
             f"{report.sim_time_s:.1f}",
             f"{report.real_time_factor:.1f}",
-            report.message if report.referee.success else f"{report.message} / {report.referee.why}",
+            report.message if report.seen.success else f"{report.message} / {report.seen.why}",
         )

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import replace
 
-from executive.cli.requests import Request
+from executive.cli.requests import Prepared
 from executive.conversation import Conversation, Speech
 from executive.language import Understanding, load_parser, understand
 from executive.language.parser import SpacyParser
@@ -40,32 +40,32 @@ class LateParser:
 
 
 def conversation_of(
-    request: Request, control: Control, parser: LateParser, *, require_wake: bool = False
+    prepared: Prepared, control: Control, parser: LateParser, *, require_wake: bool = False
 ) -> Conversation:
     """A conversation with the robot of a request, in its world."""
     speech = Speech(
-        knowledge=request.knowledge,
-        robot_name=request.mission.robot_name,
-        understand=lambda text, memory: _understood(text, memory, request, parser),
-        compile=lambda commands, taken: _compiled(commands, taken, request),
+        knowledge=prepared.knowledge,
+        robot_name=prepared.mission.robot_name,
+        understand=lambda text, memory: _understood(text, memory, prepared, parser),
+        compile=lambda commands, taken: _compiled(commands, taken, prepared),
     )
-    return Conversation(speech, control, require_wake=require_wake, others=request.knowledge.robot.others)
+    return Conversation(speech, control, require_wake=require_wake, others=prepared.knowledge.robot.others)
 
 
-def _understood(text: str, memory: Memory | None, request: Request, parser: LateParser) -> Understanding:
+def _understood(text: str, memory: Memory | None, prepared: Prepared, parser: LateParser) -> Understanding:
     return understand(
         text,
         parser=parser(),
-        knowledge=request.knowledge,
+        knowledge=prepared.knowledge,
         require_wake=False,
-        robot_name=request.mission.robot_name,
+        robot_name=prepared.mission.robot_name,
         memory=memory,
     )
 
 
-def _compiled(commands: Sequence[Command], taken: frozenset[str], request: Request) -> CompiledTree:
+def _compiled(commands: Sequence[Command], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
     """The tree of a mission of these commands, under a name that is not taken. Raises InputError."""
-    mission = mission_from_commands(commands, world=request.world.name, robot_name=request.mission.robot_name)
+    mission = mission_from_commands(commands, world=prepared.world.name, robot_name=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
-    return compile_mission(replace(mission, name=name), knowledge=request.knowledge, registry=installed_skills())
+    return compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=installed_skills())

@@ -13,13 +13,14 @@ from typing import Annotated, Final
 import typer
 
 from executive.cli.output import refusals
-from executive.cli.requests import Request, filed, said
+from executive.cli.requests import prepare
 from executive.mission.errors import InputError
+from executive.mission.request import Request
 from executive.record.history import read_history
+from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.btcpp import to_btcpp
 from executive.view.collapse import DRAWN_NODES, MANY_NODES, folded_below, folded_to
 from executive.view.mermaid import to_mermaid
-from executive.view.model import NodeView, node_view, to_json
 from executive.view.svg import to_svg
 from executive.view.text import to_text
 
@@ -81,21 +82,21 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
         return read_history(Path(text)).trees(at_s)[-1]
     if at_s is not None:
         raise InputError("--at is for logs", mend="name a log.mcap that a run has written")
-    request = _request(text, say, world)
-    for note in request.mission.notes:
+    prepared = prepare(_request(text, say, world))
+    for note in prepared.mission.notes:
         typer.echo(note, err=True)
-    return node_view(request.compile().root)
+    return node_view(prepared.tree.root)
 
 
 def _request(text: str | None, say: str | None, world: str | None) -> Request:
     if text is not None and say is not None:
         raise InputError("a sentence and --say were given", mend="leave one of them out")
     if text is not None and (text.endswith((".yaml", ".yml")) or _is_file(text)):
-        return filed(Path(text), world=world)
+        return Request(file=Path(text), world=world)
     sentence = say if text is None else text
     if sentence is None:
         raise InputError("a mission file, a sentence or a log is needed", mend='try: errand tree "go to the kitchen"')
-    return said(sentence, world=world, require_wake=False)
+    return Request(sentence, world=world)
 
 
 def _is_file(text: str) -> bool:

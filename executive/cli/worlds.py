@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.mission.errors import InputError, did_you_mean
+from executive.mission.errors import InputError, suggestion
 from executive.mission.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import World, WorldError, known_worlds, load_world
 
@@ -19,9 +19,8 @@ def _world_error(name: str, error: Exception) -> InputError:
     """Of a world that is not there its name and what there is; else what its files say."""
     if not isinstance(error, OSError) and not str(error).startswith("unknown world"):
         return InputError(str(error))
-    near = did_you_mean(name, known_worlds())
     known = f"known are {', '.join(known_worlds())}, and folders with a world.dmd.yaml"
-    return InputError(f"unknown world '{name[:60]}'", mend=f"did you mean '{near}'?" if near else known)
+    return InputError(f"unknown world '{name[:60]}'", mend=suggestion(name, known_worlds(), known))
 
 
 def knowledge_of(world: World) -> Knowledge:

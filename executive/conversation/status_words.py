@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Final
 
 from py_trees.common import Status
 
-from executive.mission.knowledge import Corner, Knowledge
+from executive.mission.geometry import distance_m
+from executive.mission.knowledge import Knowledge
 from executive.run.control import ControlState, Mode
 from executive.run.runner import Progress
-from executive.run.snapshot import NodeState, Snapshot
+from executive.tree.snapshot import NodeState, Snapshot
 from skills.robot import Pose2D
 
 __all__ = ["doing_in_words", "place_in_words"]
@@ -27,11 +26,11 @@ def place_in_words(pose: Pose2D | None, knowledge: Knowledge) -> str:
     if pose is None:
         return "I do not know where I am; I am looking for my place"
     here = (pose.x_m, pose.y_m)
-    distances = {name: _distance_m(here, place.polygon) for name, place in knowledge.places.items()}
+    distances = {name: distance_m(place.polygon, here) for name, place in knowledge.places.items()}
     room = min(distances, key=lambda name: distances[name], default=None)
     if room is None:
         return f"I am at x {pose.x_m:.1f} m, y {pose.y_m:.1f} m"
-    beside = {name: _distance_m(here, knowledge.surfaces[name].polygon) for name in knowledge.surfaces_in(room)}
+    beside = {name: distance_m(knowledge.surfaces[name].polygon, here) for name in knowledge.surfaces_in(room)}
     nearest = min(beside, key=lambda name: beside[name], default=None)
     inside = f"in the {room}" if distances[room] <= IN_THE_ROOM_M else f"{distances[room]:.1f} m from the {room}"
     at = f", next to the {nearest}" if nearest is not None and beside[nearest] <= NEAR_M else ""
@@ -82,32 +81,6 @@ def _has_failed(node: NodeState) -> bool:
 def _name(path_id: str) -> str:
     """The last part of a path id, as words."""
     return path_id.rpartition("/")[2].replace("-", " ").replace("_", " ")
-
-
-def _distance_m(point: Corner, polygon: Sequence[Corner]) -> float:
-    """How far a point lies outside a polygon; 0 inside it."""
-    if _inside(point, polygon):
-        return 0.0
-    edges = zip(polygon, (*polygon[1:], polygon[0]), strict=True)
-    return min(_distance_to_edge_m(point, start, end) for start, end in edges)
-
-
-def _inside(point: Corner, polygon: Sequence[Corner]) -> bool:
-    """Whether a ray from the point crosses the outline an odd number of times."""
-    x, y = point
-    crossed = False
-    for (x1, y1), (x2, y2) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
-        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
-            crossed = not crossed
-    return crossed
-
-
-def _distance_to_edge_m(point: Corner, start: Corner, end: Corner) -> float:
-    (px, py), (ax, ay), (bx, by) = point, start, end
-    length2 = (bx - ax) ** 2 + (by - ay) ** 2
-    share = 0.0 if length2 == 0.0 else ((px - ax) * (bx - ax) + (py - ay) * (by - ay)) / length2
-    share = min(1.0, max(0.0, share))
-    return math.hypot(px - ax - share * (bx - ax), py - ay - share * (by - ay))
 
 
 _HELD: Final = frozenset({Mode.PAUSED, Mode.STOPPED, Mode.LEASE_LOST})

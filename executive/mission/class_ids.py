@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-__all__ = ["CLASS_IDS", "NOTHING_ID", "class_name"]
+__all__ = ["CLASS_IDS", "NOTHING_ID"]
 
 NOTHING_ID: Final = 0
 
@@ -23,8 +23,3 @@ CLASS_IDS: Final[Mapping[str, int]] = MappingProxyType(
         "cube": 9,
     }
 )
-
-
-def class_name(class_id: int) -> str:
-    """The class with that number; raises KeyError when there is none."""
-    return {number: name for name, number in CLASS_IDS.items()}[class_id]

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from skills.api import Thing
 
-__all__ = ["Command", "Task", "Thing", "is_attribute", "may_be_attribute", "parse_command", "thing"]
+__all__ = ["START", "Command", "Task", "Thing", "is_attribute", "may_be_attribute", "parse_command", "thing"]
 
 _ATTRIBUTE: Final = re.compile(
     r"red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver|golden|dark|bright|light"
@@ -23,6 +23,8 @@ _ATTRIBUTE: Final = re.compile(
     re.IGNORECASE,
 )
 _NOTHING: Final = "Nothing"
+START: Final = "start"
+"""The goal that is where the robot stood when it was spoken to."""
 _PLURAL: Final = "some"
 _RESERVED: Final = re.compile(r'[\[\]"]|^\s|\s$|\s\s|[^\S ]|^$')
 _NO_ATTRIBUTE: Final = re.compile(rf"\d+|{_PLURAL}|.*\s.*")

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["InputError", "Problems", "did_you_mean", "listing"]
+__all__ = ["InputError", "Problems", "SourceLine", "did_you_mean", "listing", "suggestion"]
+
+
+@dataclass(frozen=True)
+class SourceLine:
+    """A line (from 1) of a file that the user wrote."""
+
+    file: Path
+    line: int
 
 
 class InputError(Exception):
@@ -31,6 +40,13 @@ class InputError(Exception):
         self.file = None if file is None else Path(file)
         self.line = line
         super().__init__(str(self))
+
+    @classmethod
+    def at(cls, source: SourceLine | None, message: str, *, mend: str = "") -> InputError:
+        """An error in a line, where that is known."""
+        if source is None:
+            return cls(message, mend=mend)
+        return cls(message, mend=mend, file=source.file, line=source.line)
 
     def __str__(self) -> str:
         """One line: "file:line: what; mend"."""
@@ -81,6 +97,13 @@ def did_you_mean(word: str, known: Iterable[str]) -> str | None:
     by_lower = {name.lower(): name for name in known}
     near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.7)
     return by_lower[near[0]] if near else None
+
+
+def suggestion(word: str, known: Iterable[str], otherwise: str | None = None) -> str:
+    """The mend for a word that is not known: the one that was probably meant, else `otherwise`, else all there are."""
+    names = list(known)
+    near = did_you_mean(word, names)
+    return f"did you mean '{near}'?" if near else f"known are {listing(names)}" if otherwise is None else otherwise
 
 
 def listing(words: Iterable[str], *, last: str = "and") -> str:

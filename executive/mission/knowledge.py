@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.mission.class_ids import CLASS_IDS
 from executive.mission.command import Task
-from executive.mission.errors import InputError, did_you_mean, listing
+from executive.mission.errors import InputError, suggestion
 from executive.mission.yaml_source import YamlSource, read_yaml, validate
 
 __all__ = [
@@ -230,9 +230,7 @@ def _unless_known(
 ) -> Iterator[InputError]:
     names = list(known)
     if name not in names:
-        near = did_you_mean(name, names)
-        mend = f"did you mean {near!r}?" if near else f"known are {listing(names)}"
-        yield source.error(path, f"{name!r} is not known", mend)
+        yield source.error(path, f"{name!r} is not known", suggestion(name, names))
 
 
 def _doubles(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:

@@ -1,7 +1,4 @@
-"""Missions: a name, a world, and steps. They come from a sentence or from a YAML file.
-
-The schema of the files is `executive.mission.file.schema`.
-"""
+"""Missions of what was said: from a sentence to its meaning, from commands to a mission. Those of files: `file`."""
 
 from __future__ import annotations
 
@@ -13,59 +10,10 @@ from executive.language.asking import understand_asking
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
 from executive.mission.command import Command
 from executive.mission.errors import InputError
-from executive.mission.file.model import (
-    DEFAULT_WORLD,
-    Mission,
-    MissionStep,
-    OnFailure,
-    OperatorQuestion,
-    SkillCall,
-    SourceLine,
-    StepGuards,
-    StepPolicy,
-)
-from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import load_mission, mission_from_file
-from executive.mission.file.schema import MissionFile, StepFile
+from executive.mission.file.model import Mission, MissionStep
 from executive.mission.knowledge import Knowledge
 
-__all__ = [
-    "DEFAULT_WORLD",
-    "Mission",
-    "MissionFile",
-    "MissionStep",
-    "OnFailure",
-    "OperatorQuestion",
-    "SkillCall",
-    "SourceLine",
-    "StepFile",
-    "StepGuards",
-    "StepPolicy",
-    "load_mission",
-    "mission_from_commands",
-    "mission_from_file",
-    "mission_from_meaning",
-    "mission_from_sentence",
-    "overridden",
-    "understood",
-]
-
-
-def mission_from_sentence(
-    sentence: str,
-    *,
-    parser: DependencyParser,
-    knowledge: Knowledge,
-    world: str = DEFAULT_WORLD,
-    require_wake: bool = False,
-) -> Mission:
-    """The mission that a sentence asks for.
-
-    Raises:
-        InputError: the sentence is refused, leaves a question open or is not for this robot; the message says why.
-    """
-    meant = understood(sentence, parser=parser, knowledge=knowledge, require_wake=require_wake)
-    return mission_from_meaning(meant, world=world, robot_name=knowledge.robot.name)
+__all__ = ["mission_from_commands", "mission_from_meaning", "understood"]
 
 
 def understood(

@@ -13,7 +13,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from executive.mission.errors import InputError, did_you_mean, listing
+from executive.mission.errors import InputError, did_you_mean, listing, suggestion
 
 __all__ = ["YamlSource", "read_yaml", "validate"]
 
@@ -161,8 +161,7 @@ def _input_error(model: type[BaseModel], source: YamlSource, error: ErrorDetails
     where = ".".join(str(part) for part in path)
     known = _field_names(_model_at(model, path[:-1]))
     if error["type"] == "extra_forbidden":
-        near = did_you_mean(str(path[-1]), known)
-        mend = f"did you mean {near!r}?" if near else f"known keys are {listing(known)}"
+        mend = suggestion(str(path[-1]), known, f"known keys are {listing(known)}")
         return source.error(path, f"unknown key {path[-1]!r}", mend)
     if error["type"] == "missing":
         parent = ".".join(str(part) for part in path[:-1]) or "the file"

@@ -7,12 +7,11 @@ import platform
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from executive.mission.command import Command
+from executive.mission.command import START, Command
 from executive.mission.knowledge import Knowledge
 from executive.record.messages import TASK_TOPIC, task_messages
 from executive.record.schemas import RUN
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.steps import START
 from skills.api import Publish
 from skills.robot import Clock
 

@@ -12,8 +12,8 @@ from py_trees.common import Status
 from executive.mission.errors import InputError
 from executive.record.reader import Event, read_events
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
-from executive.run.snapshot import NodeState
-from executive.view.model import NodeView, logged_view
+from executive.tree.node_view import NodeView, logged_view
+from executive.tree.snapshot import NodeState
 from skills.api import Cause
 
 TRANSITION_KEYS = ("t", "node", "from", "to", "cause", "message")

@@ -18,7 +18,7 @@ from executive.mission.errors import InputError
 from executive.record.drawable import stamp
 from executive.record.reader import Event
 from executive.record.schemas import BOXES, DETECTIONS, PATH, POSE
-from executive.tree.compiling.workshop import slug
+from executive.tree.compiling.builder import slug
 
 _RULE: Final = "=" * 80
 _TIME: Final = f"{_RULE}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"

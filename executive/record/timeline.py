@@ -11,7 +11,7 @@ from executive.record.history import logged_activity, logged_state
 from executive.record.messages import DESTINATION_TOPIC, DETECT_TOPIC, TASK_TOPIC
 from executive.record.reader import Event
 from executive.record.schemas import ACTIVITY, CONTROL, ERRORS, OUTCOME, RUN, TRANSITIONS, TREE, WALL
-from executive.run.snapshot import NodeState
+from executive.tree.snapshot import NodeState
 
 
 @dataclass(frozen=True)

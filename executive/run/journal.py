@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from executive.run.snapshot import Change
 from executive.tree.compiler import CompiledTree
+from executive.tree.snapshot import Change
 from skills.robot import Pose2D
 
 

@@ -6,8 +6,8 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from executive.run.snapshot import Snapshot
 from executive.tree.compiler import CompiledTree
+from executive.tree.snapshot import Snapshot
 from skills.api import Cause
 from skills.robot import Pose2D
 

@@ -17,7 +17,6 @@ from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
 from executive.run.outcome import Glance, Outcome, RobotResult, RunResult
 from executive.run.session import Session
-from executive.run.snapshot import Snapshot
 from executive.run.tree_run import Ending
 from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog
 from executive.tree.behaviours.board import Board
@@ -25,7 +24,8 @@ from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.workshop import slug
+from executive.tree.compiling.builder import slug
+from executive.tree.snapshot import Snapshot
 from skills.api import Cause, Costmap, Detector, Localiser, Publish, Worker
 from skills.detection import NO_DETECTOR
 from skills.robot import Clock, LeaseError, Robot

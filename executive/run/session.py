@@ -14,14 +14,14 @@ from executive.run.control import Control
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
 from executive.run.outcome import Glance, Outcome, RobotResult
-from executive.run.snapshot import NodeState, Snapshot
 from executive.run.tree_run import Ending, TreeRun
 from executive.run.watchdog import VerbHung
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.workshop import slug, start_key
+from executive.tree.compiling.builder import slug, start_key
+from executive.tree.snapshot import NodeState, Snapshot
 from skills.api import Cause
 from skills.robot import Pose2D
 

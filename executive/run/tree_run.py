@@ -12,7 +12,6 @@ from executive.record.profile import Profile
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.journal import Journal, TickNote
 from executive.run.outcome import Outcome, RobotResult
-from executive.run.snapshot import Change, NodeState, Observed, Snapshot
 from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import Explained
@@ -20,7 +19,8 @@ from executive.tree.behaviours.gate import Gate
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
-from executive.view.model import node_view
+from executive.tree.node_view import node_view
+from executive.tree.snapshot import Change, NodeState, Observed, Snapshot
 from skills.api import Cause
 
 POSE_NOTE_PERIOD_S = 1.0

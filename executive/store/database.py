@@ -10,7 +10,7 @@ from typing import Final
 
 from executive.mission.errors import InputError
 
-VERSION: Final = 1
+VERSION: Final = 2
 APPLICATION_ID: Final = 0x45525244  # "ERRD"
 BUSY_S: Final = 2.0
 _SCHEMA: Final = """
@@ -28,6 +28,7 @@ CREATE TABLE mission (
     seed INTEGER NOT NULL,
     out TEXT NOT NULL,
     record INTEGER NOT NULL,
+    stack TEXT,
     commands TEXT NOT NULL,
     fingerprint TEXT NOT NULL,
     queued INTEGER NOT NULL,

@@ -8,22 +8,22 @@ import sqlite3
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
+from executive.mission.request import Request
 from executive.run.journal import TickNote
-from executive.run.snapshot import Change
 from executive.store.database import transaction
 from executive.store.recollection import Recollection
-from executive.store.records import Order
+from executive.store.records import row_of
 from executive.store.values import to_text
 from executive.tree.compiler import CompiledTree
+from executive.tree.snapshot import Change
 from skills.robot import Pose2D
 
 MOVED_M: Final = 0.02
 TURNED_RAD: Final = 0.02
 _PUT_STEP: Final = "INSERT OR REPLACE INTO step VALUES (?, ?, ?, ?, ?, ?, ?)"
 _PUT_VALUE: Final = "INSERT OR REPLACE INTO value VALUES (?, ?, ?)"
-_REPLACE: Final = (
-    "UPDATE mission SET name = ?, commands = ?, fingerprint = ?, sentence = ?, file = ?, text = ? WHERE id = ?"
-)
+_REPLACED: Final = ("name", "commands", "fingerprint", "sentence", "file", "text")
+_REPLACE: Final = f"UPDATE mission SET {', '.join(f'{name} = :{name}' for name in _REPLACED)} WHERE id = :id"
 
 
 class StoreJournal:
@@ -42,28 +42,28 @@ class StoreJournal:
         self._checkpoints: dict[str, str] = {}
         self._pose: Pose2D | None = None
         self._recollection: Recollection | None = None
-        self._order_of: Callable[[CompiledTree], Order] | None = None
+        self._request_of: Callable[[CompiledTree], Request] | None = None
         self.keep_world: Callable[[], None] = _no_world
         self.troubles: list[str] = []
 
-    def replaceable(self, order_of: Callable[[CompiledTree], Order]) -> StoreJournal:
-        """The journal of a mission whose place another may take; `order_of` gives that one's order."""
-        self._order_of = order_of
+    def replaceable(self, request_of: Callable[[CompiledTree], Request]) -> StoreJournal:
+        """The journal of a mission whose place another may take; `request_of` gives that one's request."""
+        self._request_of = request_of
         return self
 
     def replaced(self, tree: CompiledTree) -> StoreJournal:
         """Keep the mission that takes this one's place in its stead, with nothing done of it yet."""
         journal = StoreJournal(self._connection, self._mission)
         journal.troubles, journal.keep_world = self.troubles, self.keep_world
-        if self._order_of is None:
+        if self._request_of is None:
             return journal
-        order = self._order_of(tree)
-        journal.replaceable(self._order_of)
+        row = {**row_of(self._request_of(tree)), "id": self._mission}
+        journal.replaceable(self._request_of)
         try:
             with transaction(self._connection):
                 for table in ("step", "value"):
                     self._connection.execute(f"DELETE FROM {table} WHERE mission = ?", (self._mission,))
-                self._connection.execute(_REPLACE, (*_told(order), self._mission))
+                self._connection.execute(_REPLACE, row)
         except sqlite3.Error as error:
             self._trouble(f"the mission that took this one's place could not be kept ({error})")
         return journal
@@ -137,10 +137,6 @@ class StoreJournal:
 
 def _no_world() -> None:
     """There is no world to keep: it stays by itself."""
-
-
-def _told(order: Order) -> tuple[str | None, ...]:
-    return (order.name, json.dumps(order.commands), order.fingerprint, order.sentence, order.file, order.text)
 
 
 def _apart(before: Pose2D | None, now: Pose2D) -> bool:

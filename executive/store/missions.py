@@ -9,21 +9,22 @@ import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
 from py_trees.common import Status
 
 from executive.mission.errors import InputError, listing
+from executive.mission.request import Request
 from executive.store.database import connect, told, transaction
 from executive.store.journal import StoreJournal
-from executive.store.records import Memory, Order, StepRecord
+from executive.store.records import Memory, StepRecord, request_of, row_of
 from executive.store.values import from_text
 from skills.api import Cause
 from skills.robot import Pose2D
 
-__all__ = ["MissionState", "MissionStore", "Order", "StoredMission"]
+__all__ = ["MissionState", "MissionStore", "StoredMission"]
 
 
 class MissionState(enum.Enum):
@@ -43,7 +44,7 @@ class StoredMission:
 
     id: int
     state: MissionState
-    order: Order
+    request: Request
     queued: bool
     starts: int
     message: str
@@ -69,9 +70,9 @@ class MissionStore:
         """Close it; idempotent."""
         self._connection.close()
 
-    def add(self, order: Order, *, queued: bool) -> StoredMission:
-        """Keep a mission that is still to be run."""
-        values = {**asdict(order), "commands": json.dumps(order.commands), "queued": queued, "state": "queued"}
+    def add(self, request: Request, *, queued: bool) -> StoredMission:
+        """Keep a mission that is still to be run, its request understood."""
+        values = {**row_of(request), "queued": queued, "state": "queued"}
         names, marks = ", ".join(values), ", ".join(f":{name}" for name in values)
         with self._writing():
             cursor = self._connection.execute(f"INSERT INTO mission ({names}) VALUES ({marks})", values)
@@ -166,12 +167,10 @@ class MissionStore:
 
 
 def _mission(row: sqlite3.Row) -> StoredMission:
-    own = {name: row[name] for name in Order.__dataclass_fields__}
-    own |= {"commands": tuple(json.loads(row["commands"])), "require_wake": bool(row["require_wake"])}
     return StoredMission(
         id=row["id"],
         state=MissionState(row["state"]),
-        order=Order(**{**own, "record": bool(row["record"])}),
+        request=request_of(dict(row)),
         queued=bool(row["queued"]),
         starts=row["starts"],
         message=row["message"],

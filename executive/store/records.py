@@ -1,13 +1,16 @@
-"""What the store knows of a mission that was broken off."""
+"""What the store knows of a mission: what was asked for, and how far it came before it was broken off."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
 from py_trees.common import Status
 
+from executive.mission.request import Request
 from skills.api import Cause
 from skills.robot import Pose2D
 
@@ -37,25 +40,25 @@ class Memory:
     pose: Pose2D | None
 
 
-@dataclass(frozen=True)
-class Order:
-    """What was asked for, complete enough to compile the same tree again.
+_AS_THEY_ARE: Final = ("name", "world_name", "robot", "seed", "fingerprint", "sentence", "text", "world")
 
-    Either `sentence`, or `file` with its `text`, or neither, where only the commands are known;
-    `world` as it was said, if it was. `out` is the folder for logs;
-    `fingerprint` that of the tree.
-    """
 
-    name: str
-    world_name: str
-    robot: str
-    seed: int
-    out: str
-    commands: tuple[str, ...]
-    fingerprint: str
-    sentence: str | None = None
-    file: str | None = None
-    text: str | None = None
-    world: str | None = None
-    require_wake: bool = False
-    record: bool = True
+def row_of(request: Request) -> dict[str, Any]:
+    """A request that was understood as columns; its answers stand in its sentence."""
+    own = {name: getattr(request, name) for name in _AS_THEY_ARE}
+    paths = {name: None if (path := getattr(request, name)) is None else str(path) for name in ("file", "stack")}
+    flags = {"require_wake": request.require_wake, "record": request.record}
+    return {**own, **flags, **paths, "commands": json.dumps(request.commands), "out": str(request.out)}
+
+
+def request_of(row: Mapping[str, Any]) -> Request:
+    """The request that `row_of` wrote."""
+    return Request(
+        **{name: row[name] for name in _AS_THEY_ARE},
+        commands=tuple(json.loads(row["commands"])),
+        file=None if row["file"] is None else Path(row["file"]),
+        stack=None if row["stack"] is None else Path(row["stack"]),
+        out=Path(row["out"]),
+        require_wake=bool(row["require_wake"]),
+        record=bool(row["record"]),
+    )

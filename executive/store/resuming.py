@@ -24,98 +24,87 @@ from executive.tree.behaviours.decorators import Guard
 from executive.tree.behaviours.explained import Explained
 from executive.tree.behaviours.freshness import Remembered
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.interrupts import InterruptsPlan
-from executive.tree.compiling.plans import NodePlan, SelectorPlan, SkillPlan
-from executive.tree.compiling.policies import AskPlan, SkipPlan
-from executive.tree.compiling.recovery import OnlyIfHoldingPlan, OnlyIfKnownPlan, RecoverPlan, RemedyPlan
+from executive.tree.kinds import Changes, build, writes
+from executive.tree.node import NodeSpec
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step
 
 BEFORE: Final = "before the restart"
+_CONDITIONAL: Final = frozenset({"only if known", "only if holding"})
 _DECLARED: Final = tuple(name for name, hint in Skill.__annotations__.items() if str(hint).startswith("ClassVar"))
 
 
 @dataclass(frozen=True)
 class ResumedTree(CompiledTree):
-    """A tree that begins with a blackboard as it was left."""
+    """A tree that begins with a blackboard as it was left, and some of whose nodes are changed once they are built."""
 
     board: Mapping[str, Any] = field(default_factory=dict)
+    changes: Changes = field(default_factory=dict)
 
     def build(self, context: RunContext) -> Behaviour:
         """The py_trees tree, its blackboard filled."""
         for key, value in self.board.items():
             context.board.put(key, value)
-        return super().build(context)
+        return build(self.root, context, self.changes)
 
 
 def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection]:
-    """The tree of a mission that goes on, and what it remembers; path ids stay the same."""
-    skills = {node.path_id: node for node in _mission(tree.root).walk() if isinstance(node, SkillPlan)}
-    kept = [path for path, plan in skills.items() if all(key in memory.board for _, key in plan.outputs)]
+    """The tree of a mission that goes on, and what it remembers; path ids stay the same.
+
+    What the mission is interrupted for is not taken up, but called for again where need be.
+    """
+    skills = {node.path_id: node for node in tree.mission.walk() if node.kind == "skill"}
+    kept = [
+        path for path, leaf in skills.items() if all(key in memory.board for key in leaf.options["outputs"].values())
+    ]
     recollection = Recollection(tree.path_ids, memory.steps).only(kept)
     parents = {child.path_id: node for node in tree.root.walk() for child in node.children}
     change = _Change(memory, recollection, parents)
-    root = tree.root
-    if isinstance(root, InterruptsPlan):
-        root = dataclasses.replace(root, mission=change.all_of(root.mission))
-    else:
-        root = change.all_of(root)
-    own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(tree)}
-    return ResumedTree(**{**own, "root": root, "board": memory.board}), recollection
-
-
-def _mission(root: NodePlan) -> NodePlan:
-    """The mission without what it is interrupted for: that is not taken up, but called for again where need be."""
-    return root.mission if isinstance(root, InterruptsPlan) else root
+    root = change.all_of(tree.mission)
+    if tree.root is not tree.mission:
+        root = dataclasses.replace(tree.root, children=(*tree.root.children[:-1], root))
+    own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
+    return ResumedTree(**{**own, "root": root}, board=memory.board, changes=change.made), recollection
 
 
 @dataclass(frozen=True)
 class _Change:
-    """Turns the plans of a tree into those of one that goes on."""
+    """Turns the specs of a tree into those of one that goes on; `made` is what is to be done to the built nodes."""
 
     memory: Memory
     recollection: Recollection
-    parents: Mapping[str, NodePlan]
+    parents: Mapping[str, NodeSpec]
+    made: dict[str, Callable[[Any], object]] = field(default_factory=dict)
 
-    def all_of(self, plan: NodePlan) -> NodePlan:
-        """The plan and all below, children first."""
-        fields = {each.name: getattr(plan, each.name) for each in dataclasses.fields(plan) if each.init}
-        changed = {name: self._value(value) for name, value in fields.items()}
-        new = {name: value for name, value in changed.items() if value is not fields[name]}
-        return self._one(dataclasses.replace(plan, **new) if new else plan)
+    def all_of(self, spec: NodeSpec) -> NodeSpec:
+        """The spec and all below, children first."""
+        return self._one(dataclasses.replace(spec, children=tuple(map(self.all_of, spec.children))))
 
-    def _value(self, value: Any) -> Any:
-        """The same for all plans inside a field's value."""
-        if isinstance(value, NodePlan):
-            return self.all_of(value)
-        if isinstance(value, RemedyPlan):
-            return dataclasses.replace(value, node=self.all_of(value.node))
-        if type(value) is tuple:
-            items = tuple(map(self._value, value))
-            return value if all(a is b for a, b in zip(items, value, strict=True)) else items
-        return value
+    def _one(self, spec: NodeSpec) -> NodeSpec:
+        path, step = spec.path_id, self.memory.steps.get(spec.path_id)
+        if spec.kind == "skill":
+            return self._skill(spec)
+        if spec.kind in _CONDITIONAL and self._was_reached(path):
+            self.made[path] = lambda node: _applies_as_before(node, self._begun(path))
+        elif spec.kind == "recover" and step is not None and step.status is Status.RUNNING:
+            return _with_options(spec, forgets=())
+        elif step is None or not step.ended:
+            return spec
+        elif spec.kind == "guard":
+            over = step.status is Status.SUCCESS or self._failed(spec.children[0].path_id)
+            self.made[path] = _Unguarded if over else lambda node: _AsBefore(node, step)
+        elif spec.kind == "ask" and step.status is Status.SUCCESS and self._failed(spec.children[0].path_id):
+            return dataclasses.replace(spec, kind="skip", options={"step": spec.options["step"]})
+        elif not spec.children and all(key in self.memory.board for key in writes(spec)):
+            self.made[path] = lambda node: _AsBefore(node, step)
+        return spec
 
-    def _one(self, plan: NodePlan) -> NodePlan:
-        step = self.memory.steps.get(plan.path_id)
-        if isinstance(plan, SkillPlan):
-            ports = {port: self.memory.board[key] for port, key in plan.outputs if key in self.memory.board}
-            skill = resumed_skill(plan.skill, plan.path_id, ports, self.recollection)
-            bound = {port for port, _ in plan.outputs}
-            skill.outputs = {port: kind for port, kind in plan.skill.outputs.items() if port in bound}
-            return dataclasses.replace(plan, skill=skill)
-        if isinstance(plan, OnlyIfKnownPlan | OnlyIfHoldingPlan) and self._was_reached(plan.path_id):
-            return _built(plan, lambda node: _applies_as_before(node, self._begun(plan.path_id)))
-        if isinstance(plan, RecoverPlan) and step is not None and step.status is Status.RUNNING:
-            return dataclasses.replace(plan, forgets=())
-        if step is None or not step.ended:
-            return plan
-        if plan.kind == "guard" and (step.status is Status.SUCCESS or self._failed(plan.children[0].path_id)):
-            return _built(plan, _Unguarded)
-        if isinstance(plan, AskPlan) and step.status is Status.SUCCESS and self._failed(plan.child.path_id):
-            return SkipPlan(path_id=plan.path_id, name=plan.name, source=plan.source, child=plan.child, step=plan.step)
-        known = all(key in self.memory.board for key in plan.writes())
-        if plan.kind == "guard" or (not plan.children and known):
-            return _built(plan, lambda node: _AsBefore(node, step))
-        return plan
+    def _skill(self, spec: NodeSpec) -> NodeSpec:
+        """A leaf whose skill gives its result from before, or does its work."""
+        skill, outputs = spec.options["skill"], spec.options["outputs"]
+        ports = {port: self.memory.board[key] for port, key in outputs.items() if key in self.memory.board}
+        resumed = resumed_skill(skill, spec.path_id, ports, self.recollection)
+        resumed.outputs = {port: kind for port, kind in skill.outputs.items() if port in outputs}
+        return _with_options(spec, skill=resumed)
 
     def _failed(self, path_id: str) -> bool:
         step = self.memory.steps.get(path_id)
@@ -124,30 +113,19 @@ class _Change:
     def _was_reached(self, path_id: str) -> bool:
         """Whether a way of a selector was gone or passed over, which a later one that was begun tells."""
         parent = self.parents[path_id]
-        ways = [child.path_id for child in parent.children]
-        if not isinstance(parent, SelectorPlan):
+        if parent.kind != "selector":
             return False
+        ways = [child.path_id for child in parent.children]
         step = self.memory.steps.get(parent.path_id)
-        ended = step is not None and step.ended
-        return ended or any(map(self._begun, ways[ways.index(path_id) :]))
+        return (step is not None and step.ended) or any(map(self._begun, ways[ways.index(path_id) :]))
 
     def _begun(self, path_id: str) -> bool:
         step = self.memory.steps.get(path_id)
         return step is not None and step.status is not Status.INVALID
 
 
-def _built(plan: NodePlan, change: Callable[[Any], object]) -> NodePlan:
-    """The plan of the same node, to which something is done once it is built."""
-    kind = type(plan)
-
-    def build(self: NodePlan, context: RunContext) -> Behaviour:
-        node = kind.build(self, context)
-        change(node)
-        return node
-
-    fields = {each.name: getattr(plan, each.name) for each in dataclasses.fields(plan) if each.init}
-    made: NodePlan = type(kind.__name__, (kind,), {"build": build})(**fields)
-    return made
+def _with_options(spec: NodeSpec, **options: Any) -> NodeSpec:
+    return dataclasses.replace(spec, options={**spec.options, **options})
 
 
 class _AsBefore:

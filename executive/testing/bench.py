@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +23,8 @@ from skills.testing.faults import Fault, parse_fault, with_faults
 TICK_S = 0.05
 HOLDER = "test"
 _PREFIX = "bench"
+_GOES_ON = (Status.INVALID, Status.RUNNING)
+_OUTCOMES = {Status.SUCCESS: "success", Status.FAILURE: "failure"}
 
 
 @dataclass(frozen=True)
@@ -103,17 +106,21 @@ class SkillBench:
         self._sense(self.robot)
         leaf.tick_once()
 
-    def run(self, skill: type[Skill[Any]], inputs: Any, *, limit_s: float | None = None) -> SkillRun:
-        """The skill from its beginning to its end, or to the time limit (s)."""
+    def run(
+        self, skill: type[Skill[Any]], inputs: Any, *, limit_s: float | None = None, cancel_at_s: float = math.inf
+    ) -> SkillRun:
+        """The skill from its beginning to its end, to the time limit (s), or until it is cancelled at a time (s)."""
         leaf = self.leaf(skill, inputs, limit_s=limit_s)
         begun_s, ticks = self.clock.now(), 0
         story: list[tuple[float, str]] = []
-        while leaf.status in (Status.INVALID, Status.RUNNING):
+        while leaf.status in _GOES_ON and self.clock.now() - begun_s < cancel_at_s - TICK_S / 2:
             self.tick(leaf)
             ticks += 1
             if not story or story[-1][1] != leaf.message:
                 story.append((round(self.clock.now() - begun_s, 3), leaf.message))
-        outcome = "success" if leaf.status is Status.SUCCESS else "failure"
+        outcome = _OUTCOMES.get(leaf.status, "cancelled")
+        if leaf.status in _GOES_ON:
+            leaf.stop(Status.INVALID)
         outputs = {port: self._context.board.get(f"{_PREFIX}/{port}") for port in skill.outputs if outcome == "success"}
         time_s = round(self.clock.now() - begun_s, 3)
         return SkillRun(outcome, leaf.cause, leaf.message, time_s, ticks, outputs, tuple(story))

@@ -6,7 +6,6 @@ otherwise.
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,11 +13,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
-from executive.mission.errors import InputError, did_you_mean, listing
+from executive.mission.errors import InputError, listing, suggestion
 from executive.mission.yaml_source import YamlSource, read_yaml, validate
 from executive.testing.small_room import room_knowledge
 from executive.tree.port_values import PortValueError, gathered, port_value
-from executive.tree.types import describe_type, field_types
+from executive.tree.types import describe_type, field_types, required
 from skills.api import Cause, Skill
 from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.testing.faults import parse_fault
@@ -154,7 +153,7 @@ class SkillTestFile(_Strict):
         hints, knowledge, values = field_types(skill.Inputs), room_knowledge(), self.ports(index)
         try:
             found = gathered(values, skill.Inputs)
-            missing = [field.name for field in dataclasses.fields(skill.Inputs) if _needed(field, found)]
+            missing = [name for name in required(skill.Inputs) if name not in found]
             if missing:
                 mend = f"give it a {describe_type(hints[missing[0]])}"
                 raise PortValueError((), f"input port '{missing[0]}' has no value", mend)
@@ -166,12 +165,6 @@ class SkillTestFile(_Strict):
             what = f"{port}: {error.message}" if port else error.message
             raise self.error((*where, *error.path), what, error.mend) from error
         return skill.Inputs(**given)
-
-
-def _needed(field: dataclasses.Field[Any], found: Mapping[str, Any]) -> bool:
-    """Whether a port has neither a value nor a default."""
-    missing = dataclasses.MISSING
-    return field.name not in found and field.default is missing and field.default_factory is missing
 
 
 def load_skill_tests(
@@ -186,8 +179,7 @@ def load_skill_tests(
     file = validate(SkillTestFile, source)
     file._source = source
     if file.skill not in skills:
-        near = did_you_mean(file.skill, skills)
-        mend = f"did you mean '{near}'?" if near else f"registered are {listing(skills)}"
+        mend = suggestion(file.skill, skills, f"registered are {listing(skills)}")
         raise file.error(("skill",), f"there is no skill '{file.skill}'", mend)
     for index, test in enumerate(file.tests):
         file.inputs(index, skills[file.skill])

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from py_trees.common import Status
-
-from executive.testing.bench import TICK_S, SkillBench, SkillRun
+from executive.testing.bench import SkillBench, SkillRun
 from executive.testing.skill_test import BlockSetup, RobotSetup, SkillTest, SkillTestFile, WorldSetup
 from skills.api import Skill
 from skills.robot import Capabilities, Pose2D
@@ -89,28 +88,9 @@ def carry_out(
     bench = makers[setup.kind](setup, test.world or file.world)
     bench.inject(*test.faults, kinds=kinds)
     inputs = file.inputs(index, skill)
-    if test.cancel_at_s is None:
-        run = bench.run(skill, inputs)
-    else:
-        run = _cancelled_run(bench, skill, inputs, test.cancel_at_s)
+    run = bench.run(skill, inputs, cancel_at_s=math.inf if test.cancel_at_s is None else test.cancel_at_s)
     bench.close()
     return Trial(test, run, tuple(_differences(test, run)))
-
-
-def _cancelled_run(bench: SkillBench, skill: type[Skill[Any]], inputs: Any, cancel_at_s: float) -> SkillRun:
-    """The run of a skill that is cancelled at a time, unless it has ended by itself before."""
-    leaf, begun_s, ticks = bench.leaf(skill, inputs), bench.clock.now(), 0
-    story: list[tuple[float, str]] = []
-    while bench.clock.now() - begun_s < cancel_at_s - TICK_S / 2 and leaf.status in (Status.INVALID, Status.RUNNING):
-        bench.tick(leaf)
-        ticks += 1
-        if not story or story[-1][1] != leaf.message:
-            story.append((round(bench.clock.now() - begun_s, 3), leaf.message))
-    outcome = {Status.SUCCESS: "success", Status.FAILURE: "failure"}.get(leaf.status, "cancelled")
-    if outcome == "cancelled":
-        leaf.stop(Status.INVALID)
-    time_s = round(bench.clock.now() - begun_s, 3)
-    return SkillRun(outcome, leaf.cause, leaf.message, time_s, ticks, {}, tuple(story))
 
 
 def _differences(test: SkillTest, run: SkillRun) -> list[str]:

@@ -105,6 +105,4 @@ def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilit
 def _at(part: StepPart, tree: CompiledTree, message: str, mend: str) -> InputError:
     """An error at the line that the part comes from."""
     source = next((node.source for node in tree.root.walk() if node.path_id == part.path_id), None)
-    if source is None:
-        return InputError(message, mend=mend)
-    return InputError(message, mend=mend, file=source.file, line=source.line)
+    return InputError.at(source, message, mend=mend)

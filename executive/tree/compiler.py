@@ -8,15 +8,16 @@ from dataclasses import dataclass
 from py_trees.behaviour import Behaviour
 
 from executive.mission.command import Command
-from executive.mission.errors import InputError
+from executive.mission.errors import InputError, SourceLine
 from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.context import RunContext
 from executive.tree.compiling.assembly import StepPart, assemble, step_name
-from executive.tree.compiling.interrupts import InterruptsPlan, watched
-from executive.tree.compiling.plans import NodePlan, Source
+from executive.tree.compiling.builder import PlanBuilder, Registry, start_key
+from executive.tree.compiling.interrupts import watched
 from executive.tree.compiling.wiring import check_wiring
-from executive.tree.compiling.workshop import Registry, Workshop, start_key
+from executive.tree.kinds import build
+from executive.tree.node import NodeSpec
 
 __all__ = ["CompiledTree", "Step", "StepPart", "compile_commands", "compile_mission", "step_name"]
 
@@ -26,7 +27,7 @@ class Step:
     """A command, and the line of the mission file that it comes from."""
 
     command: Command
-    source: Source | None = None
+    source: SourceLine | None = None
 
 
 @dataclass(frozen=True)
@@ -39,17 +40,17 @@ class CompiledTree:
     robot_name: str
     mission_name: str
     commands: tuple[Command, ...]
-    root: NodePlan
+    root: NodeSpec
     parts: tuple[StepPart, ...] = ()
 
     @property
-    def mission(self) -> NodePlan:
+    def mission(self) -> NodeSpec:
         """The mission below its watches."""
-        return self.root.mission if isinstance(self.root, InterruptsPlan) else self.root
+        return self.root.children[-1] if self.root.kind == "interrupts" else self.root
 
     def build(self, context: RunContext) -> Behaviour:
         """The py_trees tree for one run."""
-        return self.root.build(context)
+        return build(self.root, context)
 
     @property
     def path_ids(self) -> tuple[str, ...]:
@@ -71,12 +72,11 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
     """
     if not mission.steps:
         raise InputError(f"the mission '{mission.name}' has no commands", mend="add at least one step")
-    made = assemble(mission, knowledge=knowledge, registry=registry)
-    base = made.root.path_id
+    body, parts = assemble(mission, knowledge=knowledge, registry=registry)
     start = start_key(mission.robot_name, mission.name)
-    root = watched(Workshop(knowledge, registry, base, start, Command(), mission.source), made.root)
+    root = watched(PlanBuilder(knowledge, registry, body.path_id, start, Command(), mission.source), body)
     check_wiring(root)
-    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, made.parts)
+    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, parts)
 
 
 def compile_commands(

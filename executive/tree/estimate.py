@@ -1,6 +1,6 @@
 """What a mission will take when all goes well: time, way and charge, and what of it cannot be done at all.
 
-A plan's nodes are followed in the order in which they run without failures: of several ways the first that can be gone.
+A tree's nodes are followed in the order in which they run without failures: of several ways the first that can be gone.
 """
 
 from __future__ import annotations
@@ -9,18 +9,18 @@ import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Final, Protocol
+from types import MappingProxyType
+from typing import Annotated, Final, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from executive.mission.errors import InputError
 from executive.mission.yaml_source import read_yaml, validate
 from executive.tree.behaviours.board import Constant, FromBoard
-from executive.tree.compiling.plans import NodePlan, RememberPosePlan, RoundPlan, SelectorPlan, SkillPlan
-from executive.tree.compiling.recovery import OnlyIfKnownPlan
+from executive.tree.node import NodeSpec
 from skills.robot import Pose2D
 
-__all__ = ["Estimate", "Estimates", "Itinerary", "Way", "estimate_tree", "load_estimates"]
+__all__ = ["Estimate", "Estimates", "Itinerary", "Way", "estimate_tree", "expected", "load_estimates"]
 
 Positive = Annotated[float, Field(gt=0.0)]
 NAVIGATE: Final = "navigate"
@@ -103,7 +103,7 @@ class _Walk:
 
 
 def estimate_tree(
-    root: NodePlan, *, start: Pose2D, itinerary: Itinerary, estimates: Estimates
+    root: NodeSpec, *, start: Pose2D, itinerary: Itinerary, estimates: Estimates
 ) -> tuple[Estimate, tuple[InputError, ...]]:
     """What a tree will take from `start` on, and the places in it that cannot be reached, with their lines."""
     walk = _Walk(itinerary, estimates, start)
@@ -116,11 +116,10 @@ def load_estimates() -> Estimates:
     return validate(Estimates, read_yaml(Path(__file__).with_name("estimates.yaml")))
 
 
-def _followed(node: NodePlan, walk: _Walk, *, first: bool) -> Estimate:
+def _followed(node: NodeSpec, walk: _Walk, *, first: bool) -> Estimate:
     """A node's estimate. What cannot be done is noted and left out; with `first` it is raised instead."""
-    visit = next((visit for kind, visit in _VISITS.items() if isinstance(node, kind)), _all_of)
     try:
-        return visit(node, walk, first)
+        return _VISITS.get(node.kind, _all_of)(node, walk, first)
     except _CannotError as cannot:
         if first:
             raise
@@ -129,31 +128,37 @@ def _followed(node: NodePlan, walk: _Walk, *, first: bool) -> Estimate:
         return Estimate()
 
 
-def _all_of(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+def expected(node: NodeSpec) -> tuple[NodeSpec, ...]:
+    """The nodes below that run, one after the other, when all goes well."""
+    follow = _EXPECTED.get(node.kind)
+    return node.children if follow is None else follow(node)
+
+
+def _all_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """One after the other."""
-    return sum((_followed(child, walk, first=first) for child in node.expected), Estimate())
+    return sum((_followed(child, walk, first=first) for child in expected(node)), Estimate())
 
 
-def _first_of(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+def _first_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """The first way that can be gone; when there is none, the first one's reason."""
     reasons: list[InputError] = []
-    for child in node.expected:
+    for child in expected(node):
         tried = _tried(child, walk, reasons)
         if tried is not None:
             return tried
     raise _CannotError(reasons[0] if reasons else None)
 
 
-def _all_that_can(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+def _all_that_can(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """All ways that can be gone; when there is none, the first one's reason."""
     reasons: list[InputError] = []
-    done = [tried for child in node.expected if (tried := _tried(child, walk, reasons)) is not None]
+    done = [tried for child in expected(node) if (tried := _tried(child, walk, reasons)) is not None]
     if not done:
         raise _CannotError(reasons[0] if reasons else None)
     return sum(done, Estimate())
 
 
-def _tried(way: NodePlan, walk: _Walk, reasons: list[InputError]) -> Estimate | None:
+def _tried(way: NodeSpec, walk: _Walk, reasons: list[InputError]) -> Estimate | None:
     """One way; None where it cannot be gone: then the walk stands as before, and `reasons` has its reason."""
     here, noted = walk.pose, dict(walk.noted)
     try:
@@ -164,55 +169,58 @@ def _tried(way: NodePlan, walk: _Walk, reasons: list[InputError]) -> Estimate | 
         return None
 
 
-def _if_known(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
+def _if_known(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """What runs only after an earlier node has written something."""
-    assert isinstance(node, OnlyIfKnownPlan)
-    if node.key not in walk.written:
+    if node.options["key"] not in walk.written:
         raise _CannotError(None)
-    return _followed(node.child, walk, first=first)
+    return _followed(node.children[0], walk, first=first)
 
 
-def _remember(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
-    assert isinstance(node, RememberPosePlan)
-    walk.noted[node.key] = walk.pose
+def _remember(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    walk.noted[node.options["key"]] = walk.pose
     return Estimate()
 
 
-def _skill(node: NodePlan, walk: _Walk, first: bool) -> Estimate:
-    assert isinstance(node, SkillPlan)
+def _skill(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     goal = _goal(node, walk)
-    walk.written.update(key for _, key in node.outputs)
+    walk.written.update(node.options["outputs"].values())
     if goal is None:
         duration_s = walk.estimates.skills.get(node.name, walk.estimates.other_skill_s)
         return Estimate(duration_s, 0.0, duration_s * walk.estimates.battery.standing_per_s)
     try:
         way = walk.itinerary.way(walk.pose, goal)
     except ValueError as error:
-        place = {} if node.source is None else {"file": node.source.file, "line": node.source.line}
         mend = "name another place or pose, or mend the world's map"
-        raise _CannotError(_located(str(error).rstrip("."), mend, place)) from error
+        raise _CannotError(InputError.at(node.source, str(error).rstrip("."), mend=mend)) from error
     walk.pose = goal
     drive = walk.estimates.drive
     duration_s = drive.overhead_s + drive.per_metre_s * way.progress_m
     return Estimate(duration_s, way.length_m, duration_s * walk.estimates.battery.driving_per_s)
 
 
-def _located(message: str, mend: str, place: Mapping[str, Any]) -> InputError:
-    return InputError(message, mend=mend, **place)
-
-
-def _goal(node: SkillPlan, walk: _Walk) -> Pose2D | None:
+def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
     """Where a drive leads, as far as that is known before."""
-    binding = dict(node.inputs).get("goal") if node.name == NAVIGATE else None
+    binding = node.options["inputs"].get("goal") if node.name == NAVIGATE else None
     if isinstance(binding, FromBoard):
         return walk.noted.get(binding.key)
     return binding.value if isinstance(binding, Constant) and isinstance(binding.value, Pose2D) else None
 
 
-_VISITS: Final[Mapping[type[NodePlan], Callable[[NodePlan, _Walk, bool], Estimate]]] = {
-    SkillPlan: _skill,
-    RememberPosePlan: _remember,
-    OnlyIfKnownPlan: _if_known,
-    SelectorPlan: _first_of,
-    RoundPlan: _all_that_can,
-}
+_VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = MappingProxyType(
+    {
+        "skill": _skill,
+        "remember": _remember,
+        "selector": _first_of,
+        "round": _all_that_can,
+        "only if known": _if_known,
+    }
+)
+_EXPECTED: Final[Mapping[str, Callable[[NodeSpec], tuple[NodeSpec, ...]]]] = MappingProxyType(
+    {
+        "recover": lambda node: node.children[:1],
+        "go back": lambda node: node.children[:1],
+        "afterwards": lambda node: node.children[:1] if node.options["only_after_failure"] else node.children,
+        "interrupts": lambda node: node.children[-1:],
+        "only if holding": lambda node: (),
+    }
+)

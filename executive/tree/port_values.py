@@ -18,9 +18,9 @@ from types import MappingProxyType
 from typing import Any, Final, Union
 
 from executive.mission.command import thing
-from executive.mission.errors import did_you_mean, listing
+from executive.mission.errors import listing, suggestion
 from executive.mission.knowledge import Knowledge
-from executive.tree.types import describe_type, field_types
+from executive.tree.types import describe_type, field_types, required
 from skills.api import Surface, Thing
 from skills.robot import Pose2D
 
@@ -103,9 +103,9 @@ def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable
     fields = {_UNIT.sub("", name) for names in (*records.values(), hints) for name in names}
     known = {**dict.fromkeys(hints), **dict.fromkeys(sorted(fields))}
     wrong = next((key for key in loose if _named(key, known) is None), next(iter(loose)))
-    near = did_you_mean(wrong, [word for word in known if word != wrong])
     ports = f"its ports are {listing(hints)}" if hints else "it has no input ports"
-    raise PortValueError((wrong,), f"there is no input port '{wrong}'", f"did you mean '{near}'?" if near else ports)
+    mend = suggestion(wrong, (word for word in known if word != wrong), ports)
+    raise PortValueError((wrong,), f"there is no input port '{wrong}'", mend)
 
 
 def _is_record(hint: Any) -> bool:
@@ -157,16 +157,13 @@ def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
     for key, item in value.items():
         name = _named(str(key), hints)
         if name is None:
-            near = did_you_mean(str(key), plain)
-            mend = f"did you mean '{near}'?" if near else f"known are {listing(plain)}"
-            raise PortValueError((*path, str(key)), f"{record.__name__} has no '{key}'", mend)
+            what = f"{record.__name__} has no '{key}'"
+            raise PortValueError((*path, str(key)), what, suggestion(str(key), plain))
         read[name] = port_value(item, hints[name], knowledge, (*path, str(key)))
     filled = {**_DEFAULTS.get(record, {}), **read}
-    for field in dataclasses.fields(record):
-        optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
-        if field.name not in filled and not optional:
-            missing = _UNIT.sub("", field.name)
-            raise PortValueError(path, f"'{missing}' is missing", f"give {listing(plain)}")
+    for name in required(record):
+        if name not in filled:
+            raise PortValueError(path, f"'{_UNIT.sub('', name)}' is missing", f"give {listing(plain)}")
     try:
         return record(**filled)
     except (ValueError, TypeError) as error:
@@ -178,9 +175,7 @@ def _word(value: Any, words: type[enum.Enum], path: Path) -> enum.Enum:
         if value in (member.value, member.name, member.name.lower()):
             return member
     known = [str(member.value) for member in words]
-    near = did_you_mean(str(value), known)
-    mend = f"did you mean '{near}'?" if near else f"known are {listing(known)}"
-    raise PortValueError(path, f"{value!r} is none of its words", mend)
+    raise PortValueError(path, f"{value!r} is none of its words", suggestion(str(value), known))
 
 
 def _plain(value: Any, hint: Any, path: Path) -> Any:
@@ -251,8 +246,7 @@ def _refusal(value: Any, wanted: str, path: Path) -> PortValueError:
 
 
 def _unknown(kind: str, name: str, known: tuple[str, ...], knowledge: Knowledge, path: Path) -> PortValueError:
-    near = did_you_mean(name, knowledge.spellings(known))
-    mend = f"did you mean '{near}'?" if near else f"known are {listing(known)}"
+    mend = suggestion(name, knowledge.spellings(known), f"known are {listing(known)}")
     return PortValueError(path, f"unknown {kind} '{name}'", mend)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import types
 import typing
@@ -39,6 +40,12 @@ def assignable(source: Any, target: Any) -> bool:
         return any(assignable(source, option) for option in typing.get_args(target))
     plain = isinstance(source, type) and isinstance(target, type)
     return plain and issubclass(source, target)
+
+
+def required(record: type) -> tuple[str, ...]:
+    """The fields of a dataclass that have no default."""
+    missing, fields = dataclasses.MISSING, dataclasses.fields(record)
+    return tuple(field.name for field in fields if field.default is missing and field.default_factory is missing)
 
 
 def describe_type(hint: Any) -> str:

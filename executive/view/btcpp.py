@@ -14,9 +14,9 @@ from types import MappingProxyType
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
+from executive.tree.node_view import NodeView
+from executive.tree.ports import Port
 from executive.view.looks import look_of
-from executive.view.model import NodeView
-from executive.view.ports import Port
 from executive.view.text import note_of, printable
 
 FORMAT: Final = "4"

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from py_trees.common import Status
 
-from executive.view.model import NodeView
+from executive.tree.node_view import NodeView
 from executive.view.text import closed
 
 MANY_NODES = 80

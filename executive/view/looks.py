@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from py_trees.common import Status
 
-from executive.run.snapshot import NodeState
+from executive.tree.snapshot import NodeState
 from skills.api import Cause
 
 

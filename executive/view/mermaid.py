@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from executive.tree.node_view import NodeView
 from executive.view.looks import Look, Looks, look_of
-from executive.view.model import NodeView
 from executive.view.text import note_of, printable
 
 _SAFE: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 .,:()-_/+'")

@@ -9,8 +9,8 @@ from html import escape
 from types import MappingProxyType
 from typing import Final
 
+from executive.tree.node_view import NodeView
 from executive.view.looks import Look, Looks, look_of
-from executive.view.model import NodeView
 from executive.view.text import note_of, printable
 
 BOX_W: Final = 232

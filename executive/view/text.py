@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from py_trees.common import Status
 from rich.text import Text
 
+from executive.tree.node_view import NodeView
 from executive.view.looks import Look, look_of
-from executive.view.model import NodeView
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from executive.language import load_parser
+from executive.mission.file.resolve import mission_from_file
 from executive.mission.knowledge import load_knowledge
-from executive.mission.mission import mission_from_file
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 

@@ -12,12 +12,12 @@ import pytest
 
 from executive.mission.command import parse_command
 from executive.mission.knowledge import Knowledge
+from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
-from executive.store.records import Order
 from executive.tree.compiler import Step, compile_commands
 from tests.executive.conftest import (
     FETCH,
@@ -50,9 +50,9 @@ def ticks_of_a_run(tree, folder):
     """Run the mission with its log and journal; the CPU time of each cycle (s), the tree's tick and all around it."""
     clock, ends = ManualClock(), []
     log = EventLog(folder / "log.mcap", clock)
-    order = Order("fetch drink", "flat", "Alice", 1, str(folder), FETCH, "")
+    request = Request(name="fetch drink", world_name="flat", robot="Alice", out=folder, commands=FETCH)
     with MissionStore(folder / "missions.sqlite") as store, LockStepWorker(clock) as worker:
-        journal = store.journal(store.add(order, queued=False).id)
+        journal = store.journal(store.add(request, queued=False).id)
         result = run(
             [RunEntry(tree, ScriptedRobot(clock), StillLocaliser(), EmptyCostmap(), journal)],
             clock=clock,

@@ -11,7 +11,7 @@ import yaml
 
 from executive.language import load_parser, understand
 from executive.mission.knowledge import load_knowledge
-from executive.mission.mission import mission_from_sentence
+from executive.mission.mission import mission_from_meaning, understood
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from plant.worlds.world import load_world
@@ -49,7 +49,8 @@ def test_parse_to_compiled_tree(benchmark):
     knowledge, registry = load_knowledge(load_world("flat").knowledge_path), built_in_skills()
 
     def compiled():
-        mission = mission_from_sentence(SENTENCE, parser=parser, knowledge=knowledge, require_wake=True)
+        meant = understood(SENTENCE, parser=parser, knowledge=knowledge, require_wake=True)
+        mission = mission_from_meaning(meant, world="flat", robot_name="Alice")
         return compile_mission(mission, knowledge=knowledge, registry=registry)
 
     assert benchmark(compiled).commands

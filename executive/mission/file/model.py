@@ -9,9 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from executive.mission.command import Command
-from executive.mission.errors import InputError
-from executive.tree.behaviours.conditions import StaleData
-from executive.tree.compiling.plans import Source
+from executive.mission.errors import InputError, SourceLine
 
 __all__ = [
     "DEFAULT_WORLD",
@@ -22,13 +20,21 @@ __all__ = [
     "OperatorQuestion",
     "SkillCall",
     "SourceLine",
+    "StaleData",
     "StepGuards",
     "StepPolicy",
 ]
 
 DEFAULT_WORLD: Final = "flat"
 KeyPath = tuple[str | int, ...]
-SourceLine = Source
+
+
+class StaleData(enum.Enum):
+    """What a condition makes of a reading that is older than it may be."""
+
+    WAIT = "wait"  # stand still until there is a new one, and fail when the patience is over
+    FAIL = "fail"  # count it as violated at once
+    ACCEPT = "accept"  # judge by what there is
 
 
 class OnFailure(enum.Enum):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from executive.mission.command import Command, Thing, parse_command
-from executive.mission.errors import InputError, Problems, did_you_mean, listing
+from executive.mission.command import START, Command, Thing, parse_command
+from executive.mission.errors import InputError, Problems, listing, suggestion
 from executive.mission.file.model import KeyPath
 from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge
@@ -14,7 +14,6 @@ from executive.mission.knowledge import Knowledge
 __all__ = ["typed_command"]
 
 _NOTHING: Final = "Nothing"
-_START: Final = "start"
 
 
 def typed_command(file: MissionFile, index: int, knowledge: Knowledge) -> Command:
@@ -41,7 +40,7 @@ def _unknown_names(file: MissionFile, path: KeyPath, command: Command, knowledge
     for key, thing in (("take", command.item), ("object", command.object)):
         if thing is not None and knowledge.thing(thing.name) is None:
             yield _unknown(file, (*path, key), "thing", thing.name, knowledge.thing_names(), knowledge)
-    goals = (*knowledge.place_names(), *knowledge.people, _START)
+    goals = (*knowledge.place_names(), *knowledge.people, START)
     if command.goal is not None and _goal(command.goal, knowledge) is None:
         yield _unknown(file, (*path, "to"), "place or person", command.goal, goals, knowledge)
     if command.goal_at is not None and knowledge.place(command.goal_at) is None:
@@ -51,8 +50,7 @@ def _unknown_names(file: MissionFile, path: KeyPath, command: Command, knowledge
 def _unknown(
     file: MissionFile, path: KeyPath, kind: str, name: str, known: Sequence[str], knowledge: Knowledge
 ) -> InputError:
-    near = did_you_mean(name, knowledge.spellings(known))
-    mend = f"did you mean {near!r}?" if near else f"known are {listing(known)}"
+    mend = suggestion(name, knowledge.spellings(known), f"known are {listing(known)}")
     return file.error(path, f"unknown {kind} {name!r}", mend)
 
 
@@ -74,4 +72,4 @@ def _known(command: Command, knowledge: Knowledge) -> Command:
 
 
 def _goal(name: str, knowledge: Knowledge) -> str | None:
-    return _START if name == _START else knowledge.place(name) or knowledge.person(name)
+    return START if name == START else knowledge.place(name) or knowledge.person(name)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from executive.mission.errors import InputError, did_you_mean, listing
+from executive.mission.errors import InputError, did_you_mean, listing, suggestion
 from executive.mission.file.model import KeyPath
 from executive.mission.yaml_source import YamlSource
 
@@ -36,9 +36,8 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
     declared = _declared(source)
     unknown = [name for name in given if name not in declared]
     if unknown:
-        near = did_you_mean(unknown[0], declared)
         known = f"it has {listing(declared)}" if declared else "it declares none"
-        mend = f"did you mean '{near}'?" if near else known
+        mend = suggestion(unknown[0], declared, known)
         raise InputError(f"{source.path.name} has no parameter '{unknown[0]}'", mend=mend)
     values = {**declared, **given}
     for name, value in values.items():

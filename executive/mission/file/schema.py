@@ -19,11 +19,11 @@ from executive.mission.file.model import (
     OnFailure,
     OperatorQuestion,
     SourceLine,
+    StaleData,
     StepGuards,
     StepPolicy,
 )
 from executive.mission.yaml_source import YamlSource
-from executive.tree.behaviours.conditions import StaleData
 
 __all__ = ["AskFile", "GuardsFile", "MissionFile", "PolicyFile", "StepFile", "mission_json_schema", "schema_text"]
 

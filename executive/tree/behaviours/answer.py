@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 from py_trees.behaviour import Behaviour
@@ -12,19 +12,12 @@ from py_trees.common import Status
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.decorators import ExplainedDecorator
 from executive.tree.behaviours.explained import Explained
+from executive.tree.node import NodeKind
 from skills.api import Cause, Failed, ObjectObservation, Publish
 from skills.detect.counting import told_apart
 from skills.detect.words import counted
 
 ANSWER_TOPIC: Final = "answer"
-
-
-@dataclass(frozen=True)
-class Tally:
-    """What is to be counted: all that the leaves of looks saw, each under a blackboard key; yes is `needed` of them."""
-
-    keys: Mapping[str, str]
-    needed: int
 
 
 class Answer(ExplainedDecorator):
@@ -36,8 +29,9 @@ class Answer(ExplainedDecorator):
     which means that they succeeded, or failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; one
     that `tells` repeats what was seen where.
 
-    With a `tally` the child looks at all surfaces, and what its leaves saw is counted, each thing once. Enough of them
-    is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface looked at, and else FAILURE as above.
+    With `tallies` the child looks at all surfaces, and what its leaves saw, each under a blackboard key, is counted,
+    each thing once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
+    looked at, and else FAILURE as above.
     """
 
     def __init__(
@@ -52,12 +46,13 @@ class Answer(ExplainedDecorator):
         board: Board,
         publish: Publish,
         tells: bool = False,
-        tally: Tally | None = None,
+        tallies: Mapping[str, str] | None = None,
+        needed: int = 1,
     ) -> None:
         super().__init__(path_id=path_id, name=name, child=child)
         self.answer: bool | None = None
         self._question, self._looks, self._key, self._board = question, looks, key, board
-        self._publish, self._tells, self._tally = publish, tells, tally
+        self._publish, self._tells, self._tallies, self._needed = publish, tells, tallies or {}, needed
 
     def initialise(self) -> None:
         """Forget an earlier answer."""
@@ -70,18 +65,18 @@ class Answer(ExplainedDecorator):
             return status
         nodes = {node.path_id: node for node in self.iterate() if isinstance(node, Explained)}
         unseen = [surface for surface, leaves in self._looks.items() if not _looked(leaves, nodes)]
-        if self._tally is not None:
-            return self._counted(self._tally, nodes, unseen)
+        if self._tallies:
+            return self._counted(nodes, unseen)
         if status == Status.FAILURE and unseen:
             return self._not_looked(nodes, unseen)
         answer = status == Status.SUCCESS
         return self._answered(answer, self.message if answer and self._tells else "")
 
-    def _counted(self, tally: Tally, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
-        seen = [key for leaf, key in tally.keys.items() if leaf in nodes and nodes[leaf].status == Status.SUCCESS]
+    def _counted(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
+        seen = [key for leaf, key in self._tallies.items() if leaf in nodes and nodes[leaf].status == Status.SUCCESS]
         looks: list[tuple[ObjectObservation, ...]] = [self._board.get(key) for key in seen]
         found = told_apart(looks)
-        enough = len(found) >= tally.needed
+        enough = len(found) >= self._needed
         if unseen and not enough:
             return self._not_looked(nodes, unseen)
         limits = f", as far as was seen: not {', '.join(unseen)}" if unseen else ""
@@ -112,3 +107,8 @@ def _obstacle(nodes: Mapping[str, Explained]) -> Cause:
     """The first cause in the tree that is not merely "not seen"."""
     causes = (node.cause for node in nodes.values())
     return next((cause for cause in causes if cause not in (None, Cause.POSTCONDITION)), None) or Cause.EXECUTION
+
+
+KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
+    {"answer": NodeKind(Answer, ("child", "board", "publish"), writes=lambda options: {options["key"]: bool})}
+)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Protocol, runtime_checkable
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Final, Protocol, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
 from executive.tree.behaviours.explained import Explained, cause_of, message_of
+from executive.tree.node import NodeKind
 from skills.api import Cause
 
 _MERELY_NOT_SO = frozenset({Cause.PRECONDITION, Cause.POSTCONDITION})
@@ -157,3 +159,12 @@ class MemoryRound(MemorySelector):
             return
         super()._take_over(done[-1])
         self.message = "; ".join(dict.fromkeys(map(message_of, done)))
+
+
+KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
+    {
+        "sequence": NodeKind(MemorySequence, ("children",)),
+        "selector": NodeKind(MemorySelector, ("children",)),
+        "round": NodeKind(MemoryRound, ("children",)),
+    }
+)

@@ -5,12 +5,12 @@ A condition answers with None when it holds, `Failed` when it does not, and `Wai
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from executive.mission.file.model import StaleData
 from executive.tree.behaviours.context import RunContext
 from skills.api import Cause, Failed
 from skills.robot import Pose2D
@@ -30,18 +30,11 @@ class Condition(Protocol):
     """Something that must hold while a subtree runs."""
 
     def begin(self, context: RunContext) -> None:
-        """The subtree starts anew."""
+        """The subtree starts anew. Nothing is remembered unless a condition says so."""
+        return
 
     def violated(self, context: RunContext) -> Verdict:
         """What speaks against going on, None when nothing does. Called before each tick of the subtree."""
-
-
-class StaleData(enum.Enum):
-    """What a condition makes of a reading that is older than it may be."""
-
-    WAIT = "wait"  # stand still until there is a new one, and fail when the patience is over
-    FAIL = "fail"  # count it as violated at once
-    ACCEPT = "accept"  # judge by what there is
 
 
 @dataclass(frozen=True)
@@ -142,14 +135,11 @@ class Localised:
         return Failed(Cause.PRECONDITION, "the robot does not know where it is")
 
 
-class BatteryAbove:
+class BatteryAbove(Condition):
     """The state of charge (0 to 1) is at least `least`; PRECONDITION when not."""
 
     def __init__(self, least: float) -> None:
         self._least = least
-
-    def begin(self, context: RunContext) -> None:
-        """Nothing is remembered."""
 
     def violated(self, context: RunContext) -> Verdict:
         """A failure when the charge is below."""
@@ -159,11 +149,8 @@ class BatteryAbove:
         return Failed(Cause.PRECONDITION, f"the battery is at {charge:.0%}, less than {self._least:.0%}")
 
 
-class StopReleased:
+class StopReleased(Condition):
     """No stop button is pressed. The mission stands still as long as one is."""
-
-    def begin(self, context: RunContext) -> None:
-        """Nothing is remembered."""
 
     def violated(self, context: RunContext) -> Verdict:
         """Waiting while it is pressed."""
@@ -171,11 +158,8 @@ class StopReleased:
         return None if pressed is None else Waiting(pressed)
 
 
-class LeaseHeld:
+class LeaseHeld(Condition):
     """Nobody else may move the robot. The mission stands still as long as somebody does."""
-
-    def begin(self, context: RunContext) -> None:
-        """Nothing is remembered."""
 
     def violated(self, context: RunContext) -> Verdict:
         """Waiting while another holds the lease."""
@@ -185,7 +169,7 @@ class LeaseHeld:
         return Waiting(f"{held.holder} holds the lease of {context.robot.name}")
 
 
-class BatteryReserve:
+class BatteryReserve(Condition):
     """The charge (0 to 1) is at least `low`, and enough for the way to the dock; PRECONDITION when not.
 
     The way is taken as twice the distance as the crow flies, at `per_m` of charge for each metre.
@@ -193,9 +177,6 @@ class BatteryReserve:
 
     def __init__(self, low: float, dock: Pose2D, per_m: float = 0.0008) -> None:
         self._low, self._dock, self._per_m = low, dock, per_m
-
-    def begin(self, context: RunContext) -> None:
-        """Nothing is remembered."""
 
     def violated(self, context: RunContext) -> Verdict:
         """A failure when the charge is below."""

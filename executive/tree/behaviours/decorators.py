@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
-from executive.tree.behaviours.conditions import Condition as Condition
-from executive.tree.behaviours.conditions import Waiting
+from executive.tree.behaviours.conditions import Condition, Waiting
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import Explained, cause_of, message_of
+from executive.tree.behaviours.requirements import Requirement
 from executive.tree.behaviours.suspension import StoppableTime, suspend
+from executive.tree.node import NodeKind
 from skills.api import Cause, Failed
 from skills.robot import Clock
 
@@ -77,23 +80,13 @@ class Timeout(ExplainedDecorator):
 class Retry(ExplainedDecorator):
     """Tries again, but only after failures of given causes.
 
-    Child RUNNING or SUCCESS: the same. Child FAILURE of another cause, or with the node `final` failed, or no attempts
-    left: FAILURE with its cause. Else RUNNING, and at the next tick the child starts anew from its first step with
-    nothing remembered.
+    Child RUNNING or SUCCESS: the same. Child FAILURE of another cause, or no attempts left: FAILURE with its cause.
+    Else RUNNING, and at the next tick the child starts anew from its first step with nothing remembered.
     """
 
-    def __init__(
-        self,
-        *,
-        path_id: str,
-        name: str,
-        child: Behaviour,
-        attempts: int,
-        causes: frozenset[Cause],
-        final: str | None = None,
-    ) -> None:
+    def __init__(self, *, path_id: str, name: str, child: Behaviour, attempts: int, causes: frozenset[Cause]) -> None:
         super().__init__(path_id=path_id, name=name, child=child)
-        self._attempts, self._causes, self._final = attempts, causes, final
+        self._attempts, self._causes = attempts, causes
         self.attempt = 1
 
     def initialise(self) -> None:
@@ -105,17 +98,13 @@ class Retry(ExplainedDecorator):
         status = self.pass_on()
         if status != Status.FAILURE:
             return status
-        if self.cause in self._causes and self.attempt < self._attempts and not self._final_failed():
+        if self.cause in self._causes and self.attempt < self._attempts:
             self.attempt += 1
             self.cause, self.message = None, f"attempt {self.attempt} of {self._attempts}, since {self.message}"
             return Status.RUNNING
         if self.attempt > 1:
             self.message = f"{self.message} (after {self.attempt} attempts)"
         return Status.FAILURE
-
-    def _final_failed(self) -> bool:
-        nodes = (node for node in self.iterate() if isinstance(node, Explained) and node.path_id == self._final)
-        return any(isinstance(node, Behaviour) and node.status == Status.FAILURE for node in nodes)
 
 
 class Guard(ExplainedDecorator):
@@ -147,3 +136,16 @@ class Guard(ExplainedDecorator):
     def update(self) -> Status:
         """As the child."""
         return self.pass_on()
+
+
+def _guard(*, requirement: Requirement, context: RunContext, **node: Any) -> Guard:
+    return Guard(condition=requirement.condition(context), context=context, **node)
+
+
+KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
+    {
+        "timeout": NodeKind(Timeout, ("child", "clock")),
+        "retry": NodeKind(Retry, ("child",)),
+        "guard": NodeKind(_guard, ("child", "context")),
+    }
+)

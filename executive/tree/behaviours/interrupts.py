@@ -8,9 +8,10 @@ dock and charge, find out where the robot is), and the mission goes on where it 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from types import MappingProxyType
+from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -20,8 +21,10 @@ from executive.tree.behaviours.conditions import Condition, Waiting
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decorators import ExplainedDecorator
 from executive.tree.behaviours.explained import Explained, cause_of, message_of
+from executive.tree.behaviours.requirements import Requirement
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
+from executive.tree.node import NodeKind
 from skills.api import Cause, Failed
 
 
@@ -186,3 +189,28 @@ class Interrupts(MemoryComposite):
         for child in below:
             suspend(child)
         self.status, self.cause, self.message = Status.RUNNING, None, watch.waiting or message_of(watch)
+
+
+def _monitor(*, requirement: Requirement, context: RunContext, **node: Any) -> Monitor:
+    return Monitor(condition=requirement.condition(context), context=context, **node)
+
+
+def _interrupt(
+    *, requirement: Requirement, context: RunContext, urgent: Requirement | None = None, **node: Any
+) -> Interrupt:
+    call = Call(requirement.condition(context), None if urgent is None else urgent.condition(context))
+    return Interrupt(call=call, context=context, **node)
+
+
+def _interrupts(*, children: Sequence[Any], **node: Any) -> Interrupts:
+    *watches, mission = children
+    return Interrupts(watches=watches, mission=mission, **node)
+
+
+KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
+    {
+        "monitor": NodeKind(_monitor, ("context",)),
+        "interrupt": NodeKind(_interrupt, ("child", "context")),
+        "interrupts": NodeKind(_interrupts, ("children",)),
+    }
+)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Final
 
-import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from executive.mission.geometry import distance_m
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import Explained
+from executive.tree.node import NodeKind
 from skills.api import Cause, Surface
-from skills.robot import Clock
+from skills.robot import Clock, Pose2D
 
 
 class RememberPose(Explained, Behaviour):
@@ -107,7 +110,7 @@ class SurfacesNear(Explained, Behaviour):
         """Look which surfaces are near."""
         pose = self._context.for_skill(self.path_id).pose()
         here = (pose.x_m, pose.y_m)
-        near = sorted((distance_to_polygon_m(here, surface.polygon_W), k) for k, surface in enumerate(self._surfaces))
+        near = sorted((distance_m(surface.polygon_W, here), k) for k, surface in enumerate(self._surfaces))
         found = tuple(self._surfaces[k] for distance, k in near if distance <= self._within_m)
         if found:
             self._context.board.put(self._key, found)
@@ -118,14 +121,16 @@ class SurfacesNear(Explained, Behaviour):
         return Status.FAILURE
 
 
-def distance_to_polygon_m(point: tuple[float, float], polygon: Sequence[tuple[float, float]]) -> float:
-    """Distance from a point to the nearest edge of an outline."""
-    corners = np.asarray(polygon, dtype=float)
-    edges = np.roll(corners, -1, axis=0) - corners
-    offsets = np.asarray(point) - corners
-    along = np.clip(np.sum(offsets * edges, axis=1) / np.maximum(np.sum(edges**2, axis=1), 1e-12), 0.0, 1.0)
-    return float(np.min(np.linalg.norm(offsets - along[:, None] * edges, axis=1)))
-
-
 def _xy(point: tuple[float, float]) -> str:
     return f"({point[0]:.2f}, {point[1]:.2f}) m"
+
+
+KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
+    {
+        "remember": NodeKind(RememberPose, ("context",), writes=lambda options: {options["key"]: Pose2D}),
+        "pause": NodeKind(Pause, ("clock",)),
+        "surfaces near": NodeKind(
+            SurfacesNear, ("context",), writes=lambda options: {options["key"]: tuple[Surface, ...]}
+        ),
+    }
+)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final
 
 from py_trees.behaviour import Behaviour
@@ -12,6 +13,7 @@ from executive.tree.behaviours.composites import MemorySequence
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decorators import ExplainedDecorator
 from executive.tree.behaviours.explained import Explained, message_of
+from executive.tree.node import NodeKind
 from skills.api import Asked, Cause, Failed, Question
 
 FINAL_CAUSES: Final = frozenset({Cause.ERROR, Cause.CANCELLED})
@@ -177,3 +179,13 @@ class Summary(ExplainedDecorator):
             return self.fail(Failed(Cause.EXECUTION, f"all steps were skipped: {told}"))
         self.message = f"done, but skipped: {told}"
         return status
+
+
+KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
+    {
+        "skip": NodeKind(Skip, ("child",)),
+        "ask": NodeKind(AskOperator, ("child", "context")),
+        "go back": NodeKind(GoBack, ("children",)),
+        "summary": NodeKind(Summary, ("child",)),
+    }
+)

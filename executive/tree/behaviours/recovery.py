@@ -1,13 +1,15 @@
-"""Recovery by cause: an attempt, and remedies of which each has its own failures that it is for.
+"""Recovery by cause: an attempt, and recoveries of which each has its own failures that it is for.
 
-One failure, one remedy, another attempt; all of it bounded, and nothing of one attempt is left for the next but what
+One failure, one recovery, another attempt; all of it bounded, and nothing of one attempt is left for the next but what
 the attempts share on purpose.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -15,7 +17,8 @@ from py_trees.common import Status
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.composites import MemoryComposite
 from executive.tree.behaviours.explained import Explained, cause_of, message_of
-from skills.api import Cause
+from executive.tree.node import NodeKind
+from skills.api import Cause, ObjectObservation
 from skills.robot import Robot
 
 
@@ -43,10 +46,9 @@ class Trigger:
 
 
 @dataclass(frozen=True)
-class Remedy:
-    """What may be done after failures that fit one of the triggers, `uses` times at most; `node` does it."""
+class Recovery:
+    """When a recovery is due: after failures that fit one of the triggers, `uses` times at most."""
 
-    node: Behaviour
     triggers: tuple[Trigger, ...]
     uses: int = 1
 
@@ -56,13 +58,13 @@ class Remedy:
 
 
 class Recover(MemoryComposite):
-    """An attempt (the first child), with remedies (the others) between it and the next attempt.
+    """An attempt (the first child), with recoveries (the others, each with its `Recovery`) before the next attempt.
 
-    Attempt RUNNING or SUCCESS: the same. Attempt FAILURE: the first remedy that fits and is not used up is run from the
-    next tick on; none: FAILURE with the attempt's cause. Remedy RUNNING: RUNNING. Remedy SUCCESS: RUNNING, and at the
-    next tick the attempt starts anew. Remedy FAILURE: the next that fits; none: FAILURE with the attempt's cause (ERROR
-    when the remedy had that) and both sentences. No attempts left: FAILURE with the attempt's cause.
-    When it starts anew, remedies are counted from zero and the blackboard keys in `forgets` are empty.
+    Attempt RUNNING or SUCCESS: the same. Attempt FAILURE: the first recovery that fits and is not used up is run from
+    the next tick on; none: FAILURE with the attempt's cause. Recovery RUNNING: RUNNING. Recovery SUCCESS: RUNNING, and
+    at the next tick the attempt starts anew. Recovery FAILURE: the next that fits; none: FAILURE with the attempt's
+    cause (ERROR when the recovery had that) and both sentences. No attempts left: FAILURE with the attempt's cause.
+    When it starts anew, recoveries are counted from zero and the blackboard keys in `forgets` are empty.
     """
 
     goes_on_after = frozenset({Status.SUCCESS})
@@ -72,21 +74,21 @@ class Recover(MemoryComposite):
         *,
         path_id: str,
         name: str,
-        attempt: Behaviour,
-        remedies: Sequence[Remedy],
+        children: Sequence[Behaviour],
+        recoveries: Sequence[Recovery],
         attempts: int,
-        forgets: Sequence[str],
         board: Board,
+        forgets: Sequence[str] = (),
     ) -> None:
-        super().__init__(path_id=path_id, name=name, children=[attempt, *(remedy.node for remedy in remedies)])
-        self._remedies, self._attempts = tuple(remedies), attempts
+        super().__init__(path_id=path_id, name=name, children=children)
+        self._recoveries, self._attempts = tuple(recoveries), attempts
         self._forgets, self._board = tuple(forgets), board
         self.attempt = 1
-        self._uses = [0] * len(remedies)
+        self._uses = [0] * len(recoveries)
         self._due: list[int] = []
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick the attempt or the remedy that is under way, and see what comes of it."""
+        """Tick the attempt or the recovery that is under way, and see what comes of it."""
         if self.status != Status.RUNNING:
             self._restart()
         child = self.current_child = self.children[self._index]
@@ -96,28 +98,28 @@ class Recover(MemoryComposite):
         elif self._index == 0:
             self._attempt_ended()
         else:
-            self._remedy_ended(child)
+            self._recovery_ended(child)
         yield self
 
     def _restart(self) -> None:
         super()._restart()
-        self.attempt, self._uses, self._due = 1, [0] * len(self._remedies), []
+        self.attempt, self._uses, self._due = 1, [0] * len(self._recoveries), []
         self._board.forget(self._forgets)
 
     def _attempt_ended(self) -> None:
-        """Success ends it; after a failure the remedies that fit are due."""
+        """Success ends it; after a failure the recoveries that fit are due."""
         attempt = self.children[0]
         if attempt.status == Status.SUCCESS:
             self._end(Status.SUCCESS, None, message_of(attempt))
             return
-        fitting = [i for i, r in enumerate(self._remedies) if self._uses[i] < r.uses and r.fits(attempt)]
+        fitting = [i for i, r in enumerate(self._recoveries) if self._uses[i] < r.uses and r.fits(attempt)]
         self._due = fitting if self.attempt < self._attempts else []
-        if not self._next_remedy():
+        if not self._next_recovery():
             tried = f" (after {self.attempt} attempts)" if self.attempt > 1 else ""
             self._end(Status.FAILURE, cause_of(attempt), f"{message_of(attempt)}{tried}")
 
-    def _next_remedy(self) -> bool:
-        """Turn to the next remedy that is due; False when there is none."""
+    def _next_recovery(self) -> bool:
+        """Turn to the next recovery that is due; False when there is none."""
         if not self._due:
             return False
         chosen = self._due.pop(0)
@@ -127,15 +129,15 @@ class Recover(MemoryComposite):
         self.status, self.cause, self.message = Status.RUNNING, None, f"{self.children[self._index].name}, since {why}"
         return True
 
-    def _remedy_ended(self, remedy: Behaviour) -> None:
-        if remedy.status == Status.SUCCESS:
+    def _recovery_ended(self, recovery: Behaviour) -> None:
+        if recovery.status == Status.SUCCESS:
             self.attempt += 1
             self._index = 0
             said = f"attempt {self.attempt}, since {message_of(self.children[0])}"
             self.status, self.cause, self.message = Status.RUNNING, None, said
-        elif not self._next_remedy():
-            failed = Cause.ERROR if cause_of(remedy) is Cause.ERROR else cause_of(self.children[0])
-            said = f"{message_of(self.children[0])}; {remedy.name}: {message_of(remedy)}"
+        elif not self._next_recovery():
+            failed = Cause.ERROR if cause_of(recovery) is Cause.ERROR else cause_of(self.children[0])
+            said = f"{message_of(self.children[0])}; {recovery.name}: {message_of(recovery)}"
             self._end(Status.FAILURE, failed, said)
 
     def _end(self, status: Status, cause: Cause | None, message: str) -> None:
@@ -146,9 +148,9 @@ class Recover(MemoryComposite):
 class Afterwards(MemoryComposite):
     """Something to be done (the first child), and what tidies up after it (the second), however it ended.
 
-    First child RUNNING: RUNNING. First child done: on to the second in the same tick, unless `after` does not hold the
-    first's status. Second RUNNING: RUNNING. Second done: the first's status, cause and sentence, with the second's
-    failure mentioned.
+    First child RUNNING: RUNNING. First child done: on to the second in the same tick, unless it succeeded and the
+    second is there `only_after_failure`. Second RUNNING: RUNNING. Second done: the first's status, cause and sentence,
+    with the second's failure mentioned.
     """
 
     goes_on_after = frozenset({Status.SUCCESS})
@@ -158,12 +160,11 @@ class Afterwards(MemoryComposite):
         *,
         path_id: str,
         name: str,
-        first: Behaviour,
-        then: Behaviour,
-        after: frozenset[Status] = frozenset({Status.SUCCESS, Status.FAILURE}),
+        children: Sequence[Behaviour],
+        only_after_failure: bool = False,
     ) -> None:
-        super().__init__(path_id=path_id, name=name, children=[first, then])
-        self._after = after
+        super().__init__(path_id=path_id, name=name, children=children)
+        self._after = {Status.FAILURE} if only_after_failure else {Status.SUCCESS, Status.FAILURE}
 
     def tick(self) -> Iterator[Behaviour]:
         """Tick the first child; when it is done, the second."""
@@ -217,3 +218,15 @@ class OnlyIfHolding(MemoryComposite):
     def applies(self) -> bool:
         """Whether something is held."""
         return self._robot.gripper().holding
+
+
+KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
+    {
+        "recover": NodeKind(Recover, ("children", "board")),
+        "afterwards": NodeKind(Afterwards, ("children",)),
+        "only if known": NodeKind(
+            OnlyIfKnown, ("child", "board"), writes=lambda options: {options["key"]: ObjectObservation}
+        ),
+        "only if holding": NodeKind(OnlyIfHolding, ("child", "robot")),
+    }
+)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from types import MappingProxyType
+from typing import Any, Final, TypeVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -14,6 +15,7 @@ from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import Explained
 from executive.tree.behaviours.freshness import refuse_stale
 from executive.tree.behaviours.suspension import StoppableTime
+from executive.tree.node import NodeKind
 from executive.tree.types import conforms, describe_type
 from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
 
@@ -38,10 +40,10 @@ class SkillLeaf(Explained, Behaviour):
         path_id: str,
         name: str,
         skill: type[Skill[Any]],
-        inputs: Mapping[str, Binding],
-        outputs: Mapping[str, str],
         limit_s: float,
         context: RunContext,
+        inputs: Mapping[str, Binding] = MappingProxyType({}),
+        outputs: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         super().__init__(name)
         self.path_id = path_id
@@ -182,3 +184,11 @@ class SkillLeaf(Explained, Behaviour):
             self._context.publish(ERROR_TOPIC, {"node": self.path_id, "traceback": trace})
             text = str(defect.args[0]) if isinstance(defect, KeyError) and defect.args else str(defect)
             return Failed(Cause.ERROR, f"{self.name} raised {type(defect).__name__}: {text}")
+
+
+def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The keys bound to the skill's output ports."""
+    return {key: options["skill"].outputs.get(port, Any) for port, key in options.get("outputs", {}).items()}
+
+
+KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType({"skill": NodeKind(SkillLeaf, ("context",), _written)})

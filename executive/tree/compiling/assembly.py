@@ -2,49 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from executive.mission.command import Command, Task
-from executive.mission.errors import InputError, Problems
+from py_trees.common import Status
+
+from executive.mission.command import START, Command, Task
+from executive.mission.errors import InputError, Problems, SourceLine
 from executive.mission.file.model import Mission, MissionStep, StepPolicy
-from executive.mission.knowledge import Knowledge
-from executive.tree.behaviours.board import FromBoard
-from executive.tree.compiling.plans import NodePlan, RememberPosePlan, SequencePlan, SkillPlan, Source
-from executive.tree.compiling.policies import AskPlan, PolicyFrame, SkipPlan, SummaryPlan, needs_way_back, under_policy
+from executive.mission.goal import GoalCondition, command_goal, drive_goal
+from executive.mission.knowledge import Knowledge, Pose
+from executive.tree.behaviours.board import Constant
+from executive.tree.compiling.builder import PlanBuilder, Registry, slug, start_key
+from executive.tree.compiling.policies import PolicyFrame, needs_way_back, under_policy
 from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.compiling.skill_steps import skill_plan
-from executive.tree.compiling.steps import START, step_plan
+from executive.tree.compiling.steps import step_plan
 from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
-from executive.tree.compiling.workshop import Registry, Workshop, slug, start_key
+from executive.tree.node import NodeSpec
+from skills.robot import Pose2D
 
 __all__ = ["Assembled", "StepPart", "assemble", "step_name"]
 
+NAVIGATE: Final = "navigate"
 NO_POLICY: Final = StepPolicy()
+_SKIPPING: Final = frozenset({"skip", "ask"})
 
 
 @dataclass(frozen=True)
 class StepPart:
     """A part of a mission with something to show for it: a command, or a skill on its own.
 
-    `path_id` is that of its subtree. `excused` are pairs of path ids: when the first succeeded although the second
-    failed, the part was skipped. `elsewhere` are the surfaces on which a thing may be found that is not in its place.
+    `path_id` is that of its subtree, `goal` what is to be so when it is done; of skills on their own only a drive to a
+    fixed pose has one. `excused` are pairs of path ids: when the first succeeded although the second failed, the part
+    was skipped.
     """
 
     path_id: str
     command: Command | None = None
-    skill: SkillPlan | None = None
+    goal: GoalCondition | None = None
     excused: tuple[tuple[str, str], ...] = ()
-    elsewhere: tuple[str, ...] = ()
+
+    def was_skipped(self, statuses: Mapping[str, Status]) -> bool:
+        """Whether a node above let its failure pass; `statuses` are those at the end, by path id."""
+        ends = ((statuses.get(above), statuses.get(below)) for above, below in self.excused)
+        return (Status.SUCCESS, Status.FAILURE) in ends
 
 
 @dataclass(frozen=True)
 class Assembled:
-    """The root of a mission's tree, and its parts in order."""
+    """Nodes in a row, and what they are to bring about, in order."""
 
-    root: NodePlan
-    parts: tuple[StepPart, ...]
+    nodes: tuple[NodeSpec, ...] = ()
+    parts: tuple[StepPart, ...] = ()
+
+    def __add__(self, other: Assembled) -> Assembled:
+        return Assembled(self.nodes + other.nodes, self.parts + other.parts)
 
 
 @dataclass(frozen=True)
@@ -57,41 +71,28 @@ class _Item:
     command: Command | None = None
 
 
-@dataclass
-class _Site:
-    """What all levels of one mission share."""
-
-    knowledge: Knowledge
-    registry: Registry
-    start_key: str
-    names: dict[str, str] = field(default_factory=dict)
-
-    def navigate(self, path_id: str, source: Source | None) -> NodePlan:
-        """The way back to where the mission began, below `path_id`."""
-        shop = Workshop(self.knowledge, self.registry, path_id, self.start_key, Command(goal=START), source)
-        return shop.navigate(FromBoard(self.start_key))
-
-
-def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> Assembled:
-    """The tree of a mission.
+def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> tuple[NodeSpec, tuple[StepPart, ...]]:
+    """The root of a mission's tree, and its parts in order.
 
     Raises:
         InputError: unknown names, ports wired wrongly, commands that cannot be carried out; all in `others`.
     """
     base = f"{slug(mission.robot_name)}/{slug(mission.name)}"
-    site = _Site(knowledge, registry, start_key(mission.robot_name, mission.name))
-    plans, parts = _level(mission, base, site)
-    remember = tuple(_remember(base, site.start_key, mission))
-    name, source = mission.name, mission.source
-    if mission.policy == NO_POLICY and not _may_skip(plans):
-        return Assembled(SequencePlan(path_id=base, name=name, source=source, steps=(*remember, *plans)), parts)
-    body: NodePlan = SequencePlan(path_id=f"{base}/steps", name="steps", source=source, steps=plans)
-    body, excuse = _under(body, mission.policy, PolicyFrame(f"{base}/whole", name, source, site.navigate, False))
-    if _may_skip((body,)):
-        words, steps = "tell what was skipped", tuple(plan.path_id for plan in plans)
-        body = SummaryPlan(path_id=f"{base}/summary", name=words, source=source, child=body, steps=steps)
-    root = SequencePlan(path_id=base, name=name, source=source, steps=(*remember, body))
-    return Assembled(root, tuple(_excused(parts, excuse)))
+    assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name))
+    builder = assembler.builder(base, mission.source)
+    steps = assembler.level(mission, base)
+    remember = [builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)]
+    first = remember if _leads_back(mission) else []
+    if mission.policy == NO_POLICY and not _may_skip(steps.nodes):
+        return builder.sequence(mission.name, *first, *steps.nodes), steps.parts
+    frame = PolicyFrame(builder.at("whole"), mission.name, may_skip=False)
+    body = builder.node("sequence", "steps", *steps.nodes, part="steps")
+    whole = _under(Assembled((body,), steps.parts), mission.policy, frame)
+    (body,) = whole.nodes
+    if _may_skip(whole.nodes):
+        paths = tuple(node.path_id for node in steps.nodes)
+        body = builder.node("summary", "tell what was skipped", body, part="summary", steps=paths)
+    return builder.sequence(mission.name, *first, body), whole.parts
 
 
 def step_name(command: Command) -> str:
@@ -99,24 +100,93 @@ def step_name(command: Command) -> str:
     return slug(command.goal or str(command.object or command.item or "anywhere"))
 
 
-def _level(mission: Mission, base: str, site: _Site) -> tuple[tuple[NodePlan, ...], tuple[StepPart, ...]]:
-    """The subtrees of a mission's steps: those under a policy each as one, the others' parts as they are."""
-    plans: list[NodePlan] = []
-    parts: list[StepPart] = []
-    problems = Problems()
-    for group, policy in _groups(mission.steps):
-        with problems:
-            below, made = _group_plans(group, base, site)
-            if policy == NO_POLICY:
-                plans, parts = [*plans, *below], [*parts, *made]
+@dataclass
+class _Assembler:
+    """Makes the subtrees of one mission; `names` are the outputs of the skills so far, with their blackboard keys."""
+
+    knowledge: Knowledge
+    registry: Registry
+    start_key: str
+    names: dict[str, str] = field(default_factory=dict)
+
+    def builder(self, path_id: str, source: SourceLine | None) -> PlanBuilder:
+        """The builder of nodes that belong to no one command."""
+        return PlanBuilder(self.knowledge, self.registry, path_id, self.start_key, Command(goal=START), source)
+
+    def level(self, mission: Mission, base: str) -> Assembled:
+        """The subtrees of a mission's steps: those under a policy each as one, the others' parts as they are."""
+        made, problems = Assembled(), Problems()
+        for items, policy in _groups(mission.steps):
+            with problems:
+                group = self._group(items, base)
+                if policy != NO_POLICY:
+                    builder = self.builder(f"{base}/step-{items[0].place}", items[0].step.source)
+                    words = f"step {items[0].place}: {_words(items)}"
+                    if len(group.nodes) > 1:
+                        group = replace(group, nodes=(builder.sequence(words, *group.nodes),))
+                    group = _under(group, policy, PolicyFrame(builder, words))
+                made += group
+        problems.raise_any()
+        return made
+
+    def _group(self, items: Sequence[_Item], base: str) -> Assembled:
+        """The subtrees of items in a row; commands to get and bring several things become trips."""
+        made, problems, done = Assembled(), Problems(), 0
+        for item, after in zip(items, (*items[1:], None), strict=True):
+            if item.number <= done:
                 continue
-            number = group[0].place
-            place, source, words = f"{base}/step-{number}", group[0].step.source, f"step {number}: {_words(group)}"
-            one = below[0] if len(below) == 1 else SequencePlan(path_id=place, name=words, source=source, steps=below)
-            plan, excuse = _under(one, policy, PolicyFrame(place, words, source, site.navigate))
-            plans, parts = [*plans, plan], [*parts, *_excused(made, excuse)]
-    problems.raise_any()
-    return tuple(plans), tuple(parts)
+            following = None if after is None else after.command
+            with problems:
+                if item.command is not None and following is not None and are_trips(item.command, following):
+                    done = item.number + 1
+                    trips = trips_plan(self._command_builder(item, base), following)
+                    commands = (item.command, following)
+                    goals = (command_goal(command, self.knowledge) for command in commands)
+                    parts = tuple(map(StepPart, (trips.path_id,) * 2, commands, goals))
+                    made += Assembled((trips,), parts)
+                else:
+                    made += self._item(item, following, base)
+        problems.raise_any()
+        return made
+
+    def _item(self, item: _Item, following: Command | None, base: str) -> Assembled:
+        """The subtree of one command, skill or used mission; `following` is the command right after it."""
+        step = item.step
+        if step.used is not None:
+            return self._used(step, step.used, f"{base}/{item.number}-{slug(step.used.name)}")
+        if step.skill is not None:
+            path_id = f"{base}/{item.number}-{slug(step.skill.skill)}"
+            leaf = skill_plan(
+                step.skill,
+                path_id,
+                step.source,
+                knowledge=self.knowledge,
+                registry=self.registry,
+                names=self.names,
+            )
+            return Assembled((leaf,), (StepPart(path_id, goal=_drive_goal(leaf)),))
+        builder = replace(self._command_builder(item, base), avoided=_goals(following, self.knowledge))
+        refuse_several(builder)
+        node = step_plan(builder)
+        goal = command_goal(builder.command, self.knowledge, _elsewhere(builder))
+        return Assembled((node,), (StepPart(builder.path_id, builder.command, goal),))
+
+    def _used(self, step: MissionStep, used: Mission, base: str) -> Assembled:
+        """The subtree of a mission that a step uses."""
+        try:
+            steps = self.level(used, base)
+        except InputError as error:
+            raise error if step.source is None else error.within(step.source.file, step.source.line) from error
+        builder = self.builder(base, step.source)
+        body = replace(steps, nodes=(builder.sequence(used.name, *steps.nodes),))
+        return _under(body, used.policy, PolicyFrame(builder.at("whole"), used.name, may_skip=False))
+
+    def _command_builder(self, item: _Item, base: str) -> PlanBuilder:
+        command = item.command
+        if command is None:
+            raise InputError("a step has no commands", mend="give it 'say', a command, a skill or a file to use")
+        builder = self.builder(f"{base}/{item.number}-{step_name(command)}", item.step.source)
+        return replace(builder, command=command, anywhere=item.step.elsewhere)
 
 
 def _groups(steps: Sequence[MissionStep]) -> Iterator[tuple[tuple[_Item, ...], StepPolicy]]:
@@ -137,104 +207,49 @@ def _groups(steps: Sequence[MissionStep]) -> Iterator[tuple[tuple[_Item, ...], S
         yield tuple(free), NO_POLICY
 
 
-def _group_plans(items: Sequence[_Item], base: str, site: _Site) -> tuple[tuple[NodePlan, ...], tuple[StepPart, ...]]:
-    """The subtrees of items in a row; commands to get and bring several things become trips."""
-    plans: list[NodePlan] = []
-    parts: list[StepPart] = []
-    problems, done = Problems(), 0
-    for item, after in zip(items, (*items[1:], None), strict=True):
-        if item.number <= done:
-            continue
-        following = None if after is None else after.command
-        with problems:
-            if item.command is not None and following is not None and are_trips(item.command, following):
-                done = item.number + 1
-                plan = trips_plan(_shop(item, base, site), following)
-                made: tuple[StepPart, ...] = tuple(StepPart(plan.path_id, c) for c in (item.command, following))
-            else:
-                plan, made = _plan(item, following, base, site)
-            plans, parts = [*plans, plan], [*parts, *made]
-    problems.raise_any()
-    return tuple(plans), tuple(parts)
-
-
-def _plan(item: _Item, following: Command | None, base: str, site: _Site) -> tuple[NodePlan, tuple[StepPart, ...]]:
-    """The subtree of one command, skill or used mission; `following` is the command right after it."""
-    step = item.step
-    if step.used is not None:
-        return _used_plan(step, step.used, f"{base}/{item.number}-{slug(step.used.name)}", site)
-    if step.skill is not None:
-        path_id = f"{base}/{item.number}-{slug(step.skill.skill)}"
-        leaf = skill_plan(
-            step.skill, path_id, step.source, knowledge=site.knowledge, registry=site.registry, names=site.names
-        )
-        return leaf, (StepPart(path_id, skill=leaf),)
-    shop = replace(_shop(item, base, site), avoided=_goals(following, site.knowledge))
-    refuse_several(shop)
-    plan = step_plan(shop)
-    return plan, (StepPart(shop.path_id, shop.command, elsewhere=_elsewhere(shop)),)
-
-
 def _goals(command: Command | None, knowledge: Knowledge) -> frozenset[str]:
     """The surfaces to which a command brings what is fetched before."""
     place = None if command is None or command.goal is None else knowledge.place(command.goal)
     return frozenset() if place is None else frozenset(knowledge.surfaces_in(place))
 
 
-def _elsewhere(shop: Workshop) -> tuple[str, ...]:
+def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
     """Where else the thing of a command to get it may be found."""
-    command, knowledge = shop.command, shop.knowledge
-    if command.task is not Task.GRASP or command.object is None or command.goal is None or not shop.anywhere:
+    command, knowledge = builder.command, builder.knowledge
+    if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
         return ()
     name = knowledge.thing(command.object.name) or command.object.name
-    return surfaces_elsewhere(knowledge, name, shop.place(command.goal), shop.avoided)
+    return surfaces_elsewhere(knowledge, name, builder.place(command.goal), builder.avoided)
 
 
-def _used_plan(step: MissionStep, used: Mission, base: str, site: _Site) -> tuple[NodePlan, tuple[StepPart, ...]]:
-    """The subtree of a mission that a step uses."""
-    try:
-        plans, parts = _level(used, base, site)
-    except InputError as error:
-        raise error if step.source is None else error.within(step.source.file, step.source.line) from error
-    body = SequencePlan(path_id=base, name=used.name, source=step.source, steps=plans)
-    plan, excuse = _under(body, used.policy, PolicyFrame(f"{base}/whole", used.name, step.source, site.navigate, False))
-    return plan, tuple(_excused(parts, excuse))
+def _drive_goal(leaf: NodeSpec) -> GoalCondition | None:
+    """Where a drive on its own is to lead."""
+    pose = leaf.options["inputs"].get("goal")
+    if leaf.name != NAVIGATE or not isinstance(pose, Constant) or not isinstance(pose.value, Pose2D):
+        return None
+    return drive_goal(Pose(x=pose.value.x_m, y=pose.value.y_m, yaw=pose.value.yaw_rad))
 
 
-def _shop(item: _Item, base: str, site: _Site) -> Workshop:
-    command = item.command
-    if command is None:
-        raise InputError("a step has no commands", mend="give it 'say', a command, a skill or a file to use")
-    path_id = f"{base}/{item.number}-{step_name(command)}"
-    source, anywhere = item.step.source, item.step.elsewhere
-    return Workshop(site.knowledge, site.registry, path_id, site.start_key, command, source, anywhere)
+def _under(body: Assembled, policy: StepPolicy, frame: PolicyFrame) -> Assembled:
+    """One node under its policy; where that may skip it, its parts are excused."""
+    (below,) = body.nodes
+    node = under_policy(below, policy, frame)
+    if node.kind not in _SKIPPING:
+        return Assembled((node,), body.parts)
+    excuse = (node.path_id, node.children[0].path_id)
+    return Assembled((node,), tuple(replace(part, excused=(*part.excused, excuse)) for part in body.parts))
 
 
-def _under(body: NodePlan, policy: StepPolicy, frame: PolicyFrame) -> tuple[NodePlan, tuple[tuple[str, str], ...]]:
-    """The body under its policy, and the pair of nodes that tells whether it was skipped."""
-    plan = under_policy(body, policy, frame)
-    excuse = ((plan.path_id, plan.child.path_id),) if isinstance(plan, SkipPlan | AskPlan) else ()
-    return plan, excuse
+def _may_skip(nodes: Sequence[NodeSpec]) -> bool:
+    return any(below.kind in _SKIPPING for node in nodes for below in node.walk())
 
 
-def _excused(parts: Sequence[StepPart], excuse: tuple[tuple[str, str], ...]) -> list[StepPart]:
-    return [replace(part, excused=(*part.excused, *excuse)) for part in parts]
-
-
-def _may_skip(plans: Sequence[NodePlan]) -> bool:
-    return any(isinstance(node, SkipPlan | AskPlan) for plan in plans for node in plan.walk())
-
-
-def _remember(base: str, key: str, mission: Mission) -> Iterator[NodePlan]:
-    """A leaf that notes where the robot stands, when something leads back to it."""
-    policies = (mission.policy, *(step.policy for step in mission.walk()), *_used_policies(mission))
-    if any(map(needs_way_back, policies)) or any(command.goal == START for command in mission.commands):
-        path_id = f"{base}/remember-start"
-        yield RememberPosePlan(path_id=path_id, name="where it starts", source=mission.source, key=key, keep=True)
-
-
-def _used_policies(mission: Mission) -> Iterator[StepPolicy]:
-    yield from (step.used.policy for step in mission.walk() if step.used is not None)
+def _leads_back(mission: Mission) -> bool:
+    """Whether something in a mission leads back to where the robot stands at its beginning."""
+    steps = list(mission.walk())
+    used = (step.used.policy for step in steps if step.used is not None)
+    policies = (mission.policy, *(step.policy for step in steps), *used)
+    return any(map(needs_way_back, policies)) or any(command.goal == START for command in mission.commands)
 
 
 def _words(items: Sequence[_Item]) -> str:
@@ -249,6 +264,6 @@ def _words(items: Sequence[_Item]) -> str:
 def _command_words(command: Command) -> str:
     """A command in a few words: "grasp coke at kitchen table"."""
     thing = command.object or command.item
-    deed = command.task.value if command.task is not None else "take" if command.item is not None else "go"
+    action = command.task.value if command.task is not None else "take" if command.item is not None else "go"
     goal = "" if command.goal is None else f"{'at' if command.task is not None else 'to'} {command.goal}"
-    return " ".join(filter(None, (deed, str(thing or ""), goal)))
+    return " ".join(filter(None, (action, str(thing or ""), goal)))

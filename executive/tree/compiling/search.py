@@ -8,13 +8,13 @@ from typing import Final
 
 from executive.mission.command import Thing
 from executive.mission.errors import listing
+from executive.mission.geometry import inside
+from executive.mission.goal import surfaces_to_search
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.board import FromBoard, SurfaceOfSighting, beside
-from executive.tree.compiling.geometry import inside
-from executive.tree.compiling.plans import NodePlan, SelectorPlan, SequencePlan
-from executive.tree.compiling.recovery import OnlyIfKnownPlan
-from executive.tree.compiling.workshop import Workshop, pose_2d
-from skills.api import Cause, ObjectObservation
+from executive.tree.compiling.builder import PlanBuilder, pose_2d
+from executive.tree.node import NodeSpec
+from skills.api import Cause
 
 Ports = Mapping[str, object]
 
@@ -22,16 +22,6 @@ NO_PORTS: Final[Ports] = MappingProxyType({})
 MOST_ELSEWHERE: Final = 3
 MOST_ASIDE: Final = 2
 ASIDE_M: Final = 0.45
-
-
-def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
-    """The surfaces to look at, those where the thing usually is first; without a place, all that there are.
-
-    A usual place may be a room: then its surfaces count as usual.
-    """
-    inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
-    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
-    return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
 
 
 def surfaces_elsewhere(
@@ -49,14 +39,22 @@ def surfaces_elsewhere(
 
 
 def look_plans(
-    shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str, extra: Ports = NO_PORTS, *, tallied: bool = False
-) -> tuple[tuple[str, SequencePlan], ...]:
+    builder: PlanBuilder,
+    thing: Thing,
+    surfaces: tuple[str, ...],
+    key: str,
+    extra: Ports = NO_PORTS,
+    *,
+    tallied: bool = False,
+) -> tuple[tuple[str, NodeSpec], ...]:
     """For each surface and viewpoint: drive there and look. The sighting goes to `key`; `extra` are detect's.
 
     With `tallied`, all that a look saw goes to the key that `tally_key` gives for its leaf.
     """
-    views = [(name, n) for name in surfaces for n in range(1, len(shop.knowledge.surfaces[name].viewpoints) + 1)]
-    return tuple((name, _look_plan(shop.at(f"{name}-{n}"), thing, name, n, key, extra, tallied)) for name, n in views)
+    views = [(name, n) for name in surfaces for n in range(1, len(builder.knowledge.surfaces[name].viewpoints) + 1)]
+    return tuple(
+        (name, _look_plan(builder.at(f"{name}-{n}"), thing, name, n, key, extra, tallied)) for name, n in views
+    )
 
 
 def tally_key(leaf: str) -> str:
@@ -65,46 +63,40 @@ def tally_key(leaf: str) -> str:
 
 
 def _look_plan(
-    shop: Workshop, thing: Thing, surface: str, number: int, key: str, extra: Ports, tallied: bool
-) -> SequencePlan:
-    view = shop.knowledge.surfaces[surface].viewpoints[number - 1]
-    return shop.sequence(
+    builder: PlanBuilder, thing: Thing, surface: str, number: int, key: str, extra: Ports, tallied: bool
+) -> NodeSpec:
+    view = builder.knowledge.surfaces[surface].viewpoints[number - 1]
+    return builder.sequence(
         f"look at {surface}" + (f" ({number})" if number > 1 else ""),
-        shop.navigate(pose_2d(view)),
-        detect_plan(shop, thing, (surface,), key, extra, tallied=tallied),
+        builder.navigate(pose_2d(view)),
+        detect_plan(builder, thing, (surface,), key, extra, tallied=tallied),
     )
 
 
 def detect_plan(
-    shop: Workshop,
+    builder: PlanBuilder,
     thing: Thing,
     surfaces: tuple[str, ...] | FromBoard,
     key: str,
     extra: Ports = NO_PORTS,
     *,
     tallied: bool = False,
-) -> NodePlan:
+) -> NodeSpec:
     """Look for the thing on some surfaces, by name or from the blackboard, from where the robot stands."""
-    where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(shop.surface, surfaces))
-    ports = {"classes": shop.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
-    tally = {"observations": tally_key(f"{shop.path_id}/detect")} if tallied else {}
-    return shop.skill("detect", {**ports, **extra}, {"observation": key, **tally})
+    where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(builder.surface, surfaces))
+    ports = {"classes": builder.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
+    tally = {"observations": tally_key(f"{builder.path_id}/detect")} if tallied else {}
+    return builder.skill("detect", {**ports, **extra}, {"observation": key, **tally})
 
 
-def find_again_plan(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodePlan:
+def find_again_plan(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodeSpec:
     """When it was seen before: look from here first, where it was seen. Else passed over."""
-    seen_on = SurfaceOfSighting(key, tuple(map(shop.surface, surfaces)))
-    return OnlyIfKnownPlan(
-        path_id=shop.path_id,
-        name="look from here, if seen before",
-        source=shop.source,
-        child=detect_plan(shop, thing, seen_on, key),
-        key=key,
-        holds=ObjectObservation,
-    )
+    seen_on = SurfaceOfSighting(key, tuple(map(builder.surface, surfaces)))
+    look = detect_plan(builder, thing, seen_on, key)
+    return builder.node("only if known", "look from here, if seen before", look, key=key)
 
 
-def search_plan(shop: Workshop, thing: Thing, place: str | None, key: str, *, anywhere: bool = True) -> SelectorPlan:
+def search_plan(builder: PlanBuilder, thing: Thing, place: str | None, key: str, *, anywhere: bool = True) -> NodeSpec:
     """Look from here when it was seen before, else at each surface in turn; the first sighting ends the search.
 
     When it is nowhere in its place, look at some of its surfaces from aside, then, with `anywhere`, at surfaces
@@ -113,47 +105,46 @@ def search_plan(shop: Workshop, thing: Thing, place: str | None, key: str, *, an
     Raises:
         InputError: the place has no surfaces.
     """
-    surfaces = required_surfaces(shop, thing, place)
-    name = shop.knowledge.thing(thing.name) or thing.name
-    elsewhere = surfaces_elsewhere(shop.knowledge, name, place, shop.avoided) if anywhere and shop.anywhere else ()
-    looks = look_plans(shop, thing, surfaces, key)
-    further = look_plans(shop.at("elsewhere"), thing, elsewhere, key)
+    surfaces = required_surfaces(builder, thing, place)
+    name = builder.knowledge.thing(thing.name) or thing.name
+    elsewhere = (
+        surfaces_elsewhere(builder.knowledge, name, place, builder.avoided) if anywhere and builder.anywhere else ()
+    )
+    looks = look_plans(builder, thing, surfaces, key)
+    further = look_plans(builder.at("elsewhere"), thing, elsewhere, key)
     looked = where(place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
-    return SelectorPlan(
-        path_id=shop.path_id,
-        name=f"find {thing}",
-        source=shop.source,
-        steps=(
-            find_again_plan(shop.at("again"), thing, (*surfaces, *elsewhere), key),
-            *(look for _, look in looks),
-            *_looks_from_aside(shop, thing, surfaces, key),
-            *(look for _, look in further),
-        ),
+    return builder.node(
+        "selector",
+        f"find {thing}",
+        find_again_plan(builder.at("again"), thing, (*surfaces, *elsewhere), key),
+        *(look for _, look in looks),
+        *_looks_from_aside(builder, thing, surfaces, key),
+        *(look for _, look in further),
         exhausted_cause=Cause.PRECONDITION,
         exhausted_message=f"found no {thing} {looked}",
     )
 
 
-def _looks_from_aside(shop: Workshop, thing: Thing, surfaces: tuple[str, ...], key: str) -> Iterator[SequencePlan]:
+def _looks_from_aside(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, ...], key: str) -> Iterator[NodeSpec]:
     """Look again at surfaces that have only one viewpoint, from beside it."""
-    facts = shop.knowledge.surfaces
+    facts = builder.knowledge.surfaces
     single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
     for name in single[:MOST_ASIDE]:
-        room = shop.knowledge.places[facts[name].place].polygon
+        room = builder.knowledge.places[facts[name].place].polygon
         view = pose_2d(facts[name].viewpoints[0])
         poses = (beside(view, 0.0, left_m) for left_m in (ASIDE_M, -ASIDE_M))
         aside = next((pose for pose in poses if inside(room, (pose.x_m, pose.y_m))), None)
         if aside is not None:
-            below = shop.at(f"{name}-aside")
+            below = builder.at(f"{name}-aside")
             look = detect_plan(below, thing, (name,), key)
             yield below.sequence(f"look at {name} from aside", below.navigate(aside), look)
 
 
-def required_surfaces(shop: Workshop, thing: Thing, place: str | None) -> tuple[str, ...]:
+def required_surfaces(builder: PlanBuilder, thing: Thing, place: str | None) -> tuple[str, ...]:
     """The surfaces to look at. Raises InputError when there are none."""
-    surfaces = surfaces_to_search(shop.knowledge, shop.knowledge.thing(thing.name) or thing.name, place)
+    surfaces = surfaces_to_search(builder.knowledge, builder.knowledge.thing(thing.name) or thing.name, place)
     if not surfaces:
-        raise shop.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")
+        raise builder.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")
     return surfaces
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from executive.mission.errors import did_you_mean, listing
+from executive.mission.errors import SourceLine, listing, suggestion
 from executive.mission.file.model import SkillCall
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
-from executive.tree.compiling.plans import SkillPlan, Source
-from executive.tree.compiling.workshop import Registry, slug
+from executive.tree.compiling.builder import Registry, skill_spec, slug
+from executive.tree.node import NodeSpec
 from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_value
 from executive.tree.types import field_types
 from skills.api import Skill
@@ -21,12 +21,12 @@ __all__ = ["skill_plan"]
 def skill_plan(
     call: SkillCall,
     path_id: str,
-    source: Source | None,
+    source: SourceLine | None,
     *,
     knowledge: Knowledge,
     registry: Registry,
     names: dict[str, str],
-) -> SkillPlan:
+) -> NodeSpec:
     """The leaf of a skill step. `names` are the outputs of earlier steps and their blackboard keys; its own are added.
 
     Raises:
@@ -36,21 +36,12 @@ def skill_plan(
     inputs = _inputs(call, skill, knowledge, names)
     outputs = {port: f"{path_id}/{slug(port)}" for port in _given_ports(call, skill)}
     names.update({call.gives[port]: key for port, key in outputs.items()})
-    return SkillPlan(
-        path_id=path_id,
-        name=call.skill,
-        source=source,
-        skill=skill,
-        inputs=tuple(inputs.items()),
-        outputs=tuple(outputs.items()),
-        limit_s=skill.default_timeout_s,
-    )
+    return skill_spec(skill, call.skill, path_id, source, inputs, outputs)
 
 
 def _registered(call: SkillCall, registry: Registry) -> type[Skill[Any]]:
     if call.skill not in registry:
-        near = did_you_mean(call.skill, registry)
-        mend = f"did you mean '{near}'?" if near else f"registered are {listing(sorted(registry))}"
+        mend = suggestion(call.skill, registry, f"registered are {listing(sorted(registry))}")
         raise call.error(("skill",), f"there is no skill '{call.skill}'", mend)
     return registry[call.skill]
 
@@ -76,9 +67,8 @@ def _inputs(
 
 def _named_output(call: SkillCall, path: tuple[str | int, ...], name: Any, names: Mapping[str, str]) -> FromBoard:
     if not isinstance(name, str) or name not in names:
-        near = did_you_mean(str(name), names)
-        known = f"known are {listing(names)}" if names else "name one with 'gives: {PORT: NAME}' in an earlier step"
-        mend = f"did you mean '{near}'?" if near else known
+        none = None if names else "name one with 'gives: {PORT: NAME}' in an earlier step"
+        mend = suggestion(str(name), names, none)
         raise call.error(("with", *path), f"no earlier step gives '{name}'", mend)
     return FromBoard(names[name])
 
@@ -86,8 +76,7 @@ def _named_output(call: SkillCall, path: tuple[str | int, ...], name: Any, names
 def _given_ports(call: SkillCall, skill: type[Skill[Any]]) -> tuple[str, ...]:
     for port in call.gives:
         if port not in skill.outputs:
-            near = did_you_mean(port, skill.outputs)
             known = f"its outputs are {listing(skill.outputs)}" if skill.outputs else "it has none"
-            mend = f"did you mean '{near}'?" if near else known
+            mend = suggestion(port, skill.outputs, known)
             raise call.error(("gives", port), f"{call.skill} has no output port '{port}'", mend)
     return tuple(call.gives)

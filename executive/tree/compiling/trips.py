@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from executive.mission.command import Command, Task
-from executive.tree.compiling.plans import NodePlan
-from executive.tree.compiling.search import surfaces_to_search
-from executive.tree.compiling.steps import START, carry_plan, grasp_plan
-from executive.tree.compiling.workshop import Workshop
+from executive.mission.command import START, Command, Task
+from executive.mission.goal import surfaces_to_search
+from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.compiling.steps import carry_plan, grasp_plan
+from executive.tree.node import NodeSpec
 
 __all__ = ["are_trips", "refuse_several", "trips_plan"]
 
@@ -24,49 +24,51 @@ def are_trips(get: Command, bring: Command | None) -> bool:
     return bring.task in (None, Task.PLACE) and carried == get.object and count == get.object_count
 
 
-def trips_plan(shop: Workshop, bring: Command) -> NodePlan:
-    """Get one and bring it there, as often as was said; `shop` is that of the command to get them.
+def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
+    """Get one and bring it there, as often as was said; `builder` is that of the command to get them.
 
     Raises:
         InputError: too many; to a person, who does not take them from the gripper; no place to take them from, or one
             where those that were brought would be found again.
     """
-    get, goal = shop.command, bring.goal
+    get, goal = builder.command, bring.goal
     count, thing = get.object_count, get.object
     several = f"{count} of '{thing}'"
     if count > MAX_TRIPS:
-        raise shop.error(f"{several} are too many trips", f"ask for {MAX_TRIPS} at most")
-    if goal == START or (goal is not None and shop.knowledge.person(goal) is not None):
+        raise builder.error(f"{several} are too many trips", f"ask for {MAX_TRIPS} at most")
+    if goal == START or (goal is not None and builder.knowledge.person(goal) is not None):
         mend = "name a place with a surface to put them on"
-        raise shop.error(f"{several} cannot be handed over: the first stays in the gripper until it is taken", mend)
+        raise builder.error(f"{several} cannot be handed over: the first stays in the gripper until it is taken", mend)
     if get.goal is None:
-        raise shop.error(f"it is not said where to take {several} from", "name the place")
-    brought = set(shop.knowledge.surfaces_in(shop.place(goal))) if goal is not None else set()
-    if thing is not None and brought & set(surfaces_to_search(shop.knowledge, thing.name, shop.place(get.goal))):
+        raise builder.error(f"it is not said where to take {several} from", "name the place")
+    brought = set(builder.knowledge.surfaces_in(builder.place(goal))) if goal is not None else set()
+    if thing is not None and brought & set(surfaces_to_search(builder.knowledge, thing.name, builder.place(get.goal))):
         mend = "name the surface that they are to be taken from"
-        raise shop.error(f"{several} that lie in the {get.goal} already cannot be told from those brought there", mend)
-    trips = tuple(_trip(shop, bring, number) for number in range(1, count + 1))
-    return shop.sequence(f"bring {count} {thing} to {goal}, one at a time", *trips)
+        raise builder.error(
+            f"{several} that lie in the {get.goal} already cannot be told from those brought there", mend
+        )
+    trips = tuple(_trip(builder, bring, number) for number in range(1, count + 1))
+    return builder.sequence(f"bring {count} {thing} to {goal}, one at a time", *trips)
 
 
-def refuse_several(shop: Workshop) -> None:
+def refuse_several(builder: PlanBuilder) -> None:
     """Refuse a count that no trips are made of; in a question any count will do.
 
     Raises:
         InputError: more than one thing, or an open number of things.
     """
-    command = shop.command
+    command = builder.command
     asked = 1 if command.task is Task.FIND else command.object_count
     for thing, count in ((command.item, command.item_count), (command.object, asked)):
         if count != 1:
             said = f"{count} of '{thing}'" if count else f"an open number of '{thing}'"
             mend = "say from where to where, and how many, or ask for one at a time"
-            raise shop.error(f"{said} cannot be carried in one go", mend)
+            raise builder.error(f"{said} cannot be carried in one go", mend)
 
 
-def _trip(shop: Workshop, bring: Command, number: int) -> NodePlan:
+def _trip(builder: PlanBuilder, bring: Command, number: int) -> NodeSpec:
     """Get one thing and bring it."""
-    trip = shop.at(f"trip-{number}")
-    get_one = replace(trip.at("get"), command=replace(shop.command, object_count=1))
+    trip = builder.at(f"trip-{number}")
+    get_one = replace(trip.at("get"), command=replace(builder.command, object_count=1))
     bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))
     return trip.sequence(f"trip {number}", grasp_plan(get_one, anywhere=False), carry_plan(bring_one))

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from executive.mission.errors import InputError, did_you_mean
+from executive.mission.errors import InputError, suggestion
 from executive.tree.behaviours.board import Binding, Constant, FromBoard, FromBoardOr
-from executive.tree.compiling.plans import NodePlan, SkillPlan
-from executive.tree.types import assignable, conforms, describe_type, field_types
+from executive.tree.kinds import writes
+from executive.tree.node import NodeSpec
+from executive.tree.types import assignable, conforms, describe_type, field_types, required
 
 
-def check_wiring(root: NodePlan) -> None:
+def check_wiring(root: NodeSpec) -> None:
     """Check all ports of a tree.
 
     Raises:
@@ -25,31 +25,27 @@ def check_wiring(root: NodePlan) -> None:
         if node.path_id in seen:
             raise _error(node, "two nodes have this path id", "give the steps different names")
         seen.add(node.path_id)
-        if isinstance(node, SkillPlan):
+        if node.kind == "skill":
             for message, mend in _faults(node, written):
                 raise _error(node, message, mend)
-        written.update(node.writes())
+        written.update(writes(node))
 
 
-def _faults(node: SkillPlan, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """What is wrong with one skill's ports, and the mend."""
-    types, bound = field_types(node.skill.Inputs), dict(node.inputs)
-    for field in dataclasses.fields(node.skill.Inputs):
-        optional = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
-        if field.name not in bound and not optional:
-            yield f"input port '{field.name}' has no value", f"give it a {describe_type(types[field.name])}"
-    for port, binding in node.inputs:
+    skill, inputs, outputs = (node.options[key] for key in ("skill", "inputs", "outputs"))
+    types = field_types(skill.Inputs)
+    for name in required(skill.Inputs):
+        if name not in inputs:
+            yield f"input port '{name}' has no value", f"give it a {describe_type(types[name])}"
+    for port, binding in inputs.items():
         if port not in types:
-            near = did_you_mean(port, types)
-            yield (
-                f"there is no input port '{port}'",
-                f"did you mean '{near}'?" if near else f"known: {', '.join(types)}",
-            )
+            yield f"there is no input port '{port}'", suggestion(port, types, f"known: {', '.join(types)}")
         else:
             yield from _misfit(port, binding, types[port], written)
-    for port, _ in node.outputs:
-        if port not in node.skill.outputs:
-            yield f"there is no output port '{port}'", f"known: {', '.join(node.skill.outputs) or 'none'}"
+    for port in outputs:
+        if port not in skill.outputs:
+            yield f"there is no output port '{port}'", f"known: {', '.join(skill.outputs) or 'none'}"
 
 
 def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -69,7 +65,5 @@ def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) 
         yield f"input port '{port}' reads '{binding.key}', a {describe_type(given)}", wanted
 
 
-def _error(node: NodePlan, message: str, mend: str) -> InputError:
-    source = node.source
-    where = {} if source is None else {"file": source.file, "line": source.line}
-    return InputError(f"{node.path_id}: {message}", mend=mend, **where)  # type: ignore[arg-type]
+def _error(node: NodeSpec, message: str, mend: str) -> InputError:
+    return InputError.at(node.source, f"{node.path_id}: {message}", mend=mend)

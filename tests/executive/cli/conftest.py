@@ -1,4 +1,4 @@
-"""Lets the tests here import the small detector that lies with the skills' tests."""
+"""Lets the tests here import the small detector of the skills' tests and the made speech of the speech's tests."""
 
 import json
 import sys
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "skills"))
+sys.path[:0] = [str(Path(__file__).parents[2] / "skills"), str(Path(__file__).parents[1] / "speech")]
 
 
 @pytest.fixture

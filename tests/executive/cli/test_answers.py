@@ -6,49 +6,48 @@ import pytest
 from typer.testing import CliRunner
 
 from executive.cli import answers, entry
-from executive.cli.answers import Answers, ask_at_terminal
-from executive.cli.durable import Asked
+from executive.cli.answers import answerer, ask_at_terminal
+from executive.cli.requests import prepare
 from executive.language.questions import ClarifyingQuestion, QuestionPolicy, Slot
 from executive.mission.errors import InputError
+from executive.mission.request import Request
 
 TABLE = "put the cube on the table"
 QUESTION = ClarifyingQuestion("Which table?", Slot.PLACE, ("kitchen table", "coffee table"), "kitchen table", "table")
 
 
-def goals(asked):
-    return [command.goal for command in asked.request().mission.commands]
+def goals(request):
+    return [command.goal for command in prepare(request).mission.commands]
 
 
 def test_an_answer_given_beforehand_leads_to_the_commands():
-    assert goals(Asked(say=TABLE, answers=Answers(("coffee",)))) == ["workshop", "coffee table"]
+    assert goals(Request(TABLE, answers=("coffee",))) == ["workshop", "coffee table"]
 
 
-def test_what_is_kept_of_the_sentence_has_the_answer_in_its_place(tmp_path):
-    asked = Asked(say=TABLE, answers=Answers(("the second one",)))
-    request = asked.request()
-    order = asked.order(request, request.compile(), seed=1, out=tmp_path, record=False)
-    assert order.sentence == "put the cube on the coffee table"
+def test_what_is_kept_of_the_sentence_has_the_answer_in_its_place():
+    request = prepare(Request(TABLE, answers=("the second one",))).request
+    assert request.sentence == "put the cube on the coffee table"
 
 
 def test_the_policy_first_takes_the_likeliest():
-    assert goals(Asked(say=TABLE, answers=Answers(policy=QuestionPolicy.FIRST)))[-1] == "kitchen table"
+    assert goals(Request(TABLE, questions=QuestionPolicy.FIRST))[-1] == "kitchen table"
 
 
 @pytest.mark.parametrize("policy", [None, QuestionPolicy.ASK, QuestionPolicy.REFUSE])
 def test_in_scripts_an_open_question_is_refused_with_its_candidates(policy):
     with pytest.raises(InputError, match="kitchen table or coffee table"):
-        Asked(say=TABLE, answers=Answers(policy=policy)).request()
+        prepare(Request(TABLE, questions=policy))
 
 
 def test_an_answer_that_does_not_help_is_refused():
     with pytest.raises(InputError, match="unicorn"):
-        Asked(say=TABLE, answers=Answers(("the unicorn",))).request()
+        prepare(Request(TABLE, answers=("the unicorn",)))
 
 
 def test_who_sits_at_the_terminal_is_asked(monkeypatch, capsys):
     monkeypatch.setattr(answers, "_somebody_is_there", lambda: True)
     monkeypatch.setattr("sys.stdin", io.StringIO("2\n"))
-    assert Answers().answerer(None)(QUESTION) == "2"
+    assert answerer((), None, ask_at_terminal)(QUESTION) == "2"
     assert "[1] kitchen table  [2] coffee table" in capsys.readouterr().err
 
 
@@ -60,10 +59,10 @@ def test_an_empty_line_is_no_answer(monkeypatch):
 def test_the_files_own_policy_counts_unless_another_is_given(tmp_path):
     path = tmp_path / "m.yaml"
     path.write_text(f"name: tidy\nquestions: first\nsteps:\n  - say: {TABLE}\n")
-    assert goals(Asked(file=path))[-1] == "kitchen table"
-    assert goals(Asked(file=path, answers=Answers(("coffee",))))[-1] == "coffee table"
+    assert goals(Request(file=path))[-1] == "kitchen table"
+    assert goals(Request(file=path, answers=("coffee",)))[-1] == "coffee table"
     with pytest.raises(InputError, match=r"m.yaml:4: Which table"):
-        Asked(file=path, answers=Answers(policy=QuestionPolicy.REFUSE)).request()
+        prepare(Request(file=path, questions=QuestionPolicy.REFUSE))
 
 
 def test_without_a_policy_a_file_with_an_open_question_is_refused_with_its_line(tmp_path):

@@ -4,6 +4,7 @@ import io
 import json
 
 import pytest
+from made_speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, write_wav
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -13,7 +14,6 @@ from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.language import Status, Understanding
 from executive.mission.errors import InputError
 from executive.speech.microphone import follow
-from executive.testing.speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, write_wav
 
 GO = "Hey Alice, go to the kitchen."
 KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"

@@ -10,7 +10,7 @@ from rich.text import Text
 from executive.cli.live import fitted, live_view
 from executive.run.control import Control
 from executive.run.runner import Progress
-from executive.run.snapshot import NodeState
+from executive.tree.snapshot import NodeState
 
 
 def tree_of(count, running):

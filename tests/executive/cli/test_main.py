@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from executive.cli import entry, main
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
-from executive.view.model import node_view
+from executive.tree.node_view import node_view
 
 FETCH = "Hey Alice, can you fetch me a drink from the kitchen"
 
@@ -41,11 +41,11 @@ def no_plant(monkeypatch):
     """Runs end at once as the test says; no plant is built."""
     ended = {"report": report()}
 
-    def run_request(request, tree, *, seed, out, record, observer=None, **_):
-        out.mkdir(parents=True, exist_ok=True)
-        return Finished(ended["report"], node_view(tree.root))
+    def run_simulated(prepared, **_):
+        prepared.request.out.mkdir(parents=True, exist_ok=True)
+        return Finished(ended["report"], node_view(prepared.tree.root))
 
-    monkeypatch.setattr(main, "run_request", run_request)
+    monkeypatch.setattr(main, "run_simulated", run_simulated)
     return ended
 
 

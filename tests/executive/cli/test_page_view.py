@@ -12,25 +12,25 @@ from rich.console import Console
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
-from executive.cli.durable import Asked
 from executive.cli.page_view import PageView, queueing
 from executive.cli.page_view import said as sentence_action
+from executive.cli.requests import prepare
+from executive.mission.request import Request
 from executive.run.control import Mode
 from executive.store.missions import MissionState, MissionStore
 from executive.view.actions import RefusedError
 
 
 @pytest.fixture(scope="module")
-def request_():
-    return Asked(say="go to the kitchen").request()
+def prepared():
+    return prepare(Request("go to the kitchen", seed=5))
 
 
 @pytest.fixture
-def page(request_):
-    page = PageView(request_, Console(file=io.StringIO()))
-    tree = request_.compile()
-    page.control.begin({"Alice": tree})
-    page.conversation.begun(tree, memory=request_.meant.memory)
+def page(prepared):
+    page = PageView(prepared, Console(file=io.StringIO()))
+    page.control.begin({"Alice": prepared.tree})
+    page.conversation.begun(prepared.tree, memory=prepared.meant.memory)
     yield page
     page.close()
 
@@ -75,12 +75,13 @@ def test_a_correction_takes_the_place_of_the_mission(page):
     assert (wish.tree.commands[0].goal, wish.instead_of) == ("bathroom", "go kitchen")
 
 
-def test_a_sentence_is_queued_for_later(request_, tmp_path):
-    later = queueing(request_, world=None, store=tmp_path / "missions.sqlite", out=tmp_path, seed=5)
+def test_a_sentence_is_queued_for_later(prepared, tmp_path):
+    later = queueing(prepared, store=tmp_path / "missions.sqlite", out=tmp_path)
     assert later("go to the bathroom").startswith("queued as mission 1")
     with MissionStore(tmp_path / "missions.sqlite", create=False) as missions:
         (mission,) = missions.missions(MissionState.QUEUED)
-    assert (mission.order.sentence, mission.order.seed, mission.order.world_name) == ("go to the bathroom", 5, "flat")
+    asked = mission.request
+    assert (asked.sentence, asked.seed, asked.world_name) == ("go to the bathroom", 5, "flat")
 
 
 @pytest.mark.mission

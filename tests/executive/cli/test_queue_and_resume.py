@@ -15,9 +15,11 @@ from executive.mission.command import Command
 from executive.mission.errors import InputError
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
-from executive.run.snapshot import Change, NodeState
 from executive.store.missions import MissionStore
-from executive.view.model import node_view
+from executive.tree.compiler import compile_mission
+from executive.tree.node_view import node_view
+from executive.tree.registry import installed_skills
+from executive.tree.snapshot import Change, NodeState
 
 
 class GoneError(BaseException):
@@ -25,16 +27,17 @@ class GoneError(BaseException):
 
 
 class Plant:
-    """Stands in for `run_request`: notes one finished leaf, then ends as the test says."""
+    """Stands in for `run_simulated`: notes one finished leaf, then ends as the test says."""
 
     def __init__(self):
         self.runs = []
         self.outcomes = []
 
-    def __call__(self, request, tree, *, seed, out, record, durable, **_):
+    def __call__(self, prepared, *, durable, **_):
+        tree, out = prepared.tree, prepared.request.out
         out.mkdir(parents=True, exist_ok=True)
         durable.plant.with_name(f"{durable.plant.name}.a").touch()
-        self.runs.append((request.mission.name, seed, out.name, durable))
+        self.runs.append((prepared.mission.name, prepared.request.seed, out.name, durable))
         leaf = next(node.path_id for node in tree.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id)
         done = Change(leaf, NodeState(), NodeState(Status.SUCCESS, None, "done"))
         durable.journal.note(TickNote(1.0, (done,), {}, None, {}))
@@ -53,7 +56,7 @@ def report(outcome):
 def plant(monkeypatch):
     stand_in = Plant()
     for module in (main, queue_run, resume_command):
-        monkeypatch.setattr(module, "run_request", stand_in)
+        monkeypatch.setattr(module, "run_simulated", stand_in)
     monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
     return stand_in
 
@@ -141,10 +144,11 @@ def test_a_bad_mission_is_not_queued(errand, mission, states):
 
 
 def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(errand, mission, plant, monkeypatch):
-    def corrected(request, tree, *, out, durable, **_):
-        out.mkdir(parents=True, exist_ok=True)
+    def corrected(prepared, *, durable, **_):
+        prepared.request.out.mkdir(parents=True, exist_ok=True)
         go = mission_from_commands([Command(goal="bathroom")], world="flat", robot_name="Alice")
-        other = replace(request, mission=replace(go, name="go bathroom 2")).compile()
+        named = replace(go, name="go bathroom 2")
+        other = compile_mission(named, knowledge=prepared.knowledge, registry=installed_skills())
         leaf = next(
             node.path_id for node in other.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id
         )
@@ -153,7 +157,7 @@ def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(erra
         raise GoneError
 
     with monkeypatch.context() as patch, pytest.raises(GoneError):
-        patch.setattr(main, "run_request", corrected)
+        patch.setattr(main, "run_simulated", corrected)
         errand("run", mission("first"), "--quiet")
     result = errand("resume", "--quiet")
     assert result.exit_code == 0, result.output
@@ -234,7 +238,7 @@ def test_a_run_that_cannot_begin_leaves_no_mission_behind(errand, mission, monke
     def refuse(*_, **__):
         raise InputError("the world is full")
 
-    monkeypatch.setattr(main, "run_request", refuse)
+    monkeypatch.setattr(main, "run_simulated", refuse)
     assert errand("run", mission("alone"), "--quiet").exit_code == 2
     assert states() == []
 

@@ -5,8 +5,9 @@ import pytest
 from executive.language import load_parser
 from executive.mission.command import parse_command
 from executive.mission.errors import InputError
+from executive.mission.file.resolve import load_mission, mission_from_file
 from executive.mission.knowledge import load_knowledge
-from executive.mission.mission import load_mission, mission_from_commands, mission_from_file, mission_from_sentence
+from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
 
 WORLD = Path(__file__).parents[1] / "language" / "world.yaml"
 MISSION = """\
@@ -129,7 +130,8 @@ def test_an_error_can_name_the_line_of_any_key(write):
 
 
 def test_a_sentence_becomes_a_mission(parser, knowledge):
-    mission = mission_from_sentence("fetch me a drink", parser=parser, knowledge=knowledge)
+    meant = understood("fetch me a drink", parser=parser, knowledge=knowledge)
+    mission = mission_from_meaning(meant, world="flat", robot_name="Alice")
     assert (mission.name, mission.world, mission.robot_name) == ("fetch drink", "flat", "Alice")
     assert [str(command) for command in mission.commands] == [
         "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
@@ -148,7 +150,7 @@ def test_a_sentence_becomes_a_mission(parser, knowledge):
 )
 def test_a_sentence_that_is_not_understood_says_why(parser, knowledge, sentence, require_wake, says):
     with pytest.raises(InputError, match=says):
-        mission_from_sentence(sentence, parser=parser, knowledge=knowledge, require_wake=require_wake)
+        understood(sentence, parser=parser, knowledge=knowledge, require_wake=require_wake)
 
 
 def test_commands_become_a_mission_named_for_the_first():
@@ -171,5 +173,5 @@ def test_the_fetch_drink_file_and_the_sentence_are_the_same_mission(parser):
     root = Path(__file__).parents[3]
     knowledge = load_knowledge(root / "plant" / "worlds" / "flat" / "knowledge.yaml")
     from_file = mission_from_file(root / "missions" / "fetch_drink.yaml", parser=parser, knowledge=knowledge)
-    spoken = mission_from_sentence("fetch me a drink from the kitchen", parser=parser, knowledge=knowledge)
+    spoken = understood("fetch me a drink from the kitchen", parser=parser, knowledge=knowledge)
     assert [str(c) for c in from_file.commands] == [str(c) for c in spoken.commands]

@@ -9,7 +9,7 @@ from executive.mission.errors import InputError
 from executive.record.event_log import EventLog
 from executive.record.history import read_history
 from executive.record.timeline import timeline
-from executive.view.model import node_view, to_json
+from executive.tree.node_view import node_view, to_json
 from skills.api import Cause, Failed
 
 

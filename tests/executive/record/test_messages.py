@@ -2,8 +2,7 @@ import math
 
 import pytest
 
-from executive.mission.class_ids import CLASS_IDS, class_name
-from executive.mission.command import Task, Thing, parse_command
+from executive.mission.command import Task, parse_command
 from executive.record.messages import TaskMessage, command_type, task_messages
 
 CLASSES = {"drink": ("coke", "beer"), "hammer": ("hammer",), "unicorn": ("unicorn",)}
@@ -54,8 +53,3 @@ def test_a_class_without_a_number_is_an_error():
 
 def test_the_tasks_have_their_numbers():
     assert [command_type(task) for task in (None, Task.GRASP, Task.FIND, Task.PLACE)] == [0, 1, 2, 3]
-
-
-def test_class_ids_read_both_ways():
-    assert all(class_name(number) == name for name, number in CLASS_IDS.items())
-    assert Thing("coke").name == class_name(2)

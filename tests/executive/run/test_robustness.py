@@ -17,7 +17,7 @@ from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.watchdog import Watchdog
 from executive.run.worker import LockStepWorker, ThreadWorker
 from executive.tree.compiler import CompiledTree
-from executive.tree.compiling.plans import SkillPlan
+from executive.tree.node import NodeSpec
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
 from skills.robot import ArmTrajectory
@@ -145,7 +145,7 @@ def spoilt_run(tmp_path, verb, kind, *, worker=LockStepWorker, limit_s=30.0):
     clock = VirtualClock()
     robot = ScriptedRobot(clock, capabilities=CAPABILITIES)
     faults = [Fault(f"{verb} {kind}", Effect(frozenset({verb}), KINDS[kind][0]))] if kind else []
-    plan = SkillPlan(path_id="alice/test", name="use all", skill=UseAll, limit_s=limit_s)
+    plan = NodeSpec("skill", "alice/test", "use all", {"skill": UseAll, "limit_s": limit_s})
     entry = RunEntry(
         CompiledTree("Alice", "test", (), plan), with_faults(robot, clock, faults), KnownPlace(), BlockCostmap()
     )

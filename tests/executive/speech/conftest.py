@@ -1,8 +1,10 @@
-"""The flat, the parser, and a synthetic voice where one is installed."""
+"""The flat, the parser, a synthetic voice where one is installed, and the way to `made_speech`."""
 
 import shutil
 import struct
 import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ import pytest
 from executive.language import load_parser
 from executive.mission.knowledge import load_knowledge
 from plant.worlds.world import load_world
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 PROGRAMS = {
     "flite": ("flite", "-voice", "slt", "-t", "{text}", "-o", "{wav}"),

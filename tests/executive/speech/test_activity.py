@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from made_speech import LoudIsSpeech, silence, speech_like, tone
 
 from executive.speech.activity import FRAME, Endpointer, PauseRules, load_detector
 from executive.speech.sound import RATE_HZ
-from executive.testing.speech import LoudIsSpeech, silence, speech_like, tone
 
 FRAME_S = FRAME / RATE_HZ
 RULES = PauseRules(pause_s=0.8, kept_pause_s=0.6, margin_s=0.3, least_s=0.15, most_s=5.0)

@@ -1,9 +1,9 @@
 """Whether it was the robot that was called."""
 
 import pytest
+from made_speech import ScriptedRecognition
 
 from executive.speech.calling import opening_as_heard
-from executive.testing.speech import ScriptedRecognition
 
 OLIVER, ALICE = "Hey Oliver, get me a cube.", "Hey Alice, get me a cube."
 

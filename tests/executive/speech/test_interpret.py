@@ -1,12 +1,12 @@
 """Which reading was meant; the reader here takes only sentences with a known thing in them."""
 
 import pytest
+from made_speech import ScriptedRecognition
 
 from executive.speech.alikes import SoundAlikes
 from executive.speech.interpret import interpret, smoothed
 from executive.speech.recogniser import Transcript
 from executive.speech.repair import Reading
-from executive.testing.speech import ScriptedRecognition
 
 ALIKES = SoundAlikes(["wrench", "bench", "coke"])
 

@@ -5,6 +5,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from made_speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, tone, write_wav
 
 from executive.language import Status
 from executive.mission.errors import InputError
@@ -13,7 +14,6 @@ from executive.speech.hearing import SpeechReader, spoken_phrases
 from executive.speech.listener import Listener
 from executive.speech.sound import RATE_HZ
 from executive.speech.vocabulary import of_world
-from executive.testing.speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, tone, write_wav
 
 GO = "Hey Alice, go to the kitchen."
 

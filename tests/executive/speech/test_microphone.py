@@ -4,6 +4,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from made_speech import LoudIsSpeech, ScriptedRecogniser, speech_like
 
 from executive.language import Status
 from executive.mission.errors import InputError
@@ -12,7 +13,6 @@ from executive.speech.listener import Listener
 from executive.speech.microphone import follow, microphone_blocks
 from executive.speech.sound import RATE_HZ
 from executive.speech.vocabulary import of_world
-from executive.testing.speech import LoudIsSpeech, ScriptedRecogniser, speech_like
 
 BLOCK = RATE_HZ // 10
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from made_speech import silence, tone
 
 from executive.speech.sound import Loudness, joined, level_db
-from executive.testing.speech import silence, tone
 
 
 def test_silence_is_told_from_a_soft_voice():

@@ -4,11 +4,11 @@ import struct
 
 import numpy as np
 import pytest
+from made_speech import tone, write_raw_wav, write_wav
 
 from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ, joined
 from executive.speech.wav import read_wav
-from executive.testing.speech import tone, write_raw_wav, write_wav
 
 PCM, FLOAT, A_LAW, EXTENSIBLE = 1, 3, 6, 0xFFFE
 EDGE = 400  # samples at either end, where a change of the rate has no neighbours to look at

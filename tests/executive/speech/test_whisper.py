@@ -4,6 +4,7 @@ import socket
 from importlib import import_module
 
 import pytest
+from made_speech import silence
 
 import executive.speech.extra as extra
 from executive.mission.errors import InputError
@@ -14,7 +15,6 @@ from executive.speech.sound import joined
 from executive.speech.vocabulary import of_world
 from executive.speech.wav import read_wav
 from executive.speech.whisper import load_whisper
-from executive.testing.speech import silence
 
 pytest.importorskip("faster_whisper")
 

@@ -9,13 +9,17 @@ import pytest
 from py_trees.common import Status
 
 from executive.mission.errors import InputError
+from executive.mission.request import Request
 from executive.run.journal import TickNote
-from executive.run.snapshot import Change, NodeState
-from executive.store.missions import MissionState, MissionStore, Order
+from executive.store.missions import MissionState, MissionStore
+from executive.tree.snapshot import Change, NodeState
 from skills.api import Cause
 from skills.robot import Pose2D
 
-ORDER = Order("fetch drink", "flat", "Alice", 3, "out", ("Take ...",), "print", sentence="fetch me a drink")
+REQUEST = Request(
+    "fetch me a drink", seed=3, name="fetch drink", world_name="flat", robot="Alice", commands=("Take ...",),
+    fingerprint="print",
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -33,7 +37,7 @@ def note(*changes, now_s=1.0, board=None, pose=None, checkpoints=None):
 
 def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose(path):
     with MissionStore(path) as store:
-        mission, kept = store.add(ORDER, queued=False).id, []
+        mission, kept = store.add(REQUEST, queued=False).id, []
         journal = store.journal(mission)
         journal.keep_world = lambda: kept.append(store.has_steps(mission))
         journal.note(note(pose=Pose2D(1.0, 2.0, 0.5)))
@@ -44,7 +48,7 @@ def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose
 
 def test_missions_keep_their_order_and_states(path):
     with MissionStore(path) as store:
-        first, second = (store.add(ORDER, queued=queued) for queued in (True, False))
+        first, second = (store.add(REQUEST, queued=queued) for queued in (True, False))
         store.begin(first.id)
         store.finish(first.id, MissionState.FAILURE, "no drink")
     with MissionStore(path, create=False) as store:
@@ -52,17 +56,17 @@ def test_missions_keep_their_order_and_states(path):
         assert (done.id, done.state, done.message, done.starts) == (first.id, MissionState.FAILURE, "no drink", 1)
         assert waiting == second
         assert store.missions(MissionState.QUEUED) == (second,)
-        assert done.order == ORDER
+        assert done.request == REQUEST
 
 
 def test_what_takes_a_missions_place_is_kept_in_its_stead(path):
-    other = replace(ORDER, name="go hall", commands=("Go",), fingerprint="other", sentence=None)
+    other = replace(REQUEST, name="go hall", commands=("Go",), fingerprint="other", sentence=None)
     with MissionStore(path) as store:
-        mission = store.add(ORDER, queued=False)
+        mission = store.add(REQUEST, queued=False)
         journal = store.journal(mission.id).replaceable(lambda tree: other)
         journal.note(note(changed("a/b", Status.SUCCESS), board={"alice/x": Pose2D(1.0, 2.0, 0.5)}))
         second = journal.replaced(None)
-        assert (store.mission(mission.id).order, store.has_steps(mission.id)) == (other, False)
+        assert (store.mission(mission.id).request, store.has_steps(mission.id)) == (other, False)
         assert store.memory(mission.id).board == {}
         second.note(note(changed("a/c", Status.RUNNING)))
         assert list(store.memory(mission.id).steps) == ["a/c"]
@@ -70,7 +74,7 @@ def test_what_takes_a_missions_place_is_kept_in_its_stead(path):
 
 def test_notes_are_there_for_another_process_after_each_tick(path):
     with MissionStore(path) as store:
-        journal = store.journal(store.add(ORDER, queued=False).id)
+        journal = store.journal(store.add(REQUEST, queued=False).id)
         pose = Pose2D(1.0, 2.0, 0.5)
         journal.note(note(changed("a/b", Status.RUNNING), board={"alice/x": pose}, pose=pose))
         journal.note(note(now_s=2.0, checkpoints={"a/b": {"spot": [1.0, 2.0]}}))
@@ -86,7 +90,7 @@ def test_notes_are_there_for_another_process_after_each_tick(path):
 
 def test_a_store_that_is_locked_for_a_while_loses_no_note(path):
     with MissionStore(path) as store:
-        journal = store.journal(store.add(ORDER, queued=False).id)
+        journal = store.journal(store.add(REQUEST, queued=False).id)
         store._connection.execute("PRAGMA busy_timeout = 10")
         other = sqlite3.connect(path, isolation_level=None)
         other.execute("BEGIN IMMEDIATE")
@@ -100,7 +104,7 @@ def test_a_store_that_is_locked_for_a_while_loses_no_note(path):
 
 def test_values_that_cannot_be_kept_are_told_and_left_out(path):
     with MissionStore(path) as store:
-        journal = store.journal(store.add(ORDER, queued=False).id)
+        journal = store.journal(store.add(REQUEST, queued=False).id)
         journal.note(note(changed("a", Status.SUCCESS), board={"alice/f": print}))
         assert store.memory(1).board == {}
         assert "alice/f" in journal.troubles[0]
@@ -110,14 +114,14 @@ def test_an_unknown_mission_is_refused_with_those_known(path):
     with MissionStore(path) as store:
         with pytest.raises(InputError, match="no mission 7; the store is empty"):
             store.mission(7)
-        store.add(ORDER, queued=True)
+        store.add(REQUEST, queued=True)
         with pytest.raises(InputError, match="no mission 7; known are 1"):
             store.remove(7)
 
 
 def test_removing_a_mission_forgets_its_steps(path):
     with MissionStore(path) as store:
-        store.journal(store.add(ORDER, queued=True).id).note(note(changed("a", Status.SUCCESS)))
+        store.journal(store.add(REQUEST, queued=True).id).note(note(changed("a", Status.SUCCESS)))
         store.remove(1)
         assert store._connection.execute("SELECT count(*) FROM step").fetchone() == (0,)
 
@@ -137,7 +141,7 @@ def test_a_damaged_store_is_refused(path):
 def test_a_store_cut_off_in_the_middle_is_refused(path):
     with MissionStore(path) as store:
         for _ in range(200):
-            store.add(ORDER, queued=True)
+            store.add(REQUEST, queued=True)
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2] + b"\0" * 100)
     with pytest.raises(InputError, match="damaged"), MissionStore(path, create=False) as store:
@@ -169,7 +173,7 @@ def test_a_folder_in_place_of_the_store_is_refused(tmp_path):
 
 def test_a_value_that_cannot_be_read_names_the_mend(path):
     with MissionStore(path) as store:
-        store.add(ORDER, queued=True)
+        store.add(REQUEST, queued=True)
         store._connection.execute("INSERT INTO value VALUES (1, 'alice/x', '{')")
         with pytest.raises(InputError, match=r"mission 1 cannot be taken up.*queue remove 1"):
             store.memory(1)

@@ -6,15 +6,15 @@ import pytest
 from py_trees.common import Status
 
 from executive.mission.command import parse_command
-from executive.mission.file.model import OperatorQuestion
+from executive.mission.request import Request
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
-from executive.store.missions import MissionStore, Order
+from executive.store.missions import MissionStore
 from executive.store.records import Memory, StepRecord
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import Step, compile_commands
-from executive.tree.compiling.policies import AskPlan
+from executive.tree.node import NodeSpec
 from executive.tree.registry import installed_skills
 from skills.api import Cause, Failed, Running, Succeeded
 
@@ -27,7 +27,7 @@ FETCH_AND_ASK = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
     "Take [drink] to [start] and do [Nothing] to [Nothing]",
 )
-ORDER = Order("fetch drink", "flat", "Alice", 3, "out", (), "print", sentence="fetch me a drink")
+REQUEST = Request("fetch me a drink", seed=3, name="fetch drink", world_name="flat", robot="Alice", fingerprint="print")
 
 
 class KilledError(BaseException):
@@ -111,7 +111,7 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
 
     def one_life(texts, *, kill_after=None, kill_when=None, lag=0):
         missions = store.missions()
-        mission = missions[0] if missions else store.add(ORDER, queued=False)
+        mission = missions[0] if missions else store.add(REQUEST, queued=False)
         steps = [Step(parse_command(text)) for text in texts]
         tree = compile_commands("fetch drink", steps, knowledge=knowledge, registry=handling, robot_name="Alice")
         journal, recollection = store.journal(mission.id), None
@@ -248,12 +248,11 @@ def test_causes_come_back_with_failures(live, store, script):
 
 def test_the_operator_is_not_asked_again_about_a_step_that_was_skipped(compiled):
     tree = compiled(*TIDY)
-    first, *others = tree.root.mission.steps
-    ask = AskPlan(
-        path_id="alice/ask", name="ask", child=first, step="get it", question=OperatorQuestion(), options=("skip",)
-    )
-    mission = dataclasses.replace(tree.root.mission, steps=(ask, *others))
-    asking = dataclasses.replace(tree, root=dataclasses.replace(tree.root, mission=mission))
+    first, *others = tree.mission.children
+    options = {"step": "get it", "options": ("skip",), "default": "stop", "limit_s": 60.0, "text": None}
+    ask = NodeSpec("ask", "alice/ask", "ask", options, (first,))
+    mission = dataclasses.replace(tree.mission, children=(ask, *others))
+    asking = dataclasses.replace(tree, root=dataclasses.replace(tree.root, children=(mission,)))
     ended = {ask.path_id: Status.SUCCESS, first.path_id: Status.FAILURE}
     steps = {path: StepRecord(status, None, "", 1.0, {}) for path, status in ended.items()}
     again, _ = resumed_tree(asking, Memory(steps, {}, None))

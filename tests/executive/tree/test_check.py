@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from executive.mission.command import parse_command
-from executive.mission.mission import Mission, MissionStep, SkillCall
+from executive.mission.errors import SourceLine
+from executive.mission.file.model import Mission, MissionStep, SkillCall
 from executive.tree.check import Abilities, PlannedWays, check_tree
 from executive.tree.compiler import compile_mission
-from executive.tree.compiling.plans import Source
 from executive.tree.estimate import Way, load_estimates
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
@@ -45,7 +45,7 @@ def check(knowledge, registry, tmp_path):
     def check_it(*steps, ways=None, abilities=ABLE):
         made = []
         for line, one in enumerate(steps, start=1):
-            source = Source(tmp_path / "m.yaml", line)
+            source = SourceLine(tmp_path / "m.yaml", line)
             command = (parse_command(one),) if isinstance(one, str) else ()
             made.append(MissionStep(command, source, skill=None if command else one))
         mission = Mission("m", "flat", "Alice", tuple(made))

@@ -5,9 +5,9 @@ from collections import Counter
 
 import pytest
 
+from executive.tree.node_view import node_view
 from executive.view.btcpp import to_btcpp
 from executive.view.collapse import folded_below
-from executive.view.model import node_view
 from skills.api import Cause, Failed
 
 CONTROLS = {"Sequence", "Fallback", "Control"}

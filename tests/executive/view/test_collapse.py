@@ -3,9 +3,9 @@
 import pytest
 from py_trees.common import Status
 
-from executive.run.snapshot import NodeState
+from executive.tree.node_view import NodeView
+from executive.tree.snapshot import NodeState
 from executive.view.collapse import folded_below, folded_to
-from executive.view.model import NodeView
 from executive.view.svg import to_svg
 from executive.view.text import to_text
 from skills.api import Cause

@@ -8,11 +8,11 @@ import pytest
 from py_trees.common import Status
 
 from executive.record.reader import Event
-from executive.run.snapshot import NodeState
+from executive.tree.node_view import NodeView, to_json
+from executive.tree.ports import Port
+from executive.tree.snapshot import NodeState
 from executive.view.btcpp import to_btcpp
 from executive.view.mermaid import to_mermaid
-from executive.view.model import NodeView, to_json
-from executive.view.ports import Port
 from executive.view.replay import to_html
 from executive.view.svg import to_svg
 from executive.view.text import printable, to_text

@@ -21,9 +21,9 @@ from executive.record.surroundings import map_message
 from executive.run.control import Control, Mode
 from executive.run.outcome import Glance
 from executive.run.runner import Progress
+from executive.tree.node_view import node_view
 from executive.view.actions import RefusedError, asked_json, control_actions
 from executive.view.feed import Feed
-from executive.view.model import node_view
 from executive.view.replay import fed, to_html
 from executive.view.server import PageContent, PageServer
 from executive.view.watch import SEND_LIMIT_S, ControlWatch

@@ -6,9 +6,9 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 from py_trees.common import Status
 
-from executive.run.snapshot import NodeState
+from executive.tree.node_view import NodeView, node_view, to_json
+from executive.tree.snapshot import NodeState
 from executive.view.looks import Looks, look_of
-from executive.view.model import NodeView, node_view, to_json
 from executive.view.svg import to_svg
 from executive.view.text import to_rich, to_text
 from skills.api import Cause, Failed

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from executive.language import load_parser
+from executive.mission.file.overrides import overridden
+from executive.mission.file.resolve import load_mission, mission_from_file
 from executive.mission.knowledge import load_knowledge
-from executive.mission.mission import load_mission, mission_from_file, overridden
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 

@@ -3,10 +3,9 @@
 import pytest
 
 from executive.mission.errors import InputError
-from executive.mission.file.resolve import MAX_STEPS
-from executive.mission.mission import load_mission, mission_from_file, overridden
+from executive.mission.file.overrides import overridden
+from executive.mission.file.resolve import MAX_STEPS, load_mission, mission_from_file
 from executive.tree.behaviours.board import Constant, FromBoard
-from executive.tree.compiling.plans import SkillPlan
 from skills.robot import Pose2D
 
 VISIT = """\
@@ -33,7 +32,7 @@ def refused(compile_text, text, **others):
 
 
 def leaves(tree, name):
-    return [node for node in tree.root.walk() if isinstance(node, SkillPlan) and node.name == name]
+    return [node for node in tree.root.walk() if node.kind == "skill" and node.name == name]
 
 
 def test_a_used_file_stands_in_the_tree_with_its_parameters(compile_text):
@@ -45,7 +44,7 @@ def test_a_used_file_stands_in_the_tree_with_its_parameters(compile_text):
         "Take [Nothing] to [kitchen] and do [find] to [coke]",
     ]
     assert {"alice/round/1-visit-office/1-office", "alice/round/2-visit-kitchen/2-kitchen"} <= set(tree.path_ids)
-    limits = [node.limit_s for node in tree.root.walk() if node.kind == "timeout"]
+    limits = [node.options["limit_s"] for node in tree.root.walk() if node.kind == "timeout"]
     assert limits == [30, 9.5]
 
 
@@ -150,7 +149,7 @@ def test_wrong_knowledge_is_refused_at_the_files_line(compile_text, override, li
 def test_a_plain_pose_is_a_goal(compile_text):
     tree = compile_text("name: m\nsteps:\n  - skill: navigate\n    with: {x: 1, y: 2, yaw: 0.5, max_speed: 0.4}\n")
     (navigate,) = [node for node in leaves(tree, "navigate") if node.path_id == "alice/m/1-navigate"]
-    ports = dict(navigate.inputs)
+    ports = navigate.options["inputs"]
     assert ports == {"goal": Constant(Pose2D(1.0, 2.0, 0.5)), "max_speed_m_s": Constant(0.4)}
 
 
@@ -168,7 +167,7 @@ steps:
 def test_what_one_skill_gives_a_later_one_takes(compile_text):
     tree = compile_text(DETECT)
     (grasp,) = [node for node in leaves(tree, "grasp") if node.path_id == "alice/m/2-grasp"]
-    assert dict(grasp.inputs)["observation"] == FromBoard("alice/m/1-detect/observation")
+    assert grasp.options["inputs"]["observation"] == FromBoard("alice/m/1-detect/observation")
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,8 @@
 
 import pytest
 
-from executive.mission.mission import load_mission, mission_from_file, overridden
+from executive.mission.file.overrides import overridden
+from executive.mission.file.resolve import load_mission, mission_from_file
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Succeeded

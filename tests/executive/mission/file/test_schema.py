@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from executive.mission.errors import InputError
+from executive.mission.file.model import OnFailure, OperatorQuestion, StaleData, StepGuards, StepPolicy
+from executive.mission.file.resolve import load_mission
 from executive.mission.file.schema import MissionFile, mission_json_schema, schema_text
-from executive.mission.mission import OnFailure, OperatorQuestion, StepGuards, StepPolicy, load_mission
-from executive.tree.behaviours.conditions import StaleData
 
 SCHEMA = Path(__file__).parents[4] / "missions" / "mission.schema.json"
 GOOD = """\

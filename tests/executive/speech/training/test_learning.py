@@ -8,6 +8,8 @@ import pytest
 torch = pytest.importorskip("torch")
 faster_whisper = pytest.importorskip("faster_whisper")
 
+from made_speech import tone  # noqa: E402
+
 from executive.speech.model_file import read_model_file  # noqa: E402
 from executive.speech.training.batches import Batches  # noqa: E402
 from executive.speech.training.data import SpokenSentence, usual  # noqa: E402
@@ -15,7 +17,6 @@ from executive.speech.training.learning import Lessons, learn, losses, text_loss
 from executive.speech.training.model import AdaptedWhisper  # noqa: E402
 from executive.speech.training.noises import Conditions  # noqa: E402
 from executive.speech.whisper import base_weights  # noqa: E402
-from executive.testing.speech import tone  # noqa: E402
 
 NOISY = Conditions(clear=0.0, echoing=0.0, ratio_db=(10.0, 10.0))
 SENTENCES = [

@@ -8,10 +8,11 @@ import pytest
 torch = pytest.importorskip("torch")
 faster_whisper = pytest.importorskip("faster_whisper")
 
+from made_speech import tone  # noqa: E402
+
 from executive.speech.model_file import read_model_file  # noqa: E402
 from executive.speech.training.model import AdaptedWhisper  # noqa: E402
 from executive.speech.whisper import base_weights  # noqa: E402
-from executive.testing.speech import tone  # noqa: E402
 
 RANKS = {"encoder/": 4, "decoder/layer_0": 2}
 START, TEXT = [50258, 50259, 50359], [50363, 2231, 264, 4414, 13]

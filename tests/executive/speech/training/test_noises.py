@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from made_speech import tone
 
 from executive.speech.sound import RATE_HZ
 from executive.speech.training.noises import Conditions, heard_in
-from executive.testing.speech import tone
 
 SPEECH = tone(1.5, height=0.5)
 TALKERS = [tone(1.0, height=0.3), tone(0.7, height=0.3), tone(2.0, height=0.3)]

@@ -4,7 +4,7 @@ import py_trees
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.answer import Answer, Tally
+from executive.tree.behaviours.answer import Answer
 from executive.tree.behaviours.composites import MemoryRound, MemorySelector
 from executive.tree.behaviours.explained import Explained
 from skills.api import Cause, ObjectObservation, Thing
@@ -104,7 +104,8 @@ def count_of(context, bench: Cause | tuple[float, ...], trolley: Cause | tuple[f
         key="alice/q/answer",
         board=context.board,
         publish=context.publish,
-        tally=Tally({f"alice/q/{name}": f"alice/q/{name}/all" for name in ("bench", "trolley")}, needed),
+        tallies={f"alice/q/{name}": f"alice/q/{name}/all" for name in ("bench", "trolley")},
+        needed=needed,
     )
     root.tick_once()
     return root

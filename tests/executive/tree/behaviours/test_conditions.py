@@ -6,6 +6,7 @@ import pytest
 from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
+from executive.mission.file.model import StaleData
 from executive.tree.behaviours.conditions import (
     BatteryAbove,
     BatteryReserve,
@@ -14,7 +15,6 @@ from executive.tree.behaviours.conditions import (
     Holding,
     LeaseHeld,
     Localised,
-    StaleData,
     StopReleased,
     Waiting,
     battery_reserve,

@@ -74,8 +74,8 @@ def test_timeout_starts_anew_after_an_end(clock):
     assert ticked(root, clock, 2) == [R, S]
 
 
-def retry(child, attempts=3, causes=frozenset({Cause.EXECUTION}), final=None):
-    return Retry(path_id="a/r", name="r", child=child, attempts=attempts, causes=causes, final=final)
+def retry(child, attempts=3, causes=frozenset({Cause.EXECUTION})):
+    return Retry(path_id="a/r", name="r", child=child, attempts=attempts, causes=causes)
 
 
 def test_retry_tries_again_one_tick_later_until_it_works(clock):
@@ -98,15 +98,6 @@ def test_retry_leaves_other_causes_alone(clock, cause):
     root = retry(Queue(F, S, cause=cause))
     assert ticked(root, clock, 1) == [F]
     assert root.cause is cause
-
-
-def test_retry_gives_up_when_the_final_node_failed(clock):
-    final, later = Queue(F, S), Queue(F, S)
-    final.path_id, later.path_id = "a/final", "a/later"
-    root = retry(MemorySequence(path_id="a/s", name="s", children=[final, later]), final="a/final")
-    assert ticked(root, clock, 1) == [F]
-    root = retry(MemorySequence(path_id="a/s", name="s", children=[Queue(S, S), Queue(F, S)]), final="a/final")
-    assert ticked(root, clock, 2) == [R, S]
 
 
 def test_retry_begins_a_sequence_at_its_first_step(clock):

@@ -7,7 +7,7 @@ from py_trees.common import Status
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.composites import MemorySelector, MemorySequence
 from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.recovery import Afterwards, OnlyIfHolding, OnlyIfKnown, Recover, Remedy, Trigger
+from executive.tree.behaviours.recovery import Afterwards, OnlyIfHolding, OnlyIfKnown, Recover, Recovery, Trigger
 from skills.api import Cause
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
@@ -34,15 +34,16 @@ class Leaf(Explained, Behaviour):
         return F if isinstance(entry, Cause) else entry
 
 
-def recover(attempt, *remedies, attempts=5, forgets=(), board=None):
+def recover(attempt, *recoveries, attempts=5, forgets=(), board=None):
+    leaves, rules = [leaf for leaf, _ in recoveries], [rule for _, rule in recoveries]
     return Recover(
-        path_id="alice/recover", name="recover", attempt=attempt, remedies=remedies, attempts=attempts,
+        path_id="alice/recover", name="recover", children=[attempt, *leaves], recoveries=rules, attempts=attempts,
         forgets=forgets, board=board or Board("alice"),
     )  # fmt: skip
 
 
-def remedy(leaf, *causes, node=None, own=False, uses=1):
-    return Remedy(leaf, (Trigger(frozenset(causes), node, own),), uses)
+def recovery(leaf, *causes, node=None, own=False, uses=1):
+    return leaf, Recovery((Trigger(frozenset(causes), node, own),), uses)
 
 
 def table(root, ticks):
@@ -54,9 +55,9 @@ def table(root, ticks):
     return rows
 
 
-def test_the_remedy_for_the_cause_is_chosen_and_the_attempt_starts_anew():
+def test_the_recovery_for_the_cause_is_chosen_and_the_attempt_starts_anew():
     attempt, clear, back_off = Leaf("go", R, PLANNING, S), Leaf("clear", EXECUTION), Leaf("back", R, S)
-    root = recover(attempt, remedy(clear, POST), remedy(back_off, PLANNING))
+    root = recover(attempt, recovery(clear, POST), recovery(back_off, PLANNING))
     # tick     root go clear back
     assert table(root, 5) == [
         (R, R, N, N),
@@ -68,45 +69,45 @@ def test_the_remedy_for_the_cause_is_chosen_and_the_attempt_starts_anew():
     assert (attempt.begun, clear.begun, back_off.begun, root.attempt) == (2, 0, 1, 2)
 
 
-def test_without_a_remedy_for_the_cause_it_fails_at_once_with_that_cause():
-    root = recover(Leaf("go", EXECUTION), remedy(Leaf("clear", S), PLANNING))
+def test_without_a_recovery_for_the_cause_it_fails_at_once_with_that_cause():
+    root = recover(Leaf("go", EXECUTION), recovery(Leaf("clear", S), PLANNING))
     assert table(root, 1) == [(F, F, N)]
     assert (root.cause, root.message) == (EXECUTION, "go 1")
 
 
-def test_a_remedy_is_used_so_often_and_no_more_then_the_next_one():
+def test_a_recovery_is_used_so_often_and_no_more_then_the_next_one():
     clear, back_off = Leaf("clear", S), Leaf("back", S)
-    root = recover(Leaf("go", PLANNING), remedy(clear, PLANNING, uses=2), remedy(back_off, PLANNING))
+    root = recover(Leaf("go", PLANNING), recovery(clear, PLANNING, uses=2), recovery(back_off, PLANNING))
     while root.status != F:
         root.tick_once()
     assert (clear.begun, back_off.begun) == (2, 1)
     assert (root.cause, root.message) == (PLANNING, "go 4 (after 4 attempts)")
 
 
-def test_attempts_are_bounded_whatever_the_remedies_allow():
+def test_attempts_are_bounded_whatever_the_recoveries_allow():
     attempt = Leaf("go", PLANNING)
-    root = recover(attempt, remedy(Leaf("clear", S), PLANNING, uses=99), attempts=3)
+    root = recover(attempt, recovery(Leaf("clear", S), PLANNING, uses=99), attempts=3)
     while root.status != F:
         root.tick_once()
     assert attempt.begun == 3
 
 
-def test_a_failed_remedy_gives_way_to_the_next_that_fits():
+def test_a_failed_recovery_gives_way_to_the_next_that_fits():
     attempt, back_off = Leaf("go", PLANNING, S), Leaf("back", S)
-    root = recover(attempt, remedy(Leaf("clear", EXECUTION), PLANNING), remedy(back_off, PLANNING))
+    root = recover(attempt, recovery(Leaf("clear", EXECUTION), PLANNING), recovery(back_off, PLANNING))
     assert [row[0] for row in table(root, 4)] == [R, R, R, S]
 
 
 @pytest.mark.parametrize(("cause", "expected"), [(EXECUTION, PLANNING), (Cause.ERROR, Cause.ERROR)])
-def test_when_all_remedies_fail_both_sentences_are_told(cause, expected):
-    root = recover(Leaf("go", PLANNING), remedy(Leaf("clear", cause), PLANNING))
+def test_when_all_recoveries_fail_both_sentences_are_told(cause, expected):
+    root = recover(Leaf("go", PLANNING), recovery(Leaf("clear", cause), PLANNING))
     assert [row[0] for row in table(root, 2)] == [R, F]
     assert (root.cause, root.message) == (expected, "go 1; clear: clear 1")
 
 
-def test_a_new_start_counts_remedies_from_zero_and_forgets_what_attempts_shared():
+def test_a_new_start_counts_recoveries_from_zero_and_forgets_what_attempts_shared():
     board, clear = Board("alice"), Leaf("clear", S)
-    root = recover(Leaf("go", PLANNING), remedy(clear, PLANNING), forgets=("alice/tried",), board=board)
+    root = recover(Leaf("go", PLANNING), recovery(clear, PLANNING), forgets=("alice/tried",), board=board)
     for number in (1, 2):
         board.put("alice/tried", number)
         while root.status != F:
@@ -118,7 +119,7 @@ def test_a_new_start_counts_remedies_from_zero_and_forgets_what_attempts_shared(
 
 def test_what_attempts_write_stays_from_one_to_the_next():
     board = Board("alice")
-    root = recover(Leaf("go", PLANNING, S), remedy(Leaf("clear", S), PLANNING), forgets=("alice/tried",), board=board)
+    root = recover(Leaf("go", PLANNING, S), recovery(Leaf("clear", S), PLANNING), forgets=("alice/tried",), board=board)
     root.tick_once()
     board.put("alice/tried", 1)
     table(root, 2)
@@ -130,20 +131,20 @@ def test_a_trigger_may_name_the_node_that_failed():
     find, take = Leaf("find", S), Leaf("take", POST, S)
     attempt = MemorySequence(path_id="alice/pick", name="pick", children=[find, take])
     look, other = Leaf("look", S), Leaf("other", S)
-    root = recover(attempt, remedy(other, POST, node="alice/find"), remedy(look, POST, node="alice/take"))
+    root = recover(attempt, recovery(other, POST, node="alice/find"), recovery(look, POST, node="alice/take"))
     assert [row[0] for row in table(root, 3)] == [R, R, S]
     assert (look.begun, other.begun, find.begun) == (1, 0, 2)
 
 
 def test_a_trigger_may_want_the_nodes_own_failure():
     below = MemorySequence(path_id="alice/guard", name="guard", children=[Leaf("go", EXECUTION)])
-    root = recover(below, remedy(Leaf("pick up", S), EXECUTION, node="alice/guard", own=True))
+    root = recover(below, recovery(Leaf("pick up", S), EXECUTION, node="alice/guard", own=True))
     assert table(root, 1) == [(F, F, N)]
 
 
 def test_interrupted_it_says_so_and_begins_anew_afterwards():
     attempt = Leaf("go", PLANNING, R)
-    root = recover(attempt, remedy(Leaf("clear", R), PLANNING))
+    root = recover(attempt, recovery(Leaf("clear", R), PLANNING))
     table(root, 2)
     root.stop(N)
     assert (root.cause, [child.status for child in root.children]) == (Cause.CANCELLED, [F, N])
@@ -154,7 +155,7 @@ def test_interrupted_it_says_so_and_begins_anew_afterwards():
 @pytest.mark.parametrize(("first", "status"), [((R, S), S), ((R, POST), F)])
 def test_what_tidies_up_runs_whatever_came_before_and_leaves_the_result(first, status):
     # tick        root     first    then
-    root = Afterwards(path_id="alice/a", name="a", first=Leaf("look", *first), then=Leaf("stow", R, S))
+    root = Afterwards(path_id="alice/a", name="a", children=[Leaf("look", *first), Leaf("stow", R, S)])
     assert table(root, 3) == [(R, R, N), (R, status, R), (status, status, S)]
     assert root.message == "look 2"
     assert root.cause == (POST if status == F else None)
@@ -162,12 +163,12 @@ def test_what_tidies_up_runs_whatever_came_before_and_leaves_the_result(first, s
 
 def test_tidying_up_only_after_a_failure_leaves_a_success_alone():
     stow = Leaf("stow", S)
-    root = Afterwards(path_id="alice/a", name="a", first=Leaf("look", S), then=stow, after=frozenset({F}))
+    root = Afterwards(path_id="alice/a", name="a", children=[Leaf("look", S), stow], only_after_failure=True)
     assert table(root, 1) == [(S, S, N)]
 
 
 def test_a_failure_to_tidy_up_is_told_but_changes_nothing():
-    root = Afterwards(path_id="alice/a", name="a", first=Leaf("look", S), then=Leaf("stow", PLANNING))
+    root = Afterwards(path_id="alice/a", name="a", children=[Leaf("look", S), Leaf("stow", PLANNING)])
     assert table(root, 1) == [(S, S, F)]
     assert (root.cause, root.message) == (None, "look 1 (stow failed: stow 1)")
 

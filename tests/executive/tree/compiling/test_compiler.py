@@ -3,29 +3,29 @@
 import pytest
 
 from executive.mission.command import parse_command
-from executive.mission.errors import InputError
+from executive.mission.errors import InputError, SourceLine
+from executive.mission.goal import surfaces_to_search
 from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiler import Step, compile_commands
-from executive.tree.compiling.plans import AnswerPlan, HoldingPlan, RememberPosePlan, SkillPlan, Source
-from executive.tree.compiling.search import surfaces_to_search
+from executive.tree.estimate import expected
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
 from skills.robot import Pose2D
 
 
 def skills_of(tree):
     """The skills that run when all goes well."""
-    return [node for node in expected(tree.mission) if isinstance(node, SkillPlan)]
+    return [node for node in followed(tree.mission) if node.kind == "skill"]
 
 
-def expected(plan):
-    yield plan
-    for child in plan.expected:
-        yield from expected(child)
+def followed(node):
+    yield node
+    for child in expected(node):
+        yield from followed(child)
 
 
 def port(node, name):
-    return dict(node.inputs)[name]
+    return node.options["inputs"][name]
 
 
 def test_the_leaves_of_a_fetch_have_these_path_ids(compiled, make):
@@ -108,7 +108,7 @@ def test_attributes_reach_the_detector(compiled):
 
 def test_the_way_back_leads_to_the_remembered_pose_under_a_guard(compiled, make):
     tree = compiled(*make.FETCH)
-    (guard,) = [node for node in tree.root.walk() if isinstance(node, HoldingPlan)]
+    (guard,) = [node for node in tree.root.walk() if node.kind == "guard"]
     (navigate,) = [node for node in skills_of(tree) if node.path_id.endswith("2-start/navigate")]
     assert port(navigate, "goal") == FromBoard("alice/fetch-drink/start-pose")
     assert navigate in list(guard.walk())
@@ -116,7 +116,7 @@ def test_the_way_back_leads_to_the_remembered_pose_under_a_guard(compiled, make)
 
 def test_the_start_is_remembered_only_when_needed(compiled):
     tree = compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")
-    assert not [node for node in tree.mission.walk() if isinstance(node, RememberPosePlan)]
+    assert not [node for node in tree.mission.walk() if node.kind == "remember"]
     assert port(skills_of(tree)[0], "goal").value == Pose2D(-4.0, 0.0, 0.0)
 
 
@@ -156,12 +156,12 @@ def test_the_person_at_the_start_is_named_when_known(compiled, make):
 
 def test_a_status_check_names_every_look(compiled):
     tree = compiled("Take [Nothing] to [kitchen] and do [find] to [drink]", name="check")
-    (answer,) = [node for node in tree.root.walk() if isinstance(node, AnswerPlan)]
+    (answer,) = [node for node in tree.root.walk() if node.kind == "answer"]
     base = "alice/check/1-kitchen/search"
-    assert answer.looks == (
-        ("counter", (f"{base}/counter-1/detect", f"{base}/counter-2/detect")),
-        ("shelf", (f"{base}/shelf-1/detect",)),
-    )
+    assert answer.options["looks"] == {
+        "counter": (f"{base}/counter-1/detect", f"{base}/counter-2/detect"),
+        "shelf": (f"{base}/shelf-1/detect",),
+    }
 
 
 @pytest.mark.parametrize(
@@ -218,13 +218,13 @@ def test_what_cannot_be_done_is_refused_with_a_reason(compiled, text, words):
 
 def test_refusals_name_the_line(knowledge, registry, tmp_path):
     command = parse_command("Take [Nothing] to [moon] and do [Nothing] to [Nothing]")
-    step = Step(command, Source(tmp_path / "m.yaml", 7))
+    step = Step(command, SourceLine(tmp_path / "m.yaml", 7))
     with pytest.raises(InputError, match=r"m\.yaml:7: the place 'moon'"):
         compile_commands("m", [step], knowledge=knowledge, registry=registry, robot_name="Alice")
 
 
 def test_nodes_keep_their_line(knowledge, registry, tmp_path):
-    source = Source(tmp_path / "m.yaml", 4)
+    source = SourceLine(tmp_path / "m.yaml", 4)
     command = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
     tree = compile_commands("m", [Step(command, source)], knowledge=knowledge, registry=registry, robot_name="Alice")
     assert {node.source for node in tree.mission.children[0].walk()} == {source}

@@ -3,7 +3,7 @@
 import pytest
 
 from executive.mission.command import parse_command
-from executive.mission.mission import Mission, MissionStep, OnFailure, OperatorQuestion, StepGuards, StepPolicy
+from executive.mission.file.model import Mission, MissionStep, OnFailure, OperatorQuestion, StepGuards, StepPolicy
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
@@ -157,7 +157,7 @@ def test_the_operators_answer_decides(compile_steps, run_tree, nowhere, answers,
 def test_a_whole_mission_is_asked_about_but_not_skipped(compile_steps):
     tree = compile_steps(step(GO["hall"]), policy=StepPolicy(on_failure=OnFailure.ASK))
     (ask,) = [node for node in tree.root.walk() if node.kind == "ask"]
-    assert ask.options == ("retry", "stop")
+    assert ask.options["options"] == ("retry", "stop")
 
 
 @pytest.mark.parametrize(("charge", "outcome"), [(0.5, Outcome.SUCCESS), (0.35, Outcome.FAILURE)])

@@ -4,7 +4,6 @@ import pytest
 
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings
-from executive.tree.compiling.interrupts import BatteryPlan, LostPlan
 from executive.tree.compiling.search import surfaces_elsewhere
 from skills.api import Cause, Failed, Succeeded
 from skills.robot import Pose2D
@@ -298,7 +297,6 @@ def lost_runs(clock, robot, script, make, run_tree):
 
 
 def test_thresholds_come_from_the_knowledge(compiled, knowledge, registry):
-    (battery,) = [node for node in compiled(GO).root.walk() if isinstance(node, BatteryPlan)]
-    (lost,) = [node for node in compiled(GO).root.walk() if isinstance(node, LostPlan)]
+    battery, lost = (node.options["requirement"] for node in compiled(GO).root.walk() if node.kind == "interrupt")
     assert (battery.low, battery.dock) == (0.15, Pose2D(0.0, -1.0, 0.0))
     assert lost.patience_s < RunSettings().time_limit_s

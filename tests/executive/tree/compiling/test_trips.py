@@ -2,11 +2,10 @@
 
 import pytest
 
-from executive.cli.promises import promises_of
+from executive.cli.goal_conditions import promises_of
 from executive.mission.errors import InputError
 from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import Constant
-from executive.tree.compiling.plans import SkillPlan
 from plant.referee import PromiseKind
 from skills.api import Succeeded
 
@@ -24,10 +23,8 @@ def test_two_things_are_two_trips(compiled):
 
 
 def test_what_was_brought_is_not_looked_for_again(compiled):
-    finds = [
-        node for node in compiled(*TWO).root.walk() if isinstance(node, SkillPlan) and "/get/find/" in node.path_id
-    ]
-    bound = [dict(node.inputs)["surfaces"] for node in finds if node.name == "detect"]
+    finds = [node for node in compiled(*TWO).root.walk() if node.kind == "skill" and "/get/find/" in node.path_id]
+    bound = [node.options["inputs"]["surfaces"] for node in finds if node.name == "detect"]
     named = {surface.name for binding in bound if isinstance(binding, Constant) for surface in binding.value}
     assert named == {"counter", "shelf"}
 
@@ -45,7 +42,7 @@ def test_each_trip_grasps_and_puts_down(compiled, run_tree, script, robot):
 
 def test_the_promise_is_one_of_two_things(compiled, run_tree, knowledge, script):
     tree = compiled(*TWO)
-    grasped, placed = promises_of(tree, knowledge=knowledge, result=run_tree(tree).robots[0])
+    grasped, placed = promises_of(tree, run_tree(tree).robots[0])
     assert (grasped.kind, grasped.count, placed.kind, placed.count) == (PromiseKind.GRASPED, 2, PromiseKind.PLACED, 2)
 
 

@@ -7,8 +7,9 @@ import pytest
 
 from executive.mission.errors import InputError
 from executive.tree.behaviours.board import Constant, FromBoard
-from executive.tree.compiling.plans import SequencePlan, SkillPlan
+from executive.tree.compiling.builder import skill_spec
 from executive.tree.compiling.wiring import check_wiring
+from executive.tree.node import NodeSpec
 from skills.api import Skill, Succeeded
 
 
@@ -31,14 +32,13 @@ class Wired(Skill[Inputs]):
         return Succeeded("done")
 
 
-def plan(inputs: dict[str, Any], outputs: dict[str, str] | None = None, path_id: str = "a/wired") -> SkillPlan:
-    bound = tuple((k, v if isinstance(v, FromBoard) else Constant(v)) for k, v in inputs.items())
-    outs = tuple((outputs or {}).items())
-    return SkillPlan(path_id=path_id, name="wired", skill=Wired, inputs=bound, outputs=outs, limit_s=1.0)
+def plan(inputs: dict[str, Any], outputs: dict[str, str] | None = None, path_id: str = "a/wired") -> NodeSpec:
+    bound = {k: v if isinstance(v, FromBoard) else Constant(v) for k, v in inputs.items()}
+    return skill_spec(Wired, "wired", path_id, None, bound, outputs or {})
 
 
-def check(*nodes: SkillPlan) -> None:
-    check_wiring(SequencePlan(path_id="a", name="a", steps=nodes))
+def check(*nodes: NodeSpec) -> None:
+    check_wiring(NodeSpec("sequence", "a", "a", children=nodes))
 
 
 def test_good_wiring_passes():

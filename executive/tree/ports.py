@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from executive.tree.behaviours.board import Constant, FromBoard
-from executive.tree.compiling.plans import NodePlan, SkillPlan
+from executive.tree.node import NodeSpec
 from executive.tree.types import describe_type, field_types
 
 
@@ -23,14 +23,17 @@ class Port:
     on_board: bool = False
 
 
-def ports_of(plan: NodePlan) -> tuple[Port, ...]:
-    """The ports of a skill, or the settings of any other node; nodes below are no settings."""
-    return tuple(_skill_ports(plan) if isinstance(plan, SkillPlan) else _settings(plan))
+def ports_of(spec: NodeSpec) -> tuple[Port, ...]:
+    """The ports of a skill, or the options of any other node."""
+    if spec.kind == "skill":
+        return tuple(_skill_ports(spec.options))
+    return tuple(Port(name, plain(value)) for name, value in spec.options.items())
 
 
-def _skill_ports(plan: SkillPlan) -> Iterator[Port]:
-    types, bound = field_types(plan.skill.Inputs), dict(plan.inputs)
-    for field in dataclasses.fields(plan.skill.Inputs):
+def _skill_ports(options: Mapping[str, Any]) -> Iterator[Port]:
+    skill, bound = options["skill"], options.get("inputs", {})
+    types = field_types(skill.Inputs)
+    for field in dataclasses.fields(skill.Inputs):
         kind = describe_type(types[field.name])
         match bound.get(field.name):
             case FromBoard(key):
@@ -39,28 +42,12 @@ def _skill_ports(plan: SkillPlan) -> Iterator[Port]:
                 yield Port(field.name, plain(value), kind)
             case _:
                 yield Port(field.name, _default(field), kind)
-    for name, key in plan.outputs:
-        yield Port(name, key, describe_type(plan.skill.outputs.get(name, Any)), output=True, on_board=True)
+    for name, key in options.get("outputs", {}).items():
+        yield Port(name, key, describe_type(skill.outputs.get(name, Any)), output=True, on_board=True)
 
 
 def _default(field: dataclasses.Field[Any]) -> str:
     return "" if field.default is dataclasses.MISSING else plain(field.default)
-
-
-def _settings(plan: NodePlan) -> Iterator[Port]:
-    inherited = {field.name for field in dataclasses.fields(NodePlan)}
-    for field in dataclasses.fields(plan):
-        value = getattr(plan, field.name)
-        if field.name not in inherited and not _holds_nodes(value):
-            yield Port(field.name, plain(value))
-
-
-def _holds_nodes(value: Any) -> bool:
-    if isinstance(value, Mapping):
-        return any(map(_holds_nodes, value.values()))
-    if isinstance(value, tuple | list):
-        return any(map(_holds_nodes, value))
-    return isinstance(value, NodePlan)
 
 
 def plain(value: Any) -> str:

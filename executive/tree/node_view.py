@@ -7,9 +7,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from executive.run.snapshot import NodeState
-from executive.tree.compiling.plans import NodePlan, Source
-from executive.view.ports import Port, ports_of
+from executive.mission.errors import SourceLine
+from executive.tree.node import NodeSpec
+from executive.tree.ports import Port, ports_of
+from executive.tree.snapshot import NodeState
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class NodeView:
     kind: str
     name: str
     state: NodeState = field(default_factory=NodeState)
-    source: Source | None = None
+    source: SourceLine | None = None
     children: tuple[NodeView, ...] = ()
     ports: tuple[Port, ...] = ()
     hidden: int = 0
@@ -48,17 +49,17 @@ class NodeView:
         }
 
 
-def node_view(plan: NodePlan, states: Mapping[str, NodeState] | None = None) -> NodeView:
-    """The view of a plan, with the states by path id where there are some."""
+def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> NodeView:
+    """The view of a spec, with the states by path id where there are some."""
     known = states or {}
     return NodeView(
-        path_id=plan.path_id,
-        kind=plan.kind,
-        name=plan.name,
-        state=known.get(plan.path_id, NodeState()),
-        source=plan.source,
-        children=tuple(node_view(child, known) for child in plan.children),
-        ports=ports_of(plan),
+        path_id=spec.path_id,
+        kind=spec.kind,
+        name=spec.name,
+        state=known.get(spec.path_id, NodeState()),
+        source=spec.source,
+        children=tuple(node_view(child, known) for child in spec.children),
+        ports=ports_of(spec),
     )
 
 
@@ -70,7 +71,7 @@ def logged_view(structure: Mapping[str, Any], states: Mapping[str, NodeState]) -
         kind=structure["type"],
         name=structure["name"],
         state=states.get(structure["id"], NodeState()),
-        source=None if source is None else Source(Path(source["file"]), int(source["line"])),
+        source=None if source is None else SourceLine(Path(source["file"]), int(source["line"])),
         children=tuple(logged_view(child, states) for child in structure["children"]),
         ports=tuple(Port(**port) for port in structure.get("ports", ())),
     )
@@ -90,5 +91,5 @@ def to_json(node: NodeView) -> dict[str, Any]:
     }
 
 
-def _place(source: Source | None) -> dict[str, Any] | None:
+def _place(source: SourceLine | None) -> dict[str, Any] | None:
     return None if source is None else {"file": str(source.file), "line": source.line}

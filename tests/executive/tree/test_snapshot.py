@@ -3,7 +3,7 @@
 import pytest
 from py_trees.common import Status
 
-from executive.run.snapshot import Change, NodeState
+from executive.tree.snapshot import Change, NodeState
 
 GOING = NodeState(Status.RUNNING, None, "going, 2.5 m to go")
 

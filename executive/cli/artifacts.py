@@ -28,7 +28,7 @@ _ROW: Final = 4
 _MOMENTS: Final[Mapping[str, str]] = MappingProxyType({"hand-over": "hand_over", "place": "place"})
 
 
-class Souvenirs:
+class Artifacts:
     """Passes messages on to the log and remembers what is worth a picture."""
 
     def __init__(self, publish: Publish) -> None:
@@ -69,18 +69,18 @@ class Souvenirs:
             self.moments[name] = time_s
 
 
-def draw_souvenirs(souvenirs: Souvenirs, simulation: Simulation, robot_name: str, folder: Path) -> Sequence[Path]:
+def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robot_name: str, folder: Path) -> Sequence[Path]:
     """Write the pictures of a recorded run into `folder` as PNG; gives their paths.
 
     What happened before a restart was not recorded by this process, and is left out.
     """
     pictures = {"map": _map(simulation, robot_name)}
-    if souvenirs.detection is not None:
-        pictures["detection"] = _detection(souvenirs.detection)
+    if artifacts.detection is not None:
+        pictures["detection"] = _detection(artifacts.detection)
     begun_s = simulation.recorder.at(0.0).time_s if simulation.recorder is not None else 0.0
     last = simulation.referee.lifts(robot_name)[-1:]
     lifts = [("grasp", lift.time_s) for lift in last if lift.time_s >= begun_s]
-    for name, time_s in (*lifts, *souvenirs.moments.items()):
+    for name, time_s in (*lifts, *artifacts.moments.items()):
         pictures[name] = _view(simulation, robot_name, time_s)
     paths = [folder / f"{name}.png" for name in pictures]
     for path, picture in zip(paths, pictures.values(), strict=True):
@@ -88,12 +88,12 @@ def draw_souvenirs(souvenirs: Souvenirs, simulation: Simulation, robot_name: str
     return paths
 
 
-def draw_answer(souvenirs: Souvenirs, folder: Path) -> Path | None:
+def draw_answer(artifacts: Artifacts, folder: Path) -> Path | None:
     """Write the picture that goes with an answer as `answer.png`; its path, or None where nothing was asked."""
-    if souvenirs.answer is None:
+    if artifacts.answer is None:
         return None
     path = folder / "answer.png"
-    save_png(path, souvenirs.answer)
+    save_png(path, artifacts.answer)
     return path
 
 

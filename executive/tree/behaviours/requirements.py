@@ -1,13 +1,25 @@
-"""Conditions that a mission file sets for its steps, as data; `condition` makes what looks at them in one run."""
+"""Conditions as data, as they stand in a compiled tree; `condition` makes what looks at them in one run."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from executive.tree.behaviours.conditions import Condition, Freshness, StaleData, Verdict, battery_above, localised
+from executive.mission.file.model import StaleData
+from executive.tree.behaviours.conditions import (
+    Condition,
+    Freshness,
+    LeaseHeld,
+    StopReleased,
+    Verdict,
+    battery_above,
+    battery_reserve,
+    holding,
+    localised,
+)
 from executive.tree.behaviours.context import RunContext
 from skills.api import Cause, Failed
+from skills.robot import Pose2D
 
 BATTERY_FRESHNESS = Freshness(10.0, StaleData.ACCEPT)
 PLACE_FRESHNESS = Freshness(2.0, StaleData.WAIT)
@@ -38,10 +50,52 @@ class KnowsPlace:
     """The robot knows where it is; `stale` says what an old estimate means (None: wait for a new one)."""
 
     stale: StaleData | None = None
+    patience_s: float = PLACE_PATIENCE_S
 
     def condition(self, context: RunContext) -> Condition:
         """A condition on the localiser, with some seconds of patience."""
-        return localised(PLACE_PATIENCE_S, replace(PLACE_FRESHNESS, policy=self.stale or PLACE_FRESHNESS.policy))
+        return localised(self.patience_s, replace(PLACE_FRESHNESS, policy=self.stale or PLACE_FRESHNESS.policy))
+
+
+@dataclass(frozen=True)
+class BatteryForWork:
+    """The battery's charge (0 to 1) is at least `low`, and enough for the way to the dock."""
+
+    low: float
+    dock: Pose2D
+
+    def condition(self, context: RunContext) -> Condition:
+        """A condition on battery and place."""
+        return battery_reserve(self.low, self.dock)
+
+
+@dataclass(frozen=True)
+class Holds:
+    """The gripper holds `thing`."""
+
+    thing: str
+
+    def condition(self, context: RunContext) -> Condition:
+        """A condition on the gripper."""
+        return holding(self.thing)
+
+
+@dataclass(frozen=True)
+class NoStopButton:
+    """No stop button is pressed."""
+
+    def condition(self, context: RunContext) -> Condition:
+        """A condition on the run's stop button."""
+        return StopReleased()
+
+
+@dataclass(frozen=True)
+class OwnLease:
+    """Nobody else holds the robot's lease."""
+
+    def condition(self, context: RunContext) -> Condition:
+        """A condition on the lease."""
+        return LeaseHeld()
 
 
 @dataclass(frozen=True)
@@ -56,14 +110,11 @@ class NotAfter:
 
 
 @dataclass(frozen=True)
-class TimeLeft:
+class TimeLeft(Condition):
     """Time is left: `limit_s` counts from `begun_s` on the robot's clock; TIMEOUT when not."""
 
     limit_s: float
     begun_s: float
-
-    def begin(self, context: RunContext) -> None:
-        """The time goes on from the run's beginning."""
 
     def violated(self, context: RunContext) -> Verdict:
         """A failure when the time is over."""

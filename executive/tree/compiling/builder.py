@@ -1,4 +1,4 @@
-"""What all subtrees of one mission share, and short ways to make their nodes."""
+"""Builds the node specs of one step's subtree: what all subtrees of one mission share, and short ways to make nodes."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import dataclasses
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 from executive.mission.command import Command
-from executive.mission.errors import InputError, did_you_mean, listing
+from executive.mission.errors import InputError, SourceLine, listing, suggestion
 from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
-from executive.tree.compiling.plans import NodePlan, SequencePlan, SkillPlan, Source
-from executive.tree.compiling.recovery import RecoverPlan, RemedyPlan, after
+from executive.tree.behaviours.recovery import Recovery, Trigger
+from executive.tree.node import NodeSpec
 from skills.api import Cause, Skill, Surface
 from skills.robot import Pose2D
 
@@ -35,8 +36,13 @@ def pose_2d(pose: Pose) -> Pose2D:
     return Pose2D(pose.x, pose.y, pose.yaw)
 
 
+def after(*causes: Cause, of: NodeSpec | None = None, own: bool = False) -> Trigger:
+    """A trigger: failures with one of the causes of a node (the attempt as a whole when none is named)."""
+    return Trigger(frozenset(causes), None if of is None else of.path_id, own)
+
+
 @dataclass(frozen=True)
-class Workshop:
+class PlanBuilder:
     """Makes the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
 
     `anywhere` says whether a thing that is not in its place is looked for elsewhere, too, but never on the surfaces in
@@ -48,17 +54,26 @@ class Workshop:
     path_id: str
     start_key: str
     command: Command
-    source: Source | None
+    source: SourceLine | None
     anywhere: bool = True
     avoided: frozenset[str] = frozenset()
 
-    def at(self, *parts: str) -> Workshop:
-        """The same workshop for a subtree below."""
+    def at(self, *parts: str) -> PlanBuilder:
+        """The builder of a subtree below."""
         return replace(self, path_id="/".join((self.path_id, *map(slug, parts))))
+
+    def node(self, kind: str, name: str, *children: NodeSpec, part: str = "", **options: Any) -> NodeSpec:
+        """A node at this path id, or at the `part` below it."""
+        path_id = f"{self.path_id}/{part}" if part else self.path_id
+        return NodeSpec(kind, path_id, name, MappingProxyType(options), children, self.source)
+
+    def sequence(self, name: str, *steps: NodeSpec) -> NodeSpec:
+        """A sequence at this path id."""
+        return self.node("sequence", name, *steps)
 
     def skill(
         self, name: str, inputs: Mapping[str, object] | None = None, outputs: Mapping[str, str] | None = None
-    ) -> SkillPlan:
+    ) -> NodeSpec:
         """A leaf that runs the registered skill `name`; inputs that are no binding are constants.
 
         Raises:
@@ -66,39 +81,37 @@ class Workshop:
         """
         if name not in self.registry:
             raise self.error(f"there is no skill '{name}'", f"registered are {listing(sorted(self.registry))}")
-        skill = self.registry[name]
-        return SkillPlan(
-            path_id=f"{self.path_id}/{slug(name)}",
-            name=name,
-            source=self.source,
-            skill=skill,
-            inputs=tuple((port, _binding(value)) for port, value in (inputs or {}).items()),
-            outputs=tuple((outputs or {}).items()),
-            limit_s=skill.default_timeout_s,
-        )
+        bound = {port: _binding(value) for port, value in (inputs or {}).items()}
+        return skill_spec(self.registry[name], name, f"{self.path_id}/{slug(name)}", self.source, bound, outputs or {})
 
-    def sequence(self, name: str, *steps: NodePlan) -> SequencePlan:
-        """A sequence at this workshop's path id."""
-        return SequencePlan(path_id=self.path_id, name=name, source=self.source, steps=steps)
+    def recover(
+        self,
+        name: str,
+        attempt: NodeSpec,
+        *recoveries: tuple[NodeSpec, Recovery],
+        attempts: int,
+        part: str = "",
+        forgets: tuple[str, ...] = (),
+    ) -> NodeSpec:
+        """An attempt with recoveries, `attempts` at most; the blackboard keys in `forgets` are empty when it starts."""
+        nodes, when = tuple(node for node, _ in recoveries), tuple(rule for _, rule in recoveries)
+        options = {"recoveries": when, "attempts": attempts, "forgets": forgets}
+        return self.node("recover", name, attempt, *nodes, part=part, **options)
 
-    def navigate(self, pose: Pose2D | FromBoard, *, exactly: bool = False) -> NodePlan:
+    def pause(self, part: str, name: str, duration_s: float) -> NodeSpec:
+        """A leaf that waits on the robot's clock."""
+        return self.node("pause", name, part=part, duration_s=duration_s)
+
+    def navigate(self, pose: Pose2D | FromBoard, *, exactly: bool = False) -> NodeSpec:
         """Drive to a pose; where the way is blocked, see anew what stands there, then back off a little.
 
         With `exactly`, within 8 cm.
         """
         ports = {"goal": pose, "position_tolerance_m": 0.08} if exactly else {"goal": pose}
         drive, below = self.skill("navigate", ports), self.at("way")
-        return RecoverPlan(
-            path_id=below.path_id,
-            name="go there",
-            source=self.source,
-            attempt=drive,
-            remedies=(
-                RemedyPlan(below.skill("clear_costmap"), (after(Cause.PLANNING, Cause.EXECUTION, of=drive),)),
-                RemedyPlan(below.skill("back_off"), (after(Cause.PLANNING, Cause.EXECUTION, of=drive),)),
-            ),
-            attempts=3,
-        )
+        blocked = Recovery((after(Cause.PLANNING, Cause.EXECUTION, of=drive),))
+        recoveries = ((below.skill("clear_costmap"), blocked), (below.skill("back_off"), blocked))
+        return below.recover("go there", drive, *recoveries, attempts=3)
 
     def has_ports(self, skill: str, inputs: tuple[str, ...] = (), outputs: tuple[str, ...] = ()) -> bool:
         """Whether a registered skill has these ports; a skill of others may lack what is not essential."""
@@ -121,9 +134,7 @@ class Workshop:
         """
         known = self.knowledge.place(name)
         if known is None:
-            near = did_you_mean(name, self.knowledge.place_names())
-            mend = f"did you mean '{near}'?" if near else f"known are {listing(self.knowledge.place_names())}"
-            raise self.error(f"the place '{name}' is not known", mend)
+            raise self.error(f"the place '{name}' is not known", suggestion(name, self.knowledge.place_names()))
         return known
 
     def classes(self, name: str) -> tuple[str, ...]:
@@ -134,17 +145,26 @@ class Workshop:
         """
         classes = self.knowledge.classes(self.knowledge.thing(name) or name)
         if not classes:
-            near = did_you_mean(name, self.knowledge.thing_names())
-            mend = f"did you mean '{near}'?" if near else f"known are {listing(self.knowledge.thing_names())}"
-            raise self.error(f"the thing '{name}' is not known", mend)
+            raise self.error(f"the thing '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
         return classes
 
     def error(self, message: str, mend: str) -> InputError:
         """An error at the step's line."""
-        text = f"{message} (in '{self.command}')"
-        if self.source is None:
-            return InputError(text, mend=mend)
-        return InputError(text, mend=mend, file=self.source.file, line=self.source.line)
+        return InputError.at(self.source, f"{message} (in '{self.command}')", mend=mend)
+
+
+def skill_spec(
+    skill: type[Skill[Any]],
+    name: str,
+    path_id: str,
+    source: SourceLine | None,
+    inputs: Mapping[str, Binding],
+    outputs: Mapping[str, str],
+) -> NodeSpec:
+    """A leaf that runs a skill with its ports bound; `outputs` maps output ports to blackboard keys."""
+    ports = {"inputs": MappingProxyType(dict(inputs)), "outputs": MappingProxyType(dict(outputs))}
+    options = MappingProxyType({"skill": skill, **ports, "limit_s": skill.default_timeout_s})
+    return NodeSpec("skill", path_id, name, options, source=source)
 
 
 def _binding(value: object) -> Binding:

@@ -1,16 +1,18 @@
-"""What a mission promises, in the referee's words."""
+"""The goal conditions of missions, and what the referee is told of them."""
 
 import pytest
 
-from executive.cli.promises import promises, promises_of
+from executive.cli.goal_conditions import promise_of, promises_of
 from executive.mission.command import parse_command
-from executive.mission.mission import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
+from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
+from executive.mission.goal import command_goal
 from executive.tree.compiler import compile_mission
 from plant.referee import PromiseKind
 
 
-def promised(knowledge, *texts, answers=()):
-    return promises(list(map(parse_command, texts)), knowledge=knowledge, robot="Alice", answers=answers)
+def promised(knowledge, *texts):
+    conditions = [command_goal(parse_command(text), knowledge) for text in texts]
+    return tuple(promise_of(condition, robot="Alice", answer=None) for condition in conditions)
 
 
 def test_fetch_promises_a_grasp_in_the_kitchen_and_a_hand_over(knowledge, make):
@@ -47,13 +49,6 @@ def test_going_promises_the_body_there(knowledge, goal, point):
     assert not promise.goal[0].contains((-9.0, 9.0, 0.5))
 
 
-@pytest.mark.parametrize("answer", [True, False, None])
-def test_answers_go_to_the_checks_in_order(knowledge, answer):
-    check = "Take [Nothing] to [kitchen] and do [find] to [hammer]"
-    first, second = promised(knowledge, check, check, answers=[True, answer])
-    assert (first.kind, first.answer, second.answer) == (PromiseKind.ANSWERED, True, answer)
-
-
 GET = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
 GO = "Take [Nothing] to [hall] and do [Nothing] to [Nothing]"
 SKIPPED = StepPolicy(on_failure=OnFailure.SKIP)
@@ -66,7 +61,7 @@ def promised_by(knowledge, registry, run_tree):
     def after_running(*steps):
         mission = Mission("m", "flat", "Alice", steps)
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
-        return promises_of(tree, knowledge=knowledge, result=run_tree(tree).robots[0])
+        return promises_of(tree, run_tree(tree).robots[0])
 
     return after_running
 

@@ -1,0 +1,57 @@
+"""What stands behind a run, simulated or real: nothing else knows which it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+from executive.cli.artifacts import Artifacts
+from executive.cli.durable import Durable
+from executive.cli.report import RefereeReport
+from executive.record.profile import Profile
+from executive.run.outcome import RobotResult
+from executive.run.runner import RunEntry
+from executive.tree.compiler import CompiledTree
+from skills.robot import Clock
+
+
+class Scene(Protocol):
+    """A live picture of the world, for the page."""
+
+    @property
+    def url(self) -> str:
+        """Where it is served."""
+
+    def go_easy(self) -> None:
+        """Refresh it less often."""
+
+
+class Backend(Protocol):
+    """A robot and its clock, and what there is besides: a referee, a recording, a live picture."""
+
+    @property
+    def clock(self) -> Clock:
+        """The robot's clock."""
+
+    def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
+        """The robot of a tree's name with its estimators, its state kept or taken up where `durable` says so.
+
+        Raises:
+            InputError: there is no such robot, or something that it needs cannot be read.
+        """
+
+    def show_live(self) -> Scene | None:
+        """Begin to show the world, where that can be done."""
+
+    def judge(self, tree: CompiledTree, result: RobotResult) -> RefereeReport | None:
+        """What a referee saw; None where there is none."""
+
+    def work(self) -> Mapping[str, int]:
+        """What it computed so far, as counters by name."""
+
+    def time_parts(self, profile: Profile) -> None:
+        """Let its parts be timed from now on."""
+
+    def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
+        """Write what was recorded into a folder; the recording's path, None where there is none."""

@@ -1,0 +1,106 @@
+"""The simulated backend: robots in the plant, with its referee and its recorder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from executive.cli.artifacts import Artifacts, draw_artifacts
+from executive.cli.assembly import judge, run_entry, simulate, take_up_plant
+from executive.cli.backend import Scene
+from executive.cli.durable import Durable
+from executive.cli.mission_run import Finished, run_request
+from executive.cli.page_view import PageView
+from executive.cli.report import RefereeReport
+from executive.cli.requests import Prepared
+from executive.mission.stack_file import load_stack
+from executive.record.profile import Profile
+from executive.run.control import Control
+from executive.run.outcome import RobotResult
+from executive.run.runner import Observer, RunEntry
+from executive.tree.compiler import CompiledTree
+from plant.worlds.world import World
+from skills.robot import Clock
+from skills.stack import RobotStack
+
+__all__ = ["SimulatedBackend", "run_simulated"]
+
+
+class SimulatedBackend:
+    """One robot in the plant of a world (`executive.cli.backend.Backend`)."""
+
+    def __init__(self, world: World, stack: RobotStack, *, seed: int, robot_name: str, record: bool) -> None:
+        """Build the plant, things set by the seed. Raises InputError when they do not fit into the world."""
+        self._world, self._stack, self._robot_name, self._record = world, stack, robot_name, record
+        self._simulation = simulate(world, seed=seed, robot_name=robot_name, record=record, stack=stack)
+
+    @property
+    def clock(self) -> Clock:
+        """The plant's clock, which steps it."""
+        return self._simulation.clock
+
+    def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
+        """The robot with its estimators; the plant's state is taken up and kept where `durable` says so."""
+        if durable is None:
+            return run_entry(self._simulation, self._world, tree, self._stack)
+        entry = run_entry(self._simulation, self._world, tree, self._stack, believed=durable.pose)
+        if durable.take_up:
+            take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
+        durable.journal.keep_world = self._simulation.keep_in(durable.plant, label=durable.label)
+        return replace(entry, journal=durable.journal)
+
+    def show_live(self) -> Scene:
+        """The plant's live scene."""
+        scene: Scene = self._simulation.show_live()
+        return scene
+
+    def judge(self, tree: CompiledTree, result: RobotResult) -> RefereeReport:
+        """What the plant's referee saw."""
+        verdict = judge(self._simulation, tree, result)
+        events = self._simulation.referee.events
+        return RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops, events)
+
+    def work(self) -> Mapping[str, int]:
+        """What the plant computed."""
+        return self._simulation.work()
+
+    def time_parts(self, profile: Profile) -> None:
+        """Plant, referee, and each robot's control, sensors and pictures."""
+        profile.attach("plant", self._simulation.clock, "advance")
+        profile.attach("referee", self._simulation.referee, "observe")
+        for robot in self._simulation.robots.values():
+            profile.attach("joint control", robot, "control")
+            profile.attach("LiDAR and other sensors", robot, "sense")
+            profile.attach("rendering", robot, "image")
+
+    def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
+        """Write recording and pictures, where the run was recorded."""
+        if not self._record:
+            return None
+        self._simulation.save_recording(out / "recording.html")
+        draw_artifacts(artifacts, self._simulation, self._robot_name, out)
+        return out / "recording.html"
+
+
+def run_simulated(
+    prepared: Prepared,
+    *,
+    observer: Observer | None = None,
+    control: Control | None = None,
+    page: PageView | None = None,
+    durable: Durable | None = None,
+    profile: Profile | None = None,
+) -> Finished:
+    """Run a request in the plant, as `run_request` does. Raises InputError: the world cannot be used."""
+    request = prepared.request
+    backend = SimulatedBackend(
+        prepared.world,
+        load_stack(request.stack),
+        seed=request.seed,
+        robot_name=prepared.mission.robot_name,
+        record=request.record,
+    )
+    return run_request(
+        prepared, backend, observer=observer, control=control, page=page, durable=durable, profile=profile
+    )

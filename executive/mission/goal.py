@@ -1,0 +1,137 @@
+"""What is to be so when a mission is done: the goal conditions of commands, as plain data that a referee can judge."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from executive.mission.command import START, Command, Task, Thing
+from executive.mission.knowledge import Knowledge, Pose
+
+__all__ = ["Area", "GoalCondition", "GoalKind", "command_goal", "drive_goal", "surface_area", "surfaces_to_search"]
+
+BELOW_TOP_M: Final = 0.05
+ABOVE_TOP_M: Final = 0.30
+NEAR_M: Final = 0.75
+POSE_NEAR_M: Final = 0.25
+
+
+class GoalKind(enum.Enum):
+    """What is to have happened, or to be so at the end."""
+
+    GRASPED = "grasped"  # taken from a source area and lifted, at some time
+    HANDED_OVER = "handed over"  # held out near a person
+    PLACED = "placed"  # resting in a goal area, let go
+    WENT = "went"  # the robot in a goal area
+    ANSWERED = "answered"  # the answer is what is true of the source areas
+
+
+@dataclass(frozen=True)
+class Area:
+    """A part of the world: corners seen from above, (x, y) in order, and heights (m) from low to high (None: any)."""
+
+    name: str
+    polygon: tuple[tuple[float, float], ...]
+    heights_m: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class GoalCondition:
+    """One condition. `classes` fulfil it, `count` of them; they come from a `source` area (none: anywhere) and they or
+    the robot go to a `goal` area; `person` is the one to be handed to (None: anyone)."""
+
+    kind: GoalKind
+    classes: tuple[str, ...] = ()
+    count: int = 1
+    source: tuple[Area, ...] = ()
+    goal: tuple[Area, ...] = ()
+    person: str | None = None
+
+
+def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition:
+    """The condition of a command; `elsewhere` are more surfaces from which its thing may be taken."""
+    return _GOALS[command.task](command, knowledge, tuple(elsewhere))
+
+
+def drive_goal(pose: Pose) -> GoalCondition:
+    """The robot at a pose."""
+    return GoalCondition(GoalKind.WENT, goal=(_square(f"({pose.x:.2f}, {pose.y:.2f})", pose, POSE_NEAR_M),))
+
+
+def surfaces_to_search(knowledge: Knowledge, thing: str, place: str | None) -> tuple[str, ...]:
+    """The surfaces to look at, those where the thing usually is first; without a place, all that there are.
+
+    A usual place may be a room: then its surfaces count as usual.
+    """
+    inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
+    usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
+    return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
+
+
+def surface_area(knowledge: Knowledge, surface: str) -> Area:
+    """The space on top of a surface in which the origin of a thing lies that rests there."""
+    facts = knowledge.surfaces[surface]
+    return Area(surface, facts.polygon, (facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M))
+
+
+def _classes(thing: Thing | None, knowledge: Knowledge) -> tuple[str, ...]:
+    assert thing is not None
+    return knowledge.classes(knowledge.thing(thing.name) or thing.name)
+
+
+def _areas(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> tuple[Area, ...]:
+    assert command.object is not None
+    place = None if command.goal is None else knowledge.place(command.goal)
+    surfaces = (*surfaces_to_search(knowledge, command.object.name, place), *elsewhere)
+    return tuple(surface_area(knowledge, name) for name in surfaces)
+
+
+def _grasped(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
+    classes, areas = _classes(command.object, knowledge), _areas(command, knowledge, elsewhere)
+    return GoalCondition(GoalKind.GRASPED, classes, command.object_count, areas)
+
+
+def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
+    classes, areas = _classes(command.object, knowledge), _areas(command, knowledge, elsewhere)
+    return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, areas)
+
+
+def _carried(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition:
+    classes, goal = _classes(command.item or command.object, knowledge), command.goal
+    assert goal is not None
+    person = knowledge.person(goal)
+    if goal == START or person is not None:
+        return GoalCondition(GoalKind.HANDED_OVER, classes, command.item_count, person=person)
+    place = knowledge.place(goal)
+    assert place is not None
+    goals = tuple(surface_area(knowledge, name) for name in knowledge.surfaces_in(place))
+    return GoalCondition(GoalKind.PLACED, classes, command.item_count, goal=goals)
+
+
+def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
+    if command.item is not None:
+        return _carried(command, knowledge, elsewhere)
+    assert command.goal is not None
+    return GoalCondition(GoalKind.WENT, goal=(_place_area(knowledge, command.goal),))
+
+
+def _place_area(knowledge: Knowledge, goal: str) -> Area:
+    """A room's outline; for a surface or the start a square about where the robot is to stand."""
+    person = knowledge.person(goal)
+    place = knowledge.people[person].at if person is not None else knowledge.place(goal)
+    if place in knowledge.places:
+        return Area(place, knowledge.places[place].polygon)
+    return _square(goal, knowledge.start if goal == START or place is None else knowledge.place_pose(place))
+
+
+def _square(name: str, pose: Pose, near_m: float = NEAR_M) -> Area:
+    sides = ((-near_m, -near_m), (near_m, -near_m), (near_m, near_m), (-near_m, near_m))
+    return Area(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
+
+
+_GOALS: Final[Mapping[Task | None, Callable[[Command, Knowledge, tuple[str, ...]], GoalCondition]]] = MappingProxyType(
+    {Task.GRASP: _grasped, Task.FIND: _answered, Task.PLACE: _carried, None: _went}
+)

@@ -1,0 +1,52 @@
+"""What a user asks for, and how it is to be run: the one form of it, from the command line to the store and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from executive.language.questions import QuestionPolicy
+
+__all__ = ["Request"]
+
+
+@dataclass(frozen=True)
+class Request:
+    """A sentence, or a mission file, or neither where a conversation left only commands.
+
+    `world` is as it was said, if it was; `answers` are to the questions that it leaves open, in their order, and
+    `questions` says what becomes of further ones. `out` is the folder for the run's files,
+    `stack` the file that says what the robot uses.
+
+    What stands below `stack` is filled once it is understood. Then another process can take it up: a sentence has the
+    answers in their places, and `text` is that of the file.
+    """
+
+    sentence: str | None = None
+    file: Path | None = None
+    world: str | None = None
+    require_wake: bool = False
+    answers: tuple[str, ...] = ()
+    questions: QuestionPolicy | None = None
+    seed: int = 1
+    out: Path = Path("out")
+    record: bool = True
+    stack: Path | None = None
+    name: str = ""
+    world_name: str = ""
+    robot: str = ""
+    commands: tuple[str, ...] = ()
+    fingerprint: str = ""
+    text: str | None = None
+
+    @property
+    def only_commands(self) -> bool:
+        """True where there is neither a sentence nor a file."""
+        return self.sentence is None and self.file is None and bool(self.commands)
+
+    def from_anywhere(self) -> Request:
+        """The same with whole paths, for a process that works in another folder."""
+        file = None if self.file is None else self.file.resolve()
+        world = self.world if self.world is None or not Path(self.world).exists() else str(Path(self.world).resolve())
+        stack = None if self.stack is None else self.stack.resolve()
+        return replace(self, file=file, world=world, out=self.out.resolve(), stack=stack)

@@ -1,0 +1,98 @@
+"""A run on a backend without plant, referee and recorder: nothing but the backend knows that it is not simulated."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from executive.cli import requests
+from executive.cli.mission_run import run_request
+from executive.cli.report import RunReport
+from executive.cli.requests import prepare
+from executive.mission.request import Request
+from executive.record.profile import Profile
+from executive.record.reader import read_events
+from executive.run.outcome import Outcome
+from executive.run.runner import RunEntry
+from plant.spot.capabilities import spot_capabilities
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.robot import ScriptedRobot
+
+
+class ScriptedBackend:
+    """A scripted robot at the origin of an empty world."""
+
+    def __init__(self):
+        self.clock = VirtualClock()
+        self.robot = ScriptedRobot(self.clock, capabilities=spot_capabilities())
+        self.asked = []
+
+    def entry(self, tree, durable):
+        return RunEntry(tree, self.robot, KnownPlace(), BlockCostmap())
+
+    def show_live(self):
+        return None
+
+    def judge(self, tree, result):
+        self.asked.append((tree.mission_name, result.outcome))
+
+    def work(self):
+        return {"nothing": 0, "spared": 3}
+
+    def time_parts(self, profile):
+        profile.attach("scripted", self.clock, "advance")
+
+    def leave(self, artifacts, out):
+        return None
+
+
+@pytest.fixture
+def prepared(tmp_path, monkeypatch):
+    monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
+    path = tmp_path / "drive.yaml"
+    path.write_text("name: drive\nsteps:\n  - {skill: navigate, with: {x: 1.0, y: 0.5}}\n")
+    return prepare(Request(file=path, out=tmp_path / "out", seed=4))
+
+
+def test_a_run_without_a_referee_is_achieved_when_the_tree_says_so(prepared):
+    backend = ScriptedBackend()
+    report = run_request(prepared, backend).report
+    assert (report.outcome, report.referee, report.achieved, report.false_claim) == ("success", None, True, False)
+    assert backend.asked == [("drive", Outcome.SUCCESS)]
+    x_m, y_m, _ = backend.robot.odometry().X_OB.translation()
+    assert (x_m, y_m) == (pytest.approx(1.0, abs=0.2), pytest.approx(0.5, abs=0.2))
+
+
+def test_its_report_says_that_nobody_else_saw_it(prepared):
+    report = run_request(prepared, ScriptedBackend()).report
+    told = json.loads(json.dumps(report.to_json()))
+    assert told["referee"] is None
+    assert RunReport.from_json(told) == report
+    assert not any("referee" in line or "collisions" in line for line in report.lines())
+
+
+def test_its_work_is_in_report_and_log_and_its_parts_are_timed(prepared):
+    profile = Profile()
+    report = run_request(prepared, ScriptedBackend(), profile=profile).report
+    logged = [event.data for event in read_events(prepared.request.out / "log.mcap") if event.topic == "work"]
+    assert logged == [dict(report.work)]
+    assert (report.work["spared"], report.work["planner_expansions"] > 10, "nothing" in report.work) == (3, True, False)
+    assert {"scripted", "planning", "costmap", "skills", "executive", "log"} <= set(profile.table())
+
+
+def test_log_and_tree_are_left_as_after_a_simulated_run(prepared):
+    run_request(prepared, ScriptedBackend())
+    out = prepared.request.out
+    assert sorted(path.name for path in out.iterdir()) == ["log.mcap", "tree.svg"]
+    topics = {event.topic for event in read_events(out / "log.mcap")}
+    assert {"map", "run", "tree", "transitions", "pose", "outcome"} <= topics
+
+
+def test_a_run_whose_tree_fails_is_not_achieved(prepared):
+    root, mission = prepared.tree.root, prepared.tree.mission
+    (drive,) = mission.children
+    short = replace(mission, children=(replace(drive, options={**drive.options, "limit_s": 0.01}),))
+    tree = replace(prepared.tree, root=replace(root, children=(*root.children[:-1], short)))
+    report = run_request(replace(prepared, tree=tree), ScriptedBackend()).report
+    assert (report.outcome, report.cause, report.achieved) == ("failure", "TIMEOUT", False)

@@ -1,0 +1,38 @@
+"""The table of kinds: every kind has one home, and a spec becomes its node with what is lent to it."""
+
+from py_trees.common import Status
+
+from executive.tree import kinds
+from executive.tree.behaviours.decorators import Timeout
+from executive.tree.behaviours.leaves import Pause
+from executive.tree.node import NodeSpec
+from skills.robot import Pose2D
+
+PAUSE = NodeSpec("pause", "alice/limit/wait", "wait", {"duration_s": 9.0})
+LIMIT = NodeSpec("timeout", "alice/limit", "in time", {"limit_s": 5.0}, (PAUSE,))
+
+
+def test_no_kind_is_registered_twice():
+    assert sum(len(home.KINDS) for home in kinds._HOMES) == len(kinds.KINDS)
+
+
+def test_a_spec_becomes_its_node_on_the_runs_clock(context, clock):
+    root = kinds.build(LIMIT, context)
+    assert isinstance(root, Timeout)
+    assert [node.path_id for node in root.iterate()] == ["alice/limit/wait", "alice/limit"]
+    root.tick_once()
+    assert root.status is Status.RUNNING
+    clock.advance(6.0)
+    root.tick_once()
+    assert (root.status, root.children[0].status) == (Status.FAILURE, Status.INVALID)
+
+
+def test_nodes_are_changed_as_they_are_built(context):
+    changed = []
+    kinds.build(LIMIT, context, {PAUSE.path_id: changed.append})
+    assert [type(node) for node in changed] == [Pause]
+
+
+def test_what_a_node_writes_follows_from_its_options():
+    assert kinds.writes(NodeSpec("remember", "alice/r", "r", {"key": "alice/pose"})) == {"alice/pose": Pose2D}
+    assert kinds.writes(LIMIT) == {}

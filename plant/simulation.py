@@ -221,11 +221,15 @@ class Simulation:
         """What this process has had to do so far, by name: counts that the same run repeats, whatever the machine."""
         return {**self.engine.work, "contact_points": self.referee.contact_points}
 
-    def keep_in(self, path: Path, *, label: str = "") -> None:
-        """Write the whole state to a file now and after every advance of the clock; `label` says what it is for."""
+    def keep_in(self, path: Path, *, label: str = "") -> Callable[[], None]:
+        """Write the whole state to a file now, once a second, and when what is given back is called.
+
+        `label` says what it is for.
+        """
         keeper = SnapshotKeeper(path, self.engine, self.referee, {**self._facts(), "label": label}, sorted(self.robots))
         keeper()
-        self.engine.after_advance(keeper)
+        self.engine.after_advance(keeper.when_due)
+        return keeper
 
     def restore(self, path: Path, *, label: str | None = "") -> None:
         """Take up the state in a file, as after a power failure: nobody commands the robots, which come to a stop.

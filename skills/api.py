@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pydrake.math import RigidTransform
 
 ResultT = TypeVar("ResultT")
+ReadT = TypeVar("ReadT")
 ResultT_co = TypeVar("ResultT_co", covariant=True)
 InputsT = TypeVar("InputsT")
 
@@ -138,10 +139,10 @@ class Localiser(Protocol):
 class SearchingLocaliser(Protocol):
     """A localiser that can look for the robot's place on a whole map, as recovery does when the place was lost."""
 
-    def search(self, scan: Scan, radius_m: float | None) -> LocalisationEstimate | None:
-        """Where the scan fits, within radius_m of the present belief or anywhere (None); None where nowhere.
+    def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
+        """Where the scan fits, within radius_m of the belief or anywhere (None); None where nowhere.
 
-        Changes nothing and may take long: call it inside a Worker job.
+        Changes nothing, rests on nothing that `update` changes, and may take long: call it inside a Worker job.
         """
 
     def accept(self, estimate: LocalisationEstimate) -> None:
@@ -186,12 +187,41 @@ class Job(Protocol[ResultT_co]):
     def result(self) -> ResultT_co:
         """The result; raises what the work raised, or RuntimeError before it is done."""
 
+    def withdraw(self) -> None:
+        """Nobody waits for the result any more; idempotent."""
+
 
 class Worker(Protocol):
-    """Does long work. In lock-step it runs at once and the result appears after `latency_s` on the robot's clock."""
+    """Does long work beside the ticks, one piece after the other, in the order in which it is submitted.
+
+    Work may use only what was read before: it sees no robot, clock, estimator or costmap, and changes nothing that a
+    tick uses. In lock-step the result appears after `latency_s` on the robot's clock.
+    """
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
         """Start `work`, which takes latency_s on the robot's clock."""
+
+    def sense(
+        self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
+    ) -> Job[ResultT]:
+        """Start `work` on what `read` gives, which may block, as `Robot.image` may. In lock-step it is read at once."""
+
+
+class WorkCounter(Protocol):
+    """Counts what a run computes, so that a slower path is seen without a clock. Jobs may call it."""
+
+    def count(self, name: str, amount: int = 1) -> None:
+        """Add to the counter of this name: "planner_expansions"."""
+
+
+class NoWorkCounter:
+    """A `WorkCounter` where nobody counts."""
+
+    def count(self, name: str, amount: int = 1) -> None:
+        """Nothing."""
+
+
+NO_WORK_COUNTER: Final = NoWorkCounter()
 
 
 @dataclass(frozen=True)
@@ -213,11 +243,8 @@ class Question:
             raise ValueError(f"question '{self.id}': the default '{self.default}' is none of {list(self.options)}")
 
 
-class Asked(Job[str], Protocol):
-    """A question that was put to the operator. `result` is the answer, or the default once its time is over."""
-
-    def withdraw(self) -> None:
-        """Nobody waits for the answer any more; idempotent."""
+Asked = Job[str]
+"""A question that was put to the operator. `result` is the answer, or the default once its time is over."""
 
 
 class Ask(Protocol):
@@ -271,6 +298,7 @@ class SkillContext:
     seed: int
     ask: Ask = nobody_to_ask
     detector: Detector = NO_DETECTOR
+    work: WorkCounter = NO_WORK_COUNTER
     stack: RobotStack = field(default_factory=default_stack)
 
     def X_WB(self) -> RigidTransform:

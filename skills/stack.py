@@ -23,7 +23,7 @@ from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Pose2D
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
 
-    from skills.api import Costmap, Detector, Localiser
+    from skills.api import Costmap, Detector, Localiser, WorkCounter
     from skills.arm.collision import ArmScene
     from skills.arm.kinematics import ArmModel
     from skills.estimate.grid_map import GridMap
@@ -72,11 +72,18 @@ class GlobalPlanner(Protocol):
     """Plans paths of the base."""
 
     def problem(
-        self, costmap: Costmap, footprint: Footprint, start: Pose2D, goal: Pose2D, *, max_speed_m_s: float
+        self,
+        costmap: Costmap,
+        footprint: Footprint,
+        start: Pose2D,
+        goal: Pose2D,
+        *,
+        max_speed_m_s: float,
+        work: WorkCounter = ...,
     ) -> Callable[[], WayPath]:
         """Sample the costmap now; the call that comes back plans on that sample, in any thread.
 
-        That call raises PlanningError.
+        That call raises PlanningError, and counts in `work` what it computes.
         """
 
 

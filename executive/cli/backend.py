@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
 from executive.cli.artifacts import Artifacts
 from executive.cli.durable import Durable
 from executive.cli.report import RefereeReport
+from executive.record.profile import Profile
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.compiler import CompiledTree
@@ -38,6 +40,12 @@ class Backend(Protocol):
         Raises:
             InputError: there is no such robot, or something that it needs cannot be read.
         """
+
+    def work(self) -> Mapping[str, int]:
+        """What the backend itself computed, as counters by name; empty for a real robot."""
+
+    def attach(self, profile: Profile) -> None:
+        """Time the backend's own subsystems."""
 
     def show_live(self) -> Scene | None:
         """Begin to show the world, where that can be done."""

@@ -24,6 +24,7 @@ from executive.cli.stack_command import STACK
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.language.questions import QuestionPolicy
 from executive.mission.request import Request
+from executive.record.profile import Profile, lines
 from executive.store.missions import MissionStore
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
@@ -53,6 +54,7 @@ def run(
     as_json: AsJson = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
+    profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: Store = None,
     stack: STACK = None,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
@@ -63,6 +65,7 @@ def run(
     console = console_for(as_json)
     wants_page = view or view_for is not None
     kept_in = store or out / STORE
+    timing = Profile() if profile else None
 
     def page_of(prepared: Prepared) -> PageView | None:
         later = queueing(prepared, store=kept_in, out=out)
@@ -72,7 +75,10 @@ def run(
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=not no_wake, console=console)
         asked = Request(say, file, world, not no_wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
-        finished, page = _run_kept(asked, kept_in, quiet=quiet, console=console, page=page_of)
+        finished, page = _run_kept(asked, kept_in, quiet=quiet, console=console, page=page_of, profile=timing)
+    if timing is not None:
+        for line in lines(timing.table()):
+            console.print(line, markup=False)
     if as_json:
         print_json(finished.report.to_json())
     if page is not None:
@@ -118,7 +124,7 @@ def evaluate(
 
 
 def _run_kept(
-    asked: Request, store: Path, *, quiet: bool, console: Console, page: PageOf
+    asked: Request, store: Path, *, quiet: bool, console: Console, page: PageOf, profile: Profile | None
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
     prepared = prepare(asked)
@@ -132,7 +138,7 @@ def _run_kept(
         with kept(missions, mission) as ended:
             control = control_for(console, quiet=quiet) if shown is None else shown.control
             durable = new_run(missions, mission)
-            start = partial(run_simulated, prepared, page=shown, durable=durable)
+            start = partial(run_simulated, prepared, page=shown, durable=durable, profile=profile)
             talk = None if shown is None else shown.conversation
             finished = show_run(start, prepared, console, control=control, quiet=quiet, conversation=talk)
             ended(finished.report)

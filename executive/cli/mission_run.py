@@ -6,18 +6,22 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FrameType
 
 from executive.cli.artifacts import Artifacts, draw_answer
 from executive.cli.backend import Backend
 from executive.cli.durable import Durable
 from executive.cli.page_view import PageView, log_map
+from executive.cli.profiling import profiled
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Prepared
 from executive.cli.warm_up import warm_up
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
+from executive.record.profile import Profile
+from executive.record.schemas import WORK
+from executive.record.work import CountedDetector, Work
 from executive.run.control import Control
 from executive.run.outcome import RunResult
 from executive.run.runner import Observer, Progress, RunSettings, run
@@ -45,11 +49,12 @@ def run_request(
     control: Control | None = None,
     page: PageView | None = None,
     durable: Durable | None = None,
+    profile: Profile | None = None,
 ) -> Finished:
     """Run a request on a backend and write log, tree and what that has recorded into its folder.
 
     The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it;
-    with `durable` another process can take it up, or this one takes up another's.
+    with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
 
     Raises:
         InputError: the world cannot be used.
@@ -57,6 +62,8 @@ def run_request(
     request, tree, out, clock = prepared.request, prepared.tree, prepared.request.out, backend.clock
     entry = backend.entry(tree, durable)
     warm_up(entry)
+    work = Work()
+    entry = replace(entry, detector=CountedDetector(entry.detector, work))
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     artifacts = Artifacts(log)
     try:
@@ -64,18 +71,25 @@ def run_request(
             page.begin(log, backend.show_live())
         log_map(log, prepared)
         announce(log, clock, tree, prepared.knowledge, world=prepared.world.name, seed=request.seed)
-        with cancelled_by_signals(control or Control(pace=None)) as heeded:
-            result = run(
+        with cancelled_by_signals(control or Control(pace=None)) as heeded, LockStepWorker(clock) as worker:
+            begin = run if profile is None else profiled(profile, run, backend, entry, worker)
+            result = begin(
                 [entry],
                 clock=clock,
-                worker=LockStepWorker(clock),
-                publish=artifacts,
+                worker=worker,
+                publish=artifacts if profile is None else profile.timed("log", artifacts),
                 settings=RunSettings(seed=request.seed),
                 control=heeded,
                 observer=both(observer, page),
+                work=work,
+                profile=profile,
             )
-        for trouble in () if durable is None else durable.journal.troubles:
-            log(ERROR_TOPIC, {"node": tree.robot_name, "what": "keep the mission's state", "traceback": trouble})
+        if durable is not None:
+            durable.journal.keep_world()  # the next mission begins where this one ended
+            for trouble in durable.journal.troubles:
+                log(ERROR_TOPIC, {"node": tree.robot_name, "what": "keep the mission's state", "traceback": trouble})
+        counts = work.totals({**backend.work(), "bytes_logged": log.bytes})
+        log(WORK, counts)
     finally:
         log.close()
     tree = result.trees.get(tree.robot_name, tree)
@@ -86,11 +100,14 @@ def run_request(
     recording = backend.leave(artifacts, out)
     if page is not None:
         page.end(recording)
-    return Finished(_report(prepared, tree, result, referee, log=str(log.path)), view)
+    report = _report(prepared, tree, result, referee, log=str(log.path))
+    return Finished(replace(report, work=counts), view)
 
 
-def both(*observers: Observer | None) -> Observer:
-    """An observer that tells all that there are."""
+def both(*observers: Observer | None) -> Observer | None:
+    """An observer that tells all that there are, None where there is none."""
+    if not any(observers):
+        return None
 
     def tell(progress: Progress) -> None:
         for observer in observers:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Final
 
 from rich.markup import escape
@@ -25,9 +25,10 @@ NOT_JUDGED: Final = RefereeReport(False, "there is no referee", 0, 0)
 
 @dataclass(frozen=True)
 class RunReport:
-    """One run, with the keys that scripts rely on. Times in seconds; `log` is the event log's path.
+    """One run, with the keys that scripts rely on.
 
-    `referee` is None where nobody but the robot saw what happened.
+    Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name. `referee` is None
+    where nobody but the robot saw what happened.
     """
 
     outcome: str
@@ -42,6 +43,7 @@ class RunReport:
     real_time_factor: float
     ticks: int
     log: str
+    work: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def claimed(self) -> bool:
@@ -65,7 +67,7 @@ class RunReport:
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values; the referee's events are for people only."""
-        values = {**asdict(self), "commands": list(self.commands)}
+        values = {**asdict(replace(self, work={})), "commands": list(self.commands), "work": dict(self.work)}
         if self.referee is not None:
             del values["referee"]["events"]
         return values

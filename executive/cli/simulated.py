@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from executive.cli.page_view import PageView
 from executive.cli.report import RefereeReport
 from executive.cli.requests import Prepared
 from executive.mission.stack_file import load_stack
+from executive.record.profile import Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult
 from executive.run.runner import Observer, RunEntry
@@ -45,8 +47,18 @@ class SimulatedBackend:
         entry = run_entry(self._simulation, self._world, tree, self._stack, believed=durable.pose)
         if durable.take_up:
             take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
-        self._simulation.keep_in(durable.plant, label=durable.label)
+        durable.journal.keep_world = self._simulation.keep_in(durable.plant, label=durable.label)
         return replace(entry, journal=durable.journal)
+
+    def work(self) -> Mapping[str, int]:
+        """The plant's counters."""
+        counts: Mapping[str, int] = self._simulation.work()
+        return counts
+
+    def attach(self, profile: Profile) -> None:
+        """Time the plant's steps and the referee."""
+        profile.attach("plant", self._simulation.clock, "advance")
+        profile.attach("referee", self._simulation.referee, "observe")
 
     def show_live(self) -> Scene:
         """The plant's live scene."""
@@ -75,6 +87,7 @@ def run_simulated(
     control: Control | None = None,
     page: PageView | None = None,
     durable: Durable | None = None,
+    profile: Profile | None = None,
 ) -> Finished:
     """Run a request in the plant, as `run_request` does. Raises InputError: the world cannot be used."""
     request = prepared.request
@@ -85,4 +98,6 @@ def run_simulated(
         robot_name=prepared.mission.robot_name,
         record=request.record,
     )
-    return run_request(prepared, backend, observer=observer, control=control, page=page, durable=durable)
+    return run_request(
+        prepared, backend, observer=observer, control=control, page=page, durable=durable, profile=profile
+    )

@@ -17,7 +17,7 @@ import numpy as np
 from mcap.writer import Writer
 
 from executive.record.drawable import drawable
-from executive.record.schemas import Schema, schema_of
+from executive.record.schemas import WALL, Schema, schema_of
 from skills.robot import Clock
 
 FLUSH_EVERY_S = 1.0
@@ -29,7 +29,7 @@ class EventLog:
     """An open event log. Call it to log a message (`skills.api.Publish`); `close` it at the end.
 
     Whatever is older than a second of the robot's clock has reached the file, so that a killed process leaves a log
-    that can be read.
+    that can be read. `bytes` counts those of all messages but the wall's times, which differ from run to run.
     """
 
     def __init__(self, path: Path, clock: Clock) -> None:
@@ -43,6 +43,7 @@ class EventLog:
         self._schemas: dict[str, int] = {}
         self._flushed_s = -math.inf
         self._sequence = 0
+        self.bytes = 0
         self._closed = False
         self._listeners: list[Listener] = []
 
@@ -63,6 +64,7 @@ class EventLog:
     def _write(self, topic: str, plain: dict[str, Any], now_s: float) -> None:
         stamp_ns, self._sequence = round(now_s * 1e9), self._sequence + 1
         data = json.dumps(plain, allow_nan=False, separators=(",", ":")).encode()
+        self.bytes += len(data) if topic != WALL else 0
         channel = self._channel(topic, schema_of(topic, plain))
         self._writer.add_message(channel, stamp_ns, data, stamp_ns, self._sequence)
         for listener in self._listeners:

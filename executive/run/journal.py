@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from executive.tree.compiler import CompiledTree
-from executive.tree.snapshot import Transition
+from executive.tree.snapshot import Change
 from skills.robot import Pose2D
 
 
@@ -15,11 +15,12 @@ from skills.robot import Pose2D
 class TickNote:
     """One tick: what changed in the tree, all values on the blackboard, where the robot believes to be.
 
-    `pose` is X_WB, None while the robot is not localised; `checkpoints` those of the active skills by path id.
+    `pose` is X_WB, given with changes and once a second while the robot is localised, else None; `checkpoints` are
+    those of the running skills by path id.
     """
 
     now_s: float
-    changes: Sequence[Transition]
+    changes: Sequence[Change]
     board: Mapping[str, Any]
     pose: Pose2D | None
     checkpoints: Mapping[str, Mapping[str, Any]]

@@ -51,7 +51,7 @@ class RunResult:
     """How a run ended. Times in seconds: `sim_time_s` on the robots' clock, `wall_time_s` on the wall's.
 
     `overruns` counts the ticks that took longer on the wall's clock than the tick period. `trees` are the missions
-    that the robots began with, or those that took their place, by robot.
+    that the robots began with, or those that took their place, by robot; `work` is what was computed, by name.
     """
 
     robots: tuple[RobotResult, ...]
@@ -60,6 +60,7 @@ class RunResult:
     sim_time_s: float
     wall_time_s: float
     trees: Mapping[str, CompiledTree] = field(default_factory=dict)
+    work: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def worst(self) -> RobotResult:

@@ -6,18 +6,19 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
+from executive.record.profile import Profile
 from executive.record.schemas import CONTROL
 from executive.record.ticks import TickMeter
+from executive.record.work import Work
 from executive.run.control import Control, Event, Wishes
-from executive.run.guarded_robot import guarded, show_lease_behind
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
-from executive.run.lease_keeper import LeaseKeeper
 from executive.run.outcome import Glance, Outcome, RobotResult, RunResult
 from executive.run.session import Session
 from executive.run.tree_run import Ending
-from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, tick_watch
+from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
@@ -93,13 +94,16 @@ def run(
     settings: RunSettings = RunSettings(),
     control: Control | None = None,
     observer: Observer | None = None,
+    work: Work | None = None,
+    profile: Profile | None = None,
 ) -> RunResult:
     """Run trees to their end, robots in the order of their names.
 
     Each tick: heed `control`, advance the clock by the tick period, update each robot's estimators, tick each tree, log
     what changed. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree is not
     ticked, and what passes does not count against any limit. Whatever happens, all trees and robots are stopped and
-    all leases returned before this returns. Without control, equal seeds give equal logs.
+    all leases returned before this returns. Without control, equal seeds give equal logs. `work` counts what is
+    computed, `profile` times the skills.
 
     Raises:
         ValueError: no entries, two robots of one name, or a breakpoint at a node that there is not.
@@ -109,7 +113,8 @@ def run(
         raise ValueError(f"a run needs robots of different names, not {names}")
     control = control or Control(pace=None)
     control.begin({entry.tree.robot_name: entry.tree for entry in entries})
-    return _Run(clock, worker, publish, settings, control, observer).run(entries)
+    made = _Run(clock, worker, publish, settings, control, observer, work or Work(), profile)
+    return made.run(entries)
 
 
 class _LastingLog:
@@ -139,9 +144,13 @@ class _Run:
         settings: RunSettings,
         control: Control,
         observer: Observer | None,
+        work: Work,
+        profile: Profile | None,
     ) -> None:
         self._clock, self._worker, self._publish = clock, worker, _LastingLog(publish)
         self._settings, self._control, self._observer = settings, control, observer
+        self._work, self._profile = work, profile
+        self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
@@ -150,6 +159,10 @@ class _Run:
 
     def run(self, entries: Sequence[RunEntry]) -> RunResult:
         """The whole run."""
+        with self._watchdog:
+            return self._watched_run(entries)
+
+    def _watched_run(self, entries: Sequence[RunEntry]) -> RunResult:
         ending: Ending | None = None
         try:
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
@@ -168,12 +181,12 @@ class _Run:
 
     def _open(self, entry: RunEntry) -> Session:
         settings = self._settings
-        robot = guarded(entry.robot, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s)
-        keeper = LeaseKeeper(robot, HOLDER)
-        show_lease_behind(robot, keeper.behind)
+        robot = GuardedRobot(
+            entry.robot, self._watchdog, limit_s=settings.verb_limit_s, image_limit_s=settings.image_limit_s
+        )
         context = RunContext(
-            robot=robot,
-            lease=keeper.token,
+            robot=cast(Robot, robot),
+            lease=robot.claim(HOLDER),
             clock=self._clock,
             worker=self._worker,
             localiser=entry.localiser,
@@ -184,12 +197,13 @@ class _Run:
             ask=lambda question: self._control.ask(question, self._clock),
             stop_pressed=lambda: self._control.stop_pressed,
             detector=entry.detector,
+            work=self._work,
             stack=entry.stack,
         )
         try:
-            return Session(entry.tree, context, keeper, self._control, entry.journal)
+            return Session(entry.tree, context, robot, self._control, entry.journal, self._profile)
         except BaseException:
-            keeper.give_back()
+            robot.give_lease_back()
             raise
 
     def _cycle(self) -> None:
@@ -238,7 +252,7 @@ class _Run:
         begun = time.perf_counter()
         changes = []
         for session in moving:
-            with tick_watch(session.name, self._settings.tick_limit_s):
+            with self._watchdog.over_tick(session.name, self._settings.tick_limit_s):
                 changes.append(session.tick(breakpoints))
         self._ticks += 1
         self._meter(time.perf_counter() - begun)
@@ -284,7 +298,8 @@ class _Run:
         absent = tuple(_never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
         sim_time_s = self._clock.now() - self._begun_s
         trees = {session.name: session.main_tree for session in self._sessions}
-        return RunResult(robots + absent, self._ticks, self._meter.overruns, sim_time_s, wall_time_s, trees)
+        overruns, work = self._meter.overruns, self._work.totals()
+        return RunResult(robots + absent, self._ticks, overruns, sim_time_s, wall_time_s, trees, work)
 
 
 def _for_robot(session: Session, trees: Sequence[CompiledTree]) -> Sequence[CompiledTree]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from executive.record.drawable import stamp
+from executive.record.profile import Profile
 from executive.record.schemas import OUTCOME, POSE
 from executive.run.control import Control
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
-from executive.run.lease_keeper import LeaseKeeper
 from executive.run.outcome import Glance, Outcome, RobotResult
 from executive.run.tree_run import Ending, TreeRun
 from executive.run.watchdog import VerbHung
@@ -35,13 +37,14 @@ class Session:
         self,
         tree: CompiledTree,
         context: RunContext,
-        keeper: LeaseKeeper,
+        robot: GuardedRobot,
         control: Control,
         journal: Journal | None = None,
+        profile: Profile | None = None,
     ) -> None:
         self.context = context
-        self._keeper, self._control = keeper, control
-        self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal),)
+        self._robot, self._control, self._profile = robot, control, profile
+        self._stack: tuple[TreeRun, ...] = (TreeRun(tree, context, journal, profile),)
         self._held = False
         self._lost_since_s: float | None = None
         self._preempting: tuple[RobotResult, ...] = ()
@@ -49,6 +52,7 @@ class Session:
         self.result: RobotResult | None = None
         self._pose_due_s = context.clock.now()
         self._asked_at: Pose2D | None = None
+        self._matched_s = -math.inf
 
     @property
     def name(self) -> str:
@@ -83,10 +87,7 @@ class Session:
     @property
     def glance(self) -> Glance:
         """Where the robot is and whether it holds something."""
-        estimate = self.context.localiser.estimate()
-        X_WB = estimate.X_WO @ self.context.robot.odometry().X_OB
-        pose = Pose2D.from_transform(X_WB) if estimate.localised else None
-        return Glance(pose, self.context.robot.gripper().holding)
+        return Glance(self.context.pose(), self.context.robot.gripper().holding)
 
     @property
     def waiting_at(self) -> str | None:
@@ -97,8 +98,12 @@ class Session:
         """Bring the estimators up to date, and log the pose twice a second."""
         context = self.context
         context.localiser.update(context.robot)
-        context.costmap.update(context.robot, context.localiser.estimate())
-        self._asked_at = self._asked_at or self.glance.pose
+        estimate = context.localiser.estimate()
+        context.costmap.update(context.robot, estimate)
+        if estimate.stamp_s != self._matched_s:
+            self._matched_s = estimate.stamp_s
+            context.work.count("scan_matches")
+        self._asked_at = self._asked_at or context.pose()
         if context.clock.now() >= self._pose_due_s - _EPSILON_S:
             self._pose_due_s += POSE_PERIOD_S
             self._publish_pose()
@@ -108,7 +113,7 @@ class Session:
 
         Raises nothing; when that takes longer than LEASE_PATIENCE_S, the session is closed with cause EXECUTION.
         """
-        lost = self._keeper.lost()
+        lost = self._robot.lease_lost()
         if lost is None:
             return True
         now_s = self.context.clock.now()
@@ -116,7 +121,7 @@ class Session:
             self._lost_since_s = now_s
             self._top.suspend()
             self._control.lease_lost(self.name, lost)
-        if self._keeper.regain():
+        if self._robot.regain_lease():
             self._lost_since_s = None
             self._control.lease_lost(self.name, None)
             return True
@@ -185,7 +190,7 @@ class Session:
                 run.halt(self._attempt)
             context = self.context
             self._attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
-            self._attempt("return the lease", self._keeper.give_back)
+            self._attempt("return the lease", self._robot.give_lease_back)
             for run in reversed(self._stack[1:]):
                 self._note_end(run.judge(ending))
             self._stack = self._stack[:1]
@@ -212,7 +217,7 @@ class Session:
         context = replace(self.context, board=Board(slug(tree.robot_name)))
         if start is not None:
             context.board.put(start_key(tree.robot_name, tree.mission_name), start)
-        self._stack = (*self._stack, TreeRun(tree, context, journal))
+        self._stack = (*self._stack, TreeRun(tree, context, journal, self._profile))
         self._control.mission_begun(self.name, tree)
 
     def _take_up_the_one_before(self) -> None:
@@ -237,7 +242,7 @@ class Session:
         self.context.publish(OUTCOME, {**end, "answers": result.answers, **more})
 
     def _publish_pose(self) -> None:
-        X_WB = self.context.localiser.estimate().X_WO @ self.context.robot.odometry().X_OB
+        X_WB = self.context.X_WB()
         p, q = X_WB.translation(), X_WB.rotation().ToQuaternion()
         flat = Pose2D.from_transform(X_WB)
         self.context.publish(

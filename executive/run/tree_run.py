@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from py_trees.common import Status
 
+from executive.record.profile import Profile
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.journal import Journal, TickNote
 from executive.run.outcome import Outcome, RobotResult
@@ -18,9 +20,10 @@ from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import node_view
-from executive.tree.snapshot import NodeState, Observed, Snapshot, Transition, activities, transitions
+from executive.tree.snapshot import Change, NodeState, Observed, Snapshot
 from skills.api import Cause
-from skills.robot import Pose2D
+
+POSE_NOTE_PERIOD_S = 1.0
 
 Attempt = Callable[[str, Callable[[], object]], None]
 
@@ -37,14 +40,20 @@ class Ending:
 class TreeRun:
     """One tree, built and ticked. Its nodes' last states are in `states`; a journal hears of every tick."""
 
-    def __init__(self, tree: CompiledTree, context: RunContext, journal: Journal | None = None) -> None:
+    def __init__(
+        self, tree: CompiledTree, context: RunContext, journal: Journal | None = None, profile: Profile | None = None
+    ) -> None:
         self.tree = tree
         self.context = context
         self.journal = journal
         self.root = tree.build(context)
         self._observed = Observed(self.root)
-        self._skills = frozenset(node.path_id for node in self._observed.nodes if isinstance(node, SkillLeaf))
-        self.states: Snapshot = self._observed.snapshot()
+        self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
+        self._skills = frozenset(leaf.path_id for leaf in self._leaves)
+        if profile is not None:
+            for leaf in self._leaves:
+                profile.attach("skills", leaf, "initialise", "update", "terminate")
+        self._pose_due_s = -math.inf
         self._gates: dict[str, Gate] = {}
         self._breakpoints: frozenset[str] = frozenset()
         self.show()
@@ -79,16 +88,21 @@ class TreeRun:
         """Keep the place and let go of the robot."""
         suspend(self.root)
 
-    def log_changes(self) -> Sequence[Transition]:
+    @property
+    def states(self) -> Snapshot:
+        """What every node said last."""
+        return self._observed.states
+
+    def log_changes(self) -> Sequence[Change]:
         """Log the transitions since the last time, and what running skills do by now; the transitions."""
-        before, self.states = self.states, self._observed.snapshot()
-        changes = tuple(transitions(before, self.states))
-        for change in changes:
+        changes = self._observed.changes()
+        transitions = [change for change in changes if change.is_transition]
+        for change in transitions:
             self.context.publish(TRANSITIONS, self._transition(change))
-        for path_id, state in activities(before, self.states):
-            if path_id in self._skills:
-                self.context.publish(ACTIVITY, self._activity(path_id, state))
-        return changes
+        for change in changes:
+            if change.path_id in self._skills and change.is_activity:
+                self.context.publish(ACTIVITY, self._activity(change.path_id, change.after))
+        return transitions
 
     def halt(self, attempt: Attempt) -> None:
         """Stop all that runs; results that are there stay in sight. Also after an exception in the middle of a tick.
@@ -97,9 +111,8 @@ class TreeRun:
         """
         if not self.finished:
             attempt("stop the tree", lambda: self.root.stop(Status.INVALID))
-        for node in self._observed.nodes:
-            if isinstance(node, SkillLeaf):
-                attempt(f"end {node.path_id}", node.abandon)
+        for leaf in self._leaves:
+            attempt(f"end {leaf.path_id}", leaf.abandon)
         self.log_changes()
 
     def judge(self, ending: Ending | None, preempting: tuple[RobotResult, ...] = ()) -> RobotResult:
@@ -129,16 +142,16 @@ class TreeRun:
     def _closed(self, path_id: str) -> Callable[[], bool]:
         return lambda: path_id in self._breakpoints
 
-    def _tick_note(self, changes: Sequence[Transition]) -> TickNote:
+    def _tick_note(self, changes: Sequence[Change]) -> TickNote:
         context = self.context
-        estimate = context.localiser.estimate()
-        X_WB = estimate.X_WO @ context.robot.odometry().X_OB
-        pose = Pose2D.from_transform(X_WB) if estimate.localised else None
-        leaves = (node for node in self._observed.nodes if isinstance(node, SkillLeaf))
-        checkpoints = {leaf.path_id: leaf.checkpoint for leaf in leaves if leaf.checkpoint}
-        return TickNote(context.clock.now(), changes, context.board.values(), pose, checkpoints)
+        running = (leaf for leaf in self._leaves if leaf.status is Status.RUNNING)
+        checkpoints = {leaf.path_id: leaf.checkpoint for leaf in running if leaf.checkpoint}
+        now_s, pose = context.clock.now(), None
+        if changes or now_s >= self._pose_due_s:
+            self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.pose()
+        return TickNote(now_s, changes, context.board.values(), pose, checkpoints)
 
-    def _transition(self, change: Transition) -> dict[str, object]:
+    def _transition(self, change: Change) -> dict[str, object]:
         after = change.after
         return {
             **self._activity(change.path_id, after),

@@ -29,10 +29,9 @@ _EMPTY: Final = (0, 0)
 AnswerT = TypeVar("AnswerT")
 
 
-def garbage(verb: str, answer: Any) -> str | None:
-    """What is wrong with a verb's answer, None when nothing is seen to be; verbs unknown here may answer anything."""
-    check = _CHECKS.get(verb)
-    return None if check is None else check(answer)
+def garbage_check(verb: str) -> Check | None:
+    """Says what is wrong with a verb's answer, None when nothing is seen to be; None for verbs unknown here."""
+    return _CHECKS.get(verb)
 
 
 def _of(kind: type[AnswerT], check: Callable[[AnswerT], str | None] = lambda answer: None) -> Check:

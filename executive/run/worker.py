@@ -1,21 +1,81 @@
-"""The two workers: lock-step for simulation, a thread for real time."""
+"""The two workers: lock-step for simulation, real time. Both do the work in one thread beside the ticks, in order."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import Any, Final, Generic, TypeVar
 
 from skills.api import Job
 from skills.robot import Clock
 
 ResultT = TypeVar("ResultT")
+ReadT = TypeVar("ReadT")
+
+_LOCK_STEP_THREAD: Final = "errand-lock-step"
+_REAL_TIME_THREAD: Final = "errand-worker"
+_PATIENCE_S: Final = 60.0
+_Work = tuple[Callable[[], Any], "Future[Any]"]
+
+
+def in_lock_step_job() -> bool:
+    """Whether this is called by a job in lock-step, which may touch nothing that the ticks change."""
+    return threading.current_thread().name == _LOCK_STEP_THREAD
+
+
+class _Thread:
+    """Does one piece of work after the other; ends when it is closed or let go of."""
+
+    def __init__(self, name: str) -> None:
+        self._work: SimpleQueue[_Work | None] = SimpleQueue()
+        self._closed = False
+        self._thread = threading.Thread(target=_work_off, args=(self._work,), name=name, daemon=True)
+        self._thread.start()
+
+    def do(self, work: Callable[[], ResultT]) -> Future[ResultT]:
+        """Have `work` done after all that was given before. Raises RuntimeError when closed."""
+        if self._closed:
+            raise RuntimeError("the worker is closed")
+        future: Future[ResultT] = Future()
+        self._work.put((work, future))
+        return future
+
+    def close(self, wait_s: float) -> None:
+        """Drop what has not begun, and wait so long for what runs; idempotent."""
+        self._closed = True
+        while (given := self._next()) is not None:
+            given[1].cancel()
+        self._work.put(None)
+        self._thread.join(wait_s)
+
+    def _next(self) -> _Work | None:
+        try:
+            return self._work.get_nowait()
+        except Empty:
+            return None
+
+    def __del__(self) -> None:
+        self._work.put(None)
+
+
+def _work_off(given: SimpleQueue[_Work | None]) -> None:
+    for work, future in iter(given.get, None):
+        if not future.set_running_or_notify_cancel():
+            continue
+        try:
+            future.set_result(work())
+        except BaseException as defect:
+            future.set_exception(defect)
+        del work, future
 
 
 @dataclass(frozen=True)
 class _LockStepJob(Generic[ResultT]):
-    """A result that is already there, and shows itself when its time has come."""
+    """Work under way, whose result shows itself when its time has come."""
 
     clock: Clock
     ready_s: float
@@ -26,32 +86,62 @@ class _LockStepJob(Generic[ResultT]):
         return self.clock.now() >= self.ready_s - 1e-9
 
     def result(self) -> ResultT:
-        """The result, or what the work raised. Raises RuntimeError before its time."""
+        """The result, or what the work raised; waits for work that takes longer than its latency.
+
+        Raises:
+            RuntimeError: it is not due yet.
+        """
         if not self.done():
             raise RuntimeError(f"the result is due at {self.ready_s:.3f} s")
         return self.future.result()
 
+    def withdraw(self) -> None:
+        """Nobody waits for the result any more; returns when the work is done, so that what it uses is free."""
+        wait((self.future,))
+
 
 class LockStepWorker:
-    """Runs work at once; its result appears after the declared latency. A seed gives the same run twice."""
+    """Starts work at once in a thread beside the plant's steps; its result appears after the declared latency.
+
+    Work uses only what was read before it was submitted, so that a seed gives the same run twice. Use it as a context
+    manager or close it: no work outlives the run.
+    """
 
     def __init__(self, clock: Clock) -> None:
-        self._clock = clock
+        self._clock, self._thread = clock, _Thread(_LOCK_STEP_THREAD)
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
-        """Do `work` now. What it raises is raised by `result`. Raises ValueError for a negative latency."""
+        """Start `work`. What it raises is raised by `result`. Raises ValueError for a negative latency."""
         if latency_s < 0.0:
             raise ValueError(f"{name}: a latency of {latency_s} s")
-        return _LockStepJob(self._clock, self._clock.now() + latency_s, _done_now(work))
+        return _LockStepJob(self._clock, self._clock.now() + latency_s, self._thread.do(work))
+
+    def sense(
+        self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
+    ) -> Job[ResultT]:
+        """Read the robot's sensors now, in this thread, and start work on what they gave."""
+        try:
+            given = read()
+        except Exception as defect:
+            return self.submit(_raising(defect), latency_s=latency_s, name=name)
+        return self.submit(lambda: work(given), latency_s=latency_s, name=name)
+
+    def close(self) -> None:
+        """Drop what has not begun; wait for what runs."""
+        self._thread.close(_PATIENCE_S)
+
+    def __enter__(self) -> LockStepWorker:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.close()
 
 
-def _done_now(work: Callable[[], ResultT]) -> Future[ResultT]:
-    future: Future[ResultT] = Future()
-    try:
-        future.set_result(work())
-    except Exception as defect:
-        future.set_exception(defect)
-    return future
+def _raising(defect: Exception) -> Callable[[], Any]:
+    def work() -> Any:
+        raise defect
+
+    return work
 
 
 @dataclass(frozen=True)
@@ -68,17 +158,27 @@ class _ThreadJob(Generic[ResultT]):
             raise RuntimeError("the work is not done yet")
         return self.future.result()
 
+    def withdraw(self) -> None:
+        """Nobody waits for the result any more; work that has not begun is dropped."""
+        self.future.cancel()
+
 
 class ThreadWorker:
     """Runs work in one thread beside the ticks, one piece after the other; for real time. Latencies are its own."""
 
     def __init__(self) -> None:
-        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="errand-worker")
+        self._thread = _Thread(_REAL_TIME_THREAD)
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
         """Hand `work` to the thread."""
-        return _ThreadJob(self._pool.submit(work))
+        return _ThreadJob(self._thread.do(work))
+
+    def sense(
+        self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
+    ) -> Job[ResultT]:
+        """Let the thread read the robot's sensors, which may block, and work on what they gave."""
+        return self.submit(lambda: work(read()), latency_s=latency_s, name=name)
 
     def close(self) -> None:
         """Drop what has not begun; what runs is left to end by itself."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._thread.close(0.0)

@@ -15,7 +15,7 @@ from executive.store.recollection import Recollection
 from executive.store.records import row_of
 from executive.store.values import to_text
 from executive.tree.compiler import CompiledTree
-from executive.tree.snapshot import Transition
+from executive.tree.snapshot import Change
 from skills.robot import Pose2D
 
 MOVED_M: Final = 0.02
@@ -31,6 +31,7 @@ class StoreJournal:
 
     What cannot be written now, since another program holds the store, is written with a later tick: the robot's work
     does not wait for it. `troubles` tells of what could not be kept.
+    `keep_world` is called before what a tick brought is written, for a simulated world must not lag behind it.
     """
 
     def __init__(self, connection: sqlite3.Connection, mission: int) -> None:
@@ -42,6 +43,7 @@ class StoreJournal:
         self._pose: Pose2D | None = None
         self._recollection: Recollection | None = None
         self._request_of: Callable[[CompiledTree], Request] | None = None
+        self.keep_world: Callable[[], None] = _no_world
         self.troubles: list[str] = []
 
     def replaceable(self, request_of: Callable[[CompiledTree], Request]) -> StoreJournal:
@@ -52,7 +54,7 @@ class StoreJournal:
     def replaced(self, tree: CompiledTree) -> StoreJournal:
         """Keep the mission that takes this one's place in its stead, with nothing done of it yet."""
         journal = StoreJournal(self._connection, self._mission)
-        journal.troubles = self.troubles
+        journal.troubles, journal.keep_world = self.troubles, self.keep_world
         if self._request_of is None:
             return journal
         row = {**row_of(self._request_of(tree)), "id": self._mission}
@@ -75,8 +77,10 @@ class StoreJournal:
         """Keep what a tick brought."""
         self._take_steps(note)
         self._take_values(note.board)
-        moved = note.pose is not None and _apart(self._pose, note.pose)
-        if self._steps or self._values or moved:
+        news = bool(self._steps or self._values)
+        if news:
+            self.keep_world()
+        if news or (note.pose is not None and _apart(self._pose, note.pose)):
             self._write(note)
 
     def _take_steps(self, note: TickNote) -> None:
@@ -90,7 +94,7 @@ class StoreJournal:
                 self._checkpoints[path_id] = text
                 self._steps[path_id] = (self._mission, path_id, "RUNNING", None, "", text, note.now_s)
 
-    def _row(self, change: Transition, now_s: float, checkpoint: str | None) -> tuple[object, ...]:
+    def _row(self, change: Change, now_s: float, checkpoint: str | None) -> tuple[object, ...]:
         after = change.after
         cause = None if after.cause is None else after.cause.name
         return (self._mission, change.path_id, after.status.name, cause, after.message, checkpoint, now_s)
@@ -129,6 +133,10 @@ class StoreJournal:
     def _trouble(self, sentence: str) -> None:
         if sentence not in self.troubles:
             self.troubles.append(sentence)
+
+
+def _no_world() -> None:
+    """There is no world to keep: it stays by itself."""
 
 
 def _apart(before: Pose2D | None, now: Pose2D) -> bool:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.skill_leaf import SkillLeaf
 from skills.api import Cause
 
 
@@ -25,79 +24,64 @@ class NodeState:
 
 
 @dataclass(frozen=True)
-class Transition:
-    """A node that changed its status or cause."""
+class Change:
+    """A node that says something else than before."""
 
     path_id: str
     before: NodeState
     after: NodeState
 
+    @property
+    def is_transition(self) -> bool:
+        """Whether its status or cause changed."""
+        return self.before.status is not self.after.status or self.before.cause is not self.after.cause
+
+    @property
+    def is_activity(self) -> bool:
+        """Whether it goes on and does something new; mere new numbers do not count."""
+        if self.is_transition or self.after.status is not Status.RUNNING:
+            return False
+        return _NUMBER.sub("", self.before.message) != _NUMBER.sub("", self.after.message)
+
 
 Snapshot = Mapping[str, NodeState]
-_IDLE = NodeState()
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 class Observed:
-    """A built tree whose states are read again and again; what did not change is the same object as before."""
+    """A built tree that is read after every tick. `states` gives what every explained node said last, parents first."""
 
     def __init__(self, root: Behaviour) -> None:
-        self.nodes: tuple[Behaviour, ...] = tuple(walk(root))
+        self.nodes: tuple[Behaviour, ...] = tuple(_walk(root))
         self._explained = tuple(node for node in self.nodes if isinstance(node, Explained))
-        self._last: dict[str, NodeState] = {}
+        self._last = [_state(node) for node in self._explained]
+        named = zip(self._explained, self._last, strict=True)
+        self.states: Snapshot = {node.path_id: state for node, state in named}
 
-    def snapshot(self) -> Snapshot:
-        """The present state of every explained node, parents first."""
-        last = self._last
-        self._last = {node.path_id: _renewed(last.get(node.path_id), node) for node in self._explained}
-        return self._last
-
-
-def snapshot(root: Behaviour) -> Snapshot:
-    """The present state of every explained node, parents first."""
-    return {node.path_id: _state(node) for node in walk(root) if isinstance(node, Explained)}
-
-
-def transitions(before: Snapshot, after: Snapshot) -> Iterator[Transition]:
-    """What changed between two snapshots of one tree, in the order of the tree; mere new messages do not count."""
-    for path_id, state in after.items():
-        old = before.get(path_id, _IDLE)
-        if old is not state and (old.status, old.cause) != (state.status, state.cause):
-            yield Transition(path_id, old, state)
-
-
-def activities(before: Snapshot, after: Snapshot) -> Iterator[tuple[str, NodeState]]:
-    """The nodes that go on and say something new, in the order of the tree; mere new numbers do not count."""
-    for path_id, state in after.items():
-        old = before.get(path_id, _IDLE)
-        if old is state or not old.status is state.status is Status.RUNNING or old.cause is not state.cause:
-            continue
-        if _NUMBER.sub("", old.message) != _NUMBER.sub("", state.message):
-            yield path_id, state
+    def changes(self) -> Sequence[Change]:
+        """What changed since the last time, in the order of the tree; brings `states` up to date."""
+        found = []
+        for index, (node, last) in enumerate(zip(self._explained, self._last, strict=True)):
+            if (
+                node.status is last.status
+                and node.cause is last.cause
+                and node.message == last.message
+                and node.progress == last.progress
+            ):
+                continue
+            self._last[index] = _state(node)
+            found.append(Change(node.path_id, last, self._last[index]))
+        if found:
+            self.states = {**self.states, **{change.path_id: change.after for change in found}}
+        return found
 
 
-def walk(root: Behaviour) -> Iterator[Behaviour]:
+def _walk(root: Behaviour) -> Iterator[Behaviour]:
     """The node and all below, parents first."""
     yield root
     for child in root.children:
-        yield from walk(child)
+        yield from _walk(child)
 
 
-def _renewed(last: NodeState | None, node: Explained) -> NodeState:
-    """The last state where it still holds, else a new one."""
-    assert isinstance(node, Behaviour)
-    if (
-        last is not None
-        and last.status is node.status
-        and last.message == node.message
-        and last.cause is node.cause
-        and last.progress == (node.progress if isinstance(node, SkillLeaf) else None)
-    ):
-        return last
-    return _state(node)
-
-
-def _state(node: Behaviour) -> NodeState:
-    assert isinstance(node, Explained)
-    progress = node.progress if isinstance(node, SkillLeaf) else None
-    return NodeState(node.status, node.cause, node.message, progress)
+def _state(node: Explained) -> NodeState:
+    return NodeState(node.status, node.cause, node.message, node.progress)

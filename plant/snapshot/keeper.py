@@ -1,4 +1,4 @@
-"""Writes the plant's state at every tick, and brings a plant of the same world back to it."""
+"""Writes the plant's state now and then, and brings a plant of the same world back to it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ from plant.snapshot.file import Snapshot, SnapshotError, SnapshotFile, encoded
 from plant.snapshot.values import State
 from skills.robot import FloatArray
 
+PERIOD_S: Final = 1.0
 _WORLD: Final = "world: "
 _PATH: Final = "path: "
 
 
 class KeptEngine(Protocol):
     """The part of the engine that a snapshot needs."""
+
+    def now(self) -> float:
+        """Simulated seconds since the start."""
 
     def state(self) -> State:
         """Time and robots."""
@@ -41,17 +45,27 @@ class KeptReferee(Protocol):
 
 
 class SnapshotKeeper:
-    """Writes a plant's whole state to a file whenever it is called. `facts` tell which world it is."""
+    """Writes a plant's whole state to a file whenever it is called. `facts` tell which world it is.
+
+    It stands in for a world that stays while the executive is away: the mission itself goes on from its journal.
+    """
 
     def __init__(
         self, path: Path, engine: KeptEngine, referee: KeptReferee, facts: Mapping[str, Any], robots: Sequence[str]
     ) -> None:
         self._file, self._engine, self._referee, self._facts = SnapshotFile(path), engine, referee, dict(facts)
         self._paths = {robot: bytearray() for robot in robots}
+        self._due_s = 0.0
 
     def __call__(self) -> None:
         """Write it."""
+        self._due_s = self._engine.now() + PERIOD_S
         self._file.write(self.content())
+
+    def when_due(self) -> None:
+        """Write it when the last time was a while ago."""
+        if self._engine.now() >= self._due_s:
+            self()
 
     def content(self) -> bytes:
         """What is written."""

@@ -12,7 +12,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, ObjectObservation, Running, Succeeded, Surface
-from skills.approach.standing import Standing, is_comfortable, standing_poses
+from skills.approach.standing import Standing, free_places, is_comfortable, reachable
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
@@ -72,8 +72,12 @@ class Approach(ArmSkill[ApproachInputs]):
         here = self.context.pose()
         from_here = self._reach_cost(seen)(here) if is_comfortable(here, point_W) else None
         if from_here is None or from_here > self.options.good_grasp:
+            free, reach_cost = self._free_places(seen), self._reach_cost(seen)
             places = yield from self.compute(
-                lambda: self._places(seen), latency_s=0.2, name="choose a place", message="choosing where to stand"
+                lambda: reachable(free, reach_cost),
+                latency_s=0.2,
+                name="choose a place",
+                message="choosing where to stand",
             )
             if not places:
                 raise SkillFailure(
@@ -110,12 +114,10 @@ class Approach(ArmSkill[ApproachInputs]):
         found = yield from self.perform(Detect(self.context), again)
         return Succeeded(f"standing before the {seen.thing}", found.outputs)
 
-    def _places(self, seen: ObjectObservation) -> list[Standing]:
+    def _free_places(self, seen: ObjectObservation) -> list[Standing]:
         context = self.context
         point_W = (seen.position_W[0], seen.position_W[1])
-        return standing_poses(
-            point_W, context.pose(), context.costmap, context.robot.capabilities(), self._reach_cost(seen)
-        )
+        return free_places(point_W, context.pose(), context.costmap, context.robot.capabilities())
 
     def _reach_cost(self, seen: ObjectObservation) -> Callable[[Pose2D], float | None]:
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,17 +38,10 @@ def is_comfortable(pose: Pose2D, point_W: tuple[float, float]) -> bool:
     return COMFORTABLE_M[0] <= math.hypot(dx, dy) <= COMFORTABLE_M[1] and abs(bearing) < COMFORTABLE_BEARING_RAD
 
 
-def standing_poses(
-    point_W: tuple[float, float],
-    here: Pose2D,
-    costmap: Costmap,
-    capabilities: Capabilities,
-    reach_cost: Callable[[Pose2D], float | None],
+def free_places(
+    point_W: tuple[float, float], here: Pose2D, costmap: Costmap, capabilities: Capabilities
 ) -> list[Standing]:
-    """Free poses around point_W that face it, the best first.
-
-    `reach_cost` tells how awkward the reach from a pose is, None where the point is out of reach.
-    """
+    """Free poses around point_W that face it, the cheapest first."""
     footprint = Footprint.of(capabilities)
     found = []
     for k, distance in itertools.product(range(BEARINGS), DISTANCES_M):
@@ -56,8 +49,15 @@ def standing_poses(
         pose = Pose2D(point_W[0] - distance * math.cos(yaw), point_W[1] - distance * math.sin(yaw), yaw)
         if footprint_clear(costmap, footprint, pose):
             found.append(Standing(pose, _cost(pose, here, distance)))
-    nearest = sorted(found, key=lambda standing: standing.cost)[:_LOOKED_AT]
-    reaches = [(standing, reach_cost(standing.pose)) for standing in nearest]
+    return sorted(found, key=lambda standing: standing.cost)[:_LOOKED_AT]
+
+
+def reachable(free: Sequence[Standing], reach_cost: Callable[[Pose2D], float | None]) -> list[Standing]:
+    """The best of some places, best first.
+
+    `reach_cost` tells how awkward the reach from a pose is, None where the point is out of reach.
+    """
+    reaches = [(standing, reach_cost(standing.pose)) for standing in free]
     reached = [Standing(each.pose, each.cost + REACH_WEIGHT * cost) for each, cost in reaches if cost is not None]
     return sorted(reached, key=lambda standing: standing.cost)[:_OFFERED]
 

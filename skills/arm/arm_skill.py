@@ -84,23 +84,29 @@ class ArmSkill(RoutineSkill[InputsT]):
         """The body's pose in the world, as estimated."""
         return self.context.X_WB()
 
-    def prepared_scene(self) -> ArmScene:
-        """The collision scene with what stands around and what is held; for use within Worker jobs."""
-        if self._scene is None:
-            robot = self.context.robot
-            self._scene = ArmScene(robot.capabilities(), self.model, robot.joints().position_rad)
-        self._scene.set_boxes(self.boxes)
-        self._scene.hold(self.held)
-        self._scene.set_padding(0.01)
-        self._scene.set_jaw(max(0.0, self.context.robot.gripper().opening_rad))
-        return self._scene
+    def scene_now(self) -> Callable[[], ArmScene]:
+        """Gives, inside a Worker job, the collision scene with what stands around and what is held just now."""
+        robot, model, boxes, held = self.context.robot, self.model, self.boxes, self.held
+        capabilities, joints = robot.capabilities(), robot.joints()
+        work, opening_rad = self.context.work, max(0.0, robot.gripper().opening_rad)
+
+        def prepared() -> ArmScene:
+            self._scene = scene = self._scene or ArmScene(capabilities, model, joints.position_rad, work=work)
+            scene.set_boxes(boxes)
+            scene.hold(held)
+            scene.set_padding(0.01)
+            scene.set_jaw(opening_rad)
+            return scene
+
+        return prepared
 
     def move_to(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[FloatArray]:
         """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration."""
 
+        scene_now, start = self.scene_now(), self.q_rad()
+
         def plan() -> tuple[ArmTrajectory, FloatArray]:
-            scene, start = self.prepared_scene(), self.q_rad()
-            planner = self.context.stack.arm_planner
+            scene, planner = scene_now(), self.context.stack.arm_planner
             path = planner.path(scene, start, goal(scene, start), self._rng)
             return planner.timed(path, speed_rad_s=speed_rad_s, scene=scene), path[-1]
 
@@ -118,8 +124,9 @@ class ArmSkill(RoutineSkill[InputsT]):
         The line begins at the joint angles of the arm, or at `q_from_rad`, which the arm about has.
         """
 
+        q = self.q_rad() if q_from_rad is None else q_from_rad
+
         def plan() -> ArmTrajectory:
-            q = self.q_rad() if q_from_rad is None else q_from_rad
             X_BH = RigidTransform(self.model.X_BH(q).rotation(), p_BH)
             planner = self.context.stack.arm_planner
             return planner.timed(planner.line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
@@ -180,7 +187,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         yield from self.pause(SETTLE_S, message)
         robot, asked_s = self.context.robot, self.context.clock.now()
         source = self.hand_camera.source
-        image = yield from self.compute(
+        image = yield from self.sense(
             lambda: robot.image(source), latency_s=PICTURE_LATENCY_S, name="hand picture", message=message
         )
         if image.stamp_s < asked_s - OLDEST_PICTURE_S:

@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.planning import BodyShapeDescription, RobotDiagramBuilder, SceneGraphCollisionChecker
 
+from skills.api import NO_WORK_COUNTER, WorkCounter
 from skills.arm.kinematics import ArmModel
 from skills.robot import Capabilities, FloatArray
 
@@ -39,8 +40,10 @@ class ArmScene:
         model: ArmModel,
         joint_positions_rad: Mapping[str, float],
         padding_m: float = 0.01,
+        work: WorkCounter = NO_WORK_COUNTER,
     ) -> None:
-        self.model = model
+        """`work` counts the checks."""
+        self.model, self._work = model, work
         builder = RobotDiagramBuilder()
         plant = builder.plant()
         (robot,) = Parser(plant).AddModelsFromString(_without_looks(capabilities.description), "urdf")
@@ -81,10 +84,12 @@ class ArmScene:
 
     def free(self, q_rad: FloatArray) -> bool:
         """Whether arm angles q_rad (J,) collide with nothing."""
+        self._work.count("arm_configuration_checks")
         return bool(self._checker.CheckConfigCollisionFree(self._full(q_rad)))
 
     def edge_free(self, q_from_rad: FloatArray, q_to_rad: FloatArray) -> bool:
         """Whether the straight joint motion between two configurations collides with nothing."""
+        self._work.count("arm_edge_checks")
         return bool(self._checker.CheckEdgeCollisionFree(self._full(q_from_rad), self._full(q_to_rad)))
 
     def path_free(self, path_rad: FloatArray) -> bool:

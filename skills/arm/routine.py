@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from skills.api import Cause, Failed, InputsT, PlanningError, Running, Skill, SkillContext, Step, Succeeded
+from skills.api import Cause, Failed, InputsT, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import wrap
 from skills.robot import ArmTrajectory, CommandId, CommandState, FloatArray, Pose2D
 
@@ -157,13 +157,23 @@ class RoutineSkill(Skill[InputsT]):
 
     def compute(self, work: Callable[[], ResultT], *, latency_s: float, name: str, message: str) -> Routine[ResultT]:
         """Let the Worker do `work`. A PlanningError becomes a SkillFailure with cause PLANNING."""
-        job = self.context.worker.submit(work, latency_s=latency_s, name=name)
-        while not job.done():
-            yield Running(message)
+        return (yield from self._awaited(self.context.worker.submit(work, latency_s=latency_s, name=name), message))
+
+    def _awaited(self, job: Job[ResultT], message: str) -> Routine[ResultT]:
+        """A job's result; a routine that is left before waits until the job no longer uses what it was given."""
         try:
+            while not job.done():
+                yield Running(message)
             return job.result()
         except PlanningError as error:
             raise SkillFailure(Cause.PLANNING, str(error)) from error
+        finally:
+            job.withdraw()
+
+    def sense(self, read: Callable[[], ResultT], *, latency_s: float, name: str, message: str) -> Routine[ResultT]:
+        """What `read` gives, which may block."""
+        job = self.context.worker.sense(read, lambda given: given, latency_s=latency_s, name=name)
+        return (yield from self._awaited(job, message))
 
     def follow(self, trajectory: ArmTrajectory, message: str) -> Routine[None]:
         """Move the arm along a trajectory. Raises SkillFailure with cause EXECUTION when it does not get there."""

@@ -107,15 +107,15 @@ class ScanMatchingLocaliser:
         Costs a few milliseconds for a small radius and some hundred for a whole flat: call it while standing.
         """
         scan = robot.scan()
-        found = None if scan is None else self.search(scan, radius_m)
+        found = None if scan is None else self.search(scan, self.estimate(), radius_m)
         if found is not None:
             self.accept(found)
         return found is not None
 
-    def search(self, scan: Scan, radius_m: float | None) -> LocalisationEstimate | None:
-        """Where a scan fits the map, within radius_m of the present belief or anywhere (None); changes nothing."""
+    def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
+        """Where a scan fits the map, within radius_m of a belief or anywhere (None); changes nothing."""
         X_OB = Pose2D.from_transform(scan.X_OB)
-        found = self._best_match(self._points(scan), compose(self._X_WO, X_OB), radius_m)
+        found = self._best_match(self._points(scan), compose(Pose2D.from_transform(belief.X_WO), X_OB), radius_m)
         if found is None:
             return None
         X_WO = compose(found.pose, inverse(X_OB))

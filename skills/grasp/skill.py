@@ -203,13 +203,13 @@ class Grasp(ArmSkill[GraspInputs]):
         opening = 0.9 * self.open_rad
         yield from self.move_gripper(opening, JAW_FORCE_N, "opening the jaw")
 
-        stack = self.context.stack
+        scene_now, q, stack = self.scene_now(), self.q_rad(), self.context.stack
 
         def plan() -> GraspPlan:
-            scene = self.prepared_scene()
+            scene = scene_now()
             scene.set_jaw(opening)
             around = Surroundings(view.boxes, view.target_box, up_B)
-            return stack.grasp_planner.plan(scene, self.q_rad(), candidates, around, stack.arm_planner, self._rng)
+            return stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng)
 
         return (
             yield from self.compute(plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}")

@@ -99,8 +99,9 @@ def search(
     goal_column: int,
     needs: Needs,
     greed: float,
+    expansions: IntArray,
 ) -> IntArray:
-    """State indices from a seed to the goal's place, empty when there is no way.
+    """State indices from a seed to the goal's place, empty when there is no way; adds to `expansions` (1,).
 
     A state's index is (row * columns + column) * headings + heading. `seeds` are rows of state index and cost so far;
     `final` is the cost of the last turn at the goal from each heading, infinite where it cannot be.
@@ -124,6 +125,7 @@ def search(
         if closed[index]:
             continue
         closed[index] = True
+        expansions[0] += 1
         cell, k = index // lattice.headings, index % lattice.headings
         if cell == goal_cell and cost[index] + final[k] < cost[states]:
             cost[states], parent[states] = cost[index] + final[k], index

@@ -54,14 +54,13 @@ class LowObstacleWatch:
         self._turn += 1
         self._next_s = self._context.clock.now() + self._options.period_s
         self._X_WO = self._context.localiser.estimate().X_WO
-        self._job = self._context.worker.submit(
-            lambda: self._look(source), latency_s=self._options.latency_s, name=f"look for low things by {source}"
+        robot, options = self._context.robot, self._options
+        self._job = self._context.worker.sense(
+            lambda: robot.image(source, visual=False),
+            lambda image: (low_points(image, options), image.stamp_s),
+            latency_s=options.latency_s,
+            name=f"look for low things by {source}",
         )
-
-    def _look(self, source: str) -> tuple[FloatArray, float]:
-        """Low points (N, 3) in odom and the picture's stamp."""
-        image = self._context.robot.image(source, visual=False)
-        return low_points(image, self._options), image.stamp_s
 
 
 def low_points(image: Image, options: WatchOptions) -> FloatArray:

@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import Costmap, PlanningError
+from skills.api import NO_WORK_COUNTER, Costmap, PlanningError, WorkCounter
 from skills.geometry import wrap
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, clearance_at
 from skills.navigate.lattice import Lattice, Needs, Space, cost_to_go, lattice_moves, search
@@ -61,11 +61,18 @@ class LatticePlanner:
         )
 
     def problem(
-        self, costmap: Costmap, footprint: Footprint, start: Pose2D, goal: Pose2D, *, max_speed_m_s: float
+        self,
+        costmap: Costmap,
+        footprint: Footprint,
+        start: Pose2D,
+        goal: Pose2D,
+        *,
+        max_speed_m_s: float,
+        work: WorkCounter = NO_WORK_COUNTER,
     ) -> Callable[[], Path]:
         """Sample the costmap now; the call that comes back plans on that sample, and raises PlanningError."""
         options = replace(self, forward_m_s=min(self.forward_m_s, max_speed_m_s))
-        return partial(solve, problem_of(costmap, footprint, start, goal, options, margin_m=self.around_m))
+        return partial(solve, problem_of(costmap, footprint, start, goal, options, self.around_m, work))
 
 
 @dataclass(frozen=True)
@@ -77,6 +84,7 @@ class Problem:
     start: Pose2D
     goal: Pose2D
     options: LatticePlanner
+    work: WorkCounter = NO_WORK_COUNTER
 
 
 def plan_path(
@@ -100,6 +108,7 @@ def problem_of(
     goal: Pose2D,
     options: LatticePlanner,
     margin_m: float = 3.0,
+    work: WorkCounter = NO_WORK_COUNTER,
 ) -> Problem:
     """Sample the costmap on the box around start and goal, margin_m wider to all sides."""
     low = np.minimum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) - margin_m
@@ -111,7 +120,7 @@ def problem_of(
     field = field[rows, columns]
     frame = (FIELD_CELL_M, float(xs[columns.start]), float(ys[rows.start]))
     space = Space(np.ascontiguousarray(field), frame, footprint.discs, options.weights())
-    return Problem(space, footprint, start, goal, options)
+    return Problem(space, footprint, start, goal, options, work)
 
 
 def _used(best: NDArray[np.float32]) -> slice:
@@ -219,6 +228,7 @@ def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | Non
     lattice, row, column = _lattice(problem, yaw0_rad)
     seeds, final = _seeds(problem, lattice, needs), _final_turns(problem, lattice)
     to_go = cost_to_go(problem.space, lattice, row, column, problem.footprint.inscribed_m)
+    expansions = np.zeros(1, dtype=np.int64)
     states = search(
         problem.space,
         lattice,
@@ -230,7 +240,9 @@ def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | Non
         column,
         needs,
         problem.options.greed,
+        expansions,
     )
+    problem.work.count("planner_expansions", int(expansions[0]))
     if len(states) == 0:
         return None
     cells, k = np.divmod(states, lattice.headings)

@@ -146,7 +146,7 @@ class Navigate(Skill[NavigateInputs]):
         speed = max(0.1, self._inputs.max_speed_m_s)
         begin, goal = start or self.context.pose(), self._inputs.goal
         plan = self.context.stack.planner.problem(
-            self._costmap(begin), self._footprint, begin, goal, max_speed_m_s=speed
+            self._costmap(begin), self._footprint, begin, goal, max_speed_m_s=speed, work=self.context.work
         )
         self._job = self.context.worker.submit(plan, latency_s=self.options.planning_latency_s, name="plan a path")
 

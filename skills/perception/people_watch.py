@@ -55,12 +55,16 @@ class PeopleOptions:
 
 @dataclass(frozen=True)
 class _Look:
-    """Who is in the pictures of one moment, and the pictures without their pixels: frames and lenses."""
+    """Who is in the pictures of one moment, and the pictures without their pixels: frames and lenses.
+
+    `suspected`: the pictures were taken without depth and show somebody; the next ones are taken with depth, at once.
+    """
 
     found: tuple[SeenPerson, ...]
     images: tuple[Image, ...]
     X_WO: RigidTransform
     here_W: Pose2D
+    suspected: bool = False
 
     def shows(self, one: SeenPerson, reach_m: float) -> bool:
         """Whether somebody who has not moved would be seen: from where they were seen before, or well in a picture."""
@@ -80,7 +84,7 @@ class PeopleWatch:
         knows = PERSON in context.detector.class_names
         self._cameras = context.robot.capabilities().body_cameras if knows else ()
         self._looked_s = -math.inf
-        self._soon = False
+        self._soon = self._suspected = False
         self._job: Job[_Look] | None = None
         self._seen: tuple[SeenPerson, ...] = ()
 
@@ -100,38 +104,45 @@ class PeopleWatch:
         if sources and now_s >= self._looked_s + self._period_s():
             self._looked_s, self._soon = now_s, False
             X_WO, here_W = self._context.localiser.estimate().X_WO, self._context.pose()
-            self._job = self._context.worker.submit(
-                lambda: self._look(sources, X_WO, here_W), latency_s=self._options.latency_s, name="look for people"
+            robot, with_depth = self._context.robot, self._suspected or self._somebody_may_be_near()
+            self._job = self._context.worker.sense(
+                lambda: [robot.image(source, depth=with_depth) for source in sources],
+                lambda images: self._look(images, X_WO, here_W, with_depth),
+                latency_s=self._options.latency_s,
+                name="look for people",
             )
 
     def _period_s(self) -> float:
         """How long after the last look the next one follows (s)."""
         options = self._options
         if self._soon:
-            return options.again_s
-        return options.period_s if self._seen or self._something_near() else options.idle_s
+            return 0.0 if self._suspected else options.again_s
+        return options.period_s if self._somebody_may_be_near() else options.idle_s
 
-    def _something_near(self) -> bool:
-        """Whether something stands near that the map does not explain; True where the costmap cannot tell."""
+    def _somebody_may_be_near(self) -> bool:
+        """Whether somebody is known, or something stands near that the map does not explain, as far as can be told."""
         costmap, here = self._context.costmap, self._context.pose()
-        if not isinstance(costmap, LayeredView):
+        if self._seen or not isinstance(costmap, LayeredView):
             return True
         return bool(np.any(np.linalg.norm(costmap.seen_m() - (here.x_m, here.y_m), axis=1) < self._options.near_m))
 
-    def _look(self, sources: Sequence[str], X_WO: RigidTransform, here_W: Pose2D) -> _Look:
-        """People in one picture of each camera."""
-        images = [self._context.robot.image(source, depth=False) for source in sources]
+    def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D, with_depth: bool) -> _Look:
+        """People in one picture of each camera; without depth only whether there may be somebody."""
         found = found_in_grey(self._context.detector, images, PERSON)
         pairs = [(image, one) for image, ones in zip(images, found, strict=True) for one in ones]
+        if not with_depth:
+            return _Look((), tuple(images), X_WO, here_W, suspected=any(self._is_person(one) for _, one in pairs))
         seen = [self._placed(image, one, X_WO, here_W) for image, one in pairs]
         return _Look(tuple(one for one in seen if one is not None), tuple(images), X_WO, here_W)
 
+    def _is_person(self, one: Detection) -> bool:
+        return one.class_name == PERSON and one.score >= self._options.least_score
+
     def _placed(self, image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D) -> SeenPerson | None:
         """Where a detected person is; None for other things, and for people out of the reach of depth."""
-        if one.class_name != PERSON or one.score < self._options.least_score:
+        if not self._is_person(one):
             return None
-        depth_m = self._context.robot.image(image.source, visual=False).depth_m
-        position = position_of(replace(image, depth_m=depth_m), one)
+        position = position_of(image, one)
         if position is None:
             return None
         p_OC = image.frames.pose(image.camera_frame).translation()
@@ -150,7 +161,8 @@ class PeopleWatch:
             self._seen = merged(self._seen, one, self._options.same_m)
         self._seen = tuple(self._missed(one, look, stamp_s) for one in self._seen)
         self._seen = tuple(one for one in self._seen if self._remembered(one))
-        self._soon = any(one.looks == 1 for one in self._seen)
+        self._suspected = look.suspected
+        self._soon = look.suspected or any(one.looks == 1 for one in self._seen)
         if look.found or before:
             self._context.publish(PEOPLE_TOPIC, self._message())
 

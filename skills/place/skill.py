@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
-from skills.approach.standing import COMFORTABLE_M, standing_poses
+from skills.approach.standing import COMFORTABLE_M, free_places
 from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene
 from skills.arm.poses import look_configuration, overview_viewpoints
@@ -126,7 +126,7 @@ class Place(ArmSkill[PlaceInputs]):
         if np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6:
             return
         context = self.context
-        places = standing_poses((spot[0], spot[1]), pose, context.costmap, context.robot.capabilities(), lambda _: 0.0)
+        places = free_places((spot[0], spot[1]), pose, context.costmap, context.robot.capabilities())
         if not places:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
         yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))

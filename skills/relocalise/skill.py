@@ -77,8 +77,9 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         message = "searching the whole map"
         scan = yield from self._new_scan(message)
         assert isinstance(localiser, SearchingLocaliser)
+        belief = localiser.estimate()
         found: LocalisationEstimate | None = yield from self.compute(
-            lambda: localiser.search(scan, None),
+            lambda: localiser.search(scan, belief, None),
             latency_s=self.options.search_latency_s,
             name="search the map",
             message=message,

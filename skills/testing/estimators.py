@@ -32,7 +32,7 @@ class KnownPlace:
         """Take in the odometry's stamp."""
         self._stamp_s = robot.odometry().stamp_s
 
-    def search(self, scan: Scan, radius_m: float | None) -> LocalisationEstimate | None:
+    def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
         """Where the robot is; what a search of the map would find."""
         return LocalisationEstimate(scan.stamp_s, self._X_WO, np.eye(3) * 1e-4, True)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.api import SkillContext
+from executive.run.worker import LockStepWorker
+from skills.api import Job, SkillContext
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.localiser import ScanMatchingLocaliser
 from skills.geometry import compose, inverse
@@ -250,39 +250,16 @@ class PlanarRobot:
         return Scan(self.clock.now(), shaped, ELEVATIONS, self._azimuths, X_BL, self.odometry().X_OB)
 
 
-@dataclass
-class LockStepJob:
-    ready_s: float
-    clock: PlanarClock
-    work: Callable[[], Any]
-    outcome: Any = None
-    error: Exception | None = None
+class NamingWorker(LockStepWorker):
+    """Remembers the names of what was submitted."""
 
-    def __post_init__(self) -> None:
-        try:
-            self.outcome = self.work()
-        except Exception as error:
-            self.error = error
+    def __init__(self, clock: PlanarClock) -> None:
+        super().__init__(clock)
+        self.names: list[str] = []
 
-    def done(self) -> bool:
-        return self.clock.now() >= self.ready_s - 1e-9
-
-    def result(self) -> Any:
-        if not self.done():
-            raise RuntimeError("not done")
-        if self.error is not None:
-            raise self.error
-        return self.outcome
-
-
-@dataclass
-class LockStepWorker:
-    clock: PlanarClock
-    names: list[str] = field(default_factory=list)
-
-    def submit(self, work: Callable[[], Any], *, latency_s: float, name: str) -> LockStepJob:
+    def submit(self, work: Callable[[], Any], *, latency_s: float, name: str) -> Job[Any]:
         self.names.append(name)
-        return LockStepJob(self.clock.now() + latency_s, self.clock, work)
+        return super().submit(work, latency_s=latency_s, name=name)
 
 
 class Bench:
@@ -302,7 +279,7 @@ class Bench:
         self.robot = PlanarRobot(self.clock, [*surveyed, *unmapped], start, seed=seed, cameras=cameras)
         self.localiser = ScanMatchingLocaliser(grid_of(surveyed, (0.7, 1.3)), believed_start or start)
         self.costmap = LayeredCostmap(grid_of(surveyed, (0.05, 1.0)))
-        self.worker = LockStepWorker(self.clock)
+        self.worker = NamingWorker(self.clock)
         self.published: list[tuple[str, Mapping[str, Any]]] = []
         self.lease = self.robot.take_lease("test")
 

@@ -5,12 +5,27 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from executive.tree.behaviours.board import Board
-from skills.api import Ask, Costmap, Detector, Localiser, Publish, SkillContext, Worker, nobody_to_ask
+from skills.api import (
+    NO_WORK_COUNTER,
+    Ask,
+    Costmap,
+    Detector,
+    Localiser,
+    Publish,
+    SkillContext,
+    WorkCounter,
+    Worker,
+    nobody_to_ask,
+)
 from skills.detection import NO_DETECTOR
-from skills.robot import Clock, Lease, Robot
+from skills.robot import Clock, Lease, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
+
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
 
 
 def leaf_seed(run_seed: int, path_id: str) -> int:
@@ -44,6 +59,15 @@ class RunContext:
     detector: Detector = NO_DETECTOR
     stop_pressed: Callable[[], str | None] = never_pressed
     stack: RobotStack = field(default_factory=default_stack)
+    work: WorkCounter = NO_WORK_COUNTER
+
+    def pose(self) -> Pose2D | None:
+        """Where the robot believes to be, the planar part of X_WB; None while it is not localised."""
+        return Pose2D.from_transform(self.X_WB()) if self.localiser.estimate().localised else None
+
+    def X_WB(self) -> RigidTransform:
+        """The body's pose in the world, as estimated."""
+        return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB
 
     def for_skill(self, path_id: str) -> SkillContext:
         """The part of it that a skill may touch."""
@@ -58,5 +82,6 @@ class RunContext:
             seed=leaf_seed(self.seed, path_id),
             ask=self.ask,
             detector=self.detector,
+            work=self.work,
             stack=self.stack,
         )

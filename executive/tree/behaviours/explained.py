@@ -11,13 +11,14 @@ from skills.api import Cause
 class Explained:
     """Mixin for behaviours, which have the `status`.
 
-    `cause` is None unless the node failed or was cancelled; `message` is one sentence.
+    `cause` is None unless the node failed or was cancelled; `message` is one sentence, `progress` from 0 to 1 or None.
     """
 
     path_id: str
     cause: Cause | None
     message: str
     status: Status
+    progress: float | None = None
 
     def clear_explanation(self) -> None:
         """Forget cause and message."""

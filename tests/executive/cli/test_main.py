@@ -125,12 +125,18 @@ def test_tree_of_a_file_maps_nodes_to_lines(tmp_path: Path):
     assert [child["source"]["line"] for child in root["children"][-1]["children"]] == [3, 4]
 
 
+def test_profile_prints_a_table_by_subsystem(no_plant, tmp_path):
+    asked = ("run", "--say", "Hey Alice, go to the bedroom", "--out", str(tmp_path), "--quiet")
+    assert "CPU time by subsystem" in invoke(*asked, "--profile").output
+    assert "CPU time by subsystem" not in invoke(*asked).output
+
+
 def test_run_json_has_exactly_the_contract_on_the_last_line(no_plant, tmp_path):
     result = invoke("run", "--say", "Hey Alice, go to the bedroom", "--json", "--out", str(tmp_path))
     values = json.loads(result.stdout.splitlines()[-1])
     assert list(values) == [
         "outcome", "cause", "message", "referee", "commands", "world", "seed", "sim_time_s", "wall_time_s",
-        "real_time_factor", "ticks", "log",
+        "real_time_factor", "ticks", "log", "work",
     ]  # fmt: skip
     assert list(values["referee"]) == ["success", "why", "collisions", "drops"]
     assert (result.exit_code, len(result.stdout.splitlines())) == (0, 1)

@@ -19,7 +19,7 @@ from executive.store.missions import MissionStore
 from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
-from executive.tree.snapshot import NodeState, Transition
+from executive.tree.snapshot import Change, NodeState
 
 
 class GoneError(BaseException):
@@ -33,13 +33,13 @@ class Plant:
         self.runs = []
         self.outcomes = []
 
-    def __call__(self, prepared, *, durable, observer=None, control=None, page=None):
+    def __call__(self, prepared, *, durable, **_):
         tree, out = prepared.tree, prepared.request.out
         out.mkdir(parents=True, exist_ok=True)
         durable.plant.with_name(f"{durable.plant.name}.a").touch()
         self.runs.append((prepared.mission.name, prepared.request.seed, out.name, durable))
         leaf = next(node.path_id for node in tree.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id)
-        done = Transition(leaf, NodeState(), NodeState(Status.SUCCESS, None, "done"))
+        done = Change(leaf, NodeState(), NodeState(Status.SUCCESS, None, "done"))
         durable.journal.note(TickNote(1.0, (done,), {}, None, {}))
         outcome = self.outcomes.pop(0) if self.outcomes else "success"
         if outcome == "killed":
@@ -152,7 +152,7 @@ def test_resume_goes_on_with_the_mission_that_a_correction_put_in_the_place(erra
         leaf = next(
             node.path_id for node in other.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id
         )
-        change = Transition(leaf, NodeState(), NodeState(Status.RUNNING, None, "on the way"))
+        change = Change(leaf, NodeState(), NodeState(Status.RUNNING, None, "on the way"))
         durable.journal.replaced(other).note(TickNote(2.0, (change,), {}, None, {}))
         raise GoneError
 

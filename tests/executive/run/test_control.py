@@ -6,7 +6,9 @@ import pytest
 from py_trees.common import Status
 
 from executive.run.control import Control, Mode
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.outcome import Outcome
+from executive.run.watchdog import Watchdog
 from skills.api import Cause, Failed, Question, Running, Succeeded, nobody_to_ask
 from skills.robot import Lease, Pose2D
 
@@ -438,11 +440,15 @@ def test_an_untouched_control_changes_no_log(compiled, run_tree, make, robot, cl
 
 
 def test_a_lease_shown_by_another_is_left_as_it_is(robot):
-    from executive.run.lease_keeper import LeaseKeeper
-
-    keeper = LeaseKeeper(robot, "errand")
-    foreign = Lease("Alice", "tablet", 99)
-    assert keeper.behind(foreign) == foreign
+    guarded = GuardedRobot(robot, Watchdog())
+    token, foreign, shown = guarded.claim("errand"), Lease("Alice", "tablet", 99), []
+    robot.stop = lambda *, lease: shown.append(lease) or 1
+    guarded.stop(lease=foreign)
+    robot.lease = None
+    guarded.regain_lease()
+    guarded.stop(lease=token)
+    assert shown == [foreign, robot.lease]
+    assert token != robot.lease
 
 
 def test_a_mission_can_take_the_place_of_the_one_under_way(compiled, run_tree, make, control, robot, script, notes):

@@ -11,9 +11,10 @@ import pytest
 from mcap.reader import make_reader
 
 from executive.record.event_log import EventLog
-from executive.run.guarded_robot import GarbageError, guarded
+from executive.run.guarded_robot import GarbageError, GuardedRobot
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
+from executive.run.watchdog import Watchdog
 from executive.run.worker import LockStepWorker, ThreadWorker
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
@@ -70,7 +71,9 @@ class UseAll(Skill):
         for verb in ("capabilities", "odometry", "imu", "scan", "joints", "gripper", "battery", "faults"):
             getattr(robot, verb)()
         if self.picture is None:
-            self.picture = self.context.worker.submit(lambda: robot.image("hand"), latency_s=0.0, name="picture")
+            self.picture = self.context.worker.sense(
+                lambda: robot.image("hand"), lambda image: image, latency_s=0.0, name="picture"
+            )
         if self.picture.done():
             self.seen = self.picture.result()
 
@@ -250,11 +253,11 @@ def test_garbage_is_named(clock):
             return "full"
 
     with pytest.raises(GarbageError, match=r"'battery' with garbage: 'full' is no Battery"):
-        guarded(Odd()).battery()
+        GuardedRobot(Odd(), Watchdog()).battery()
 
 
 def test_numpy_truth_and_numbers_are_no_garbage():
-    from executive.run.verb_answers import garbage
+    from executive.run.verb_answers import garbage_check
     from skills.robot import Gripper
 
-    assert garbage("gripper", Gripper(1.0, np.float64(0.2), np.float32(3.0), np.bool_(True))) is None
+    assert garbage_check("gripper")(Gripper(1.0, np.float64(0.2), np.float32(3.0), np.bool_(True))) is None

@@ -1,12 +1,16 @@
 """A verb that hangs on the wall's clock is broken off."""
 
+import signal
 import threading
 import time
 
 import pytest
 
+from executive.run.guarded_robot import GuardedRobot
 from executive.run.outcome import Outcome
-from executive.run.watchdog import VerbHung, watched
+from executive.run.watchdog import VerbHung, Watchdog
+
+LIMIT_S = 0.05
 
 
 class Hanging:
@@ -23,30 +27,65 @@ class Hanging:
         return 3
 
 
-def test_a_hanging_verb_raises_soon():
-    robot = watched(Hanging(), limit_s=0.05)
+@pytest.fixture
+def watchdog():
+    with Watchdog(LIMIT_S) as watchdog:
+        yield watchdog
+
+
+@pytest.fixture
+def hanging(watchdog):
+    return GuardedRobot(Hanging(), watchdog, limit_s=LIMIT_S, image_limit_s=LIMIT_S)
+
+
+def test_a_hanging_verb_raises_soon(hanging):
     began = time.perf_counter()
     with pytest.raises(VerbHung, match=r"'drive' within 0\.05 s"):
-        robot.drive(1.0)
+        hanging.drive(1.0)
     assert time.perf_counter() - began < 1.0
 
 
-def test_other_verbs_pass_and_no_alarm_is_left_behind():
-    robot = watched(Hanging(), limit_s=0.05)
-    assert (robot.stop(), robot.name) == (3, "Alice")
-    time.sleep(0.1)
+def test_other_verbs_pass_and_nothing_is_overdue_afterwards(hanging):
+    assert (hanging.stop(), hanging.name) == (3, "Alice")
+    time.sleep(3 * LIMIT_S)
 
 
-def test_taking_an_image_has_its_own_limit():
-    assert watched(Hanging(), limit_s=0.02).image("hand") == "hand"
+def test_a_tick_that_hangs_is_named_before_the_verb_in_it(watchdog, hanging):
+    with pytest.raises(VerbHung, match="a tick of Alice"), watchdog.over_tick("Alice", 0.03):
+        hanging.drive(1.0)
+    time.sleep(3 * LIMIT_S)
 
 
-def test_calls_from_other_threads_are_let_through():
-    robot, results = watched(Hanging(), limit_s=0.05), []
-    thread = threading.Thread(target=lambda: results.append(robot.stop()))
+def test_an_alarm_of_somebody_else_goes_to_its_handler():
+    rung = []
+    before = signal.signal(signal.SIGALRM, lambda number, frame: rung.append(number))
+    try:
+        with Watchdog(LIMIT_S):
+            signal.raise_signal(signal.SIGALRM)
+        signal.raise_signal(signal.SIGALRM)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert rung == [signal.SIGALRM, signal.SIGALRM]
+
+
+def test_taking_an_image_has_its_own_limit(watchdog, monkeypatch):
+    monkeypatch.setattr("executive.run.guarded_robot.garbage_check", lambda verb: None)
+    assert GuardedRobot(Hanging(), watchdog, limit_s=0.02, image_limit_s=2.0).image("hand") == "hand"
+
+
+def test_calls_from_other_threads_are_let_through_and_given_up_when_they_hang(hanging):
+    results = []
+
+    def call():
+        results.append(hanging.stop())
+        with pytest.raises(VerbHung, match="'drive'"):
+            hanging.drive(1.0)
+        results.append("given up")
+
+    thread = threading.Thread(target=call)
     thread.start()
-    thread.join()
-    assert results == [3]
+    thread.join(timeout=2.0)
+    assert results == [3, "given up"]
 
 
 def test_a_hung_verb_ends_the_run_with_an_error(compiled, run_tree, make, robot, script):
@@ -55,7 +94,7 @@ def test_a_hung_verb_ends_the_run_with_an_error(compiled, run_tree, make, robot,
         skill.context.robot.imu()
 
     script.ends["navigate"] = hang
-    result = run_tree(compiled(*make.FETCH), settings={"verb_limit_s": 0.05})
+    result = run_tree(compiled(*make.FETCH), settings={"verb_limit_s": LIMIT_S})
     assert result.outcome is Outcome.ERROR
     assert "'imu'" in result.worst.message
     assert (robot.driving, robot.holder) == (False, None)

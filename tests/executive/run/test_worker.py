@@ -5,6 +5,8 @@ import time
 
 import pytest
 
+from executive.run.guarded_robot import GuardedRobot
+from executive.run.watchdog import Watchdog
 from executive.run.worker import LockStepWorker, ThreadWorker
 
 
@@ -18,10 +20,74 @@ def test_lock_step_result_appears_after_its_latency(clock):
     assert (job.done(), job.result()) == (True, 42)
 
 
-def test_lock_step_runs_at_once_in_this_thread(clock):
-    threads = []
-    LockStepWorker(clock).submit(lambda: threads.append(threading.current_thread()), latency_s=1.0, name="who")
-    assert threads == [threading.main_thread()]
+@pytest.fixture
+def worker(clock):
+    with LockStepWorker(clock) as worker:
+        yield worker
+
+
+def test_lock_step_starts_at_once_and_time_goes_on_meanwhile(worker, clock):
+    begun, gate = threading.Event(), threading.Event()
+    job = worker.submit(lambda: (begun.set(), gate.wait(5.0)), latency_s=0.2, name="slow")
+    assert begun.wait(5.0)
+    clock.advance(0.1)
+    assert (clock.now(), job.done()) == (0.1, False)
+    gate.set()
+
+
+def test_a_result_that_is_due_is_waited_for(worker, clock):
+    job = worker.submit(lambda: (time.sleep(0.05), 7)[1], latency_s=0.0, name="slow")
+    assert (job.done(), job.result()) == (True, 7)
+
+
+def test_work_is_done_in_the_order_in_which_it_was_submitted_by_one_thread(worker):
+    done = []
+    jobs = [
+        worker.submit(lambda n=n: done.append((n, threading.current_thread())), latency_s=0.0, name=str(n))
+        for n in range(20)
+    ]
+    for job in reversed(jobs):
+        job.result()
+    assert [number for number, _ in done] == list(range(20))
+    assert len({thread for _, thread in done} - {threading.main_thread()}) == 1
+
+
+def test_lock_step_reads_sensors_at_once_in_this_thread(worker):
+    job = worker.sense(threading.current_thread, lambda given: (given, threading.current_thread()),
+                       latency_s=0.0, name="who")  # fmt: skip
+    read_by, done_by = job.result()
+    assert (read_by, done_by is read_by) == (threading.main_thread(), False)
+
+
+def test_what_reading_raised_is_raised_by_result(worker):
+    job = worker.sense(lambda: 1 / 0, lambda given: given, latency_s=0.0, name="bad")
+    with pytest.raises(ZeroDivisionError):
+        job.result()
+
+
+def test_a_withdrawn_job_no_longer_runs(worker):
+    ended = []
+    worker.submit(lambda: (time.sleep(0.05), ended.append(1)), latency_s=9.0, name="slow").withdraw()
+    assert ended == [1]
+
+
+def test_closing_waits_for_what_runs_drops_the_rest_and_ends_the_thread(clock):
+    others = set(threading.enumerate())
+    worker, begun, done = LockStepWorker(clock), threading.Event(), []
+    worker.submit(lambda: (begun.set(), time.sleep(0.05), done.append("first")), latency_s=0.0, name="first")
+    worker.submit(lambda: done.append("second"), latency_s=0.0, name="second")
+    assert begun.wait(5.0)
+    worker.close()
+    assert done == ["first"]
+    assert set(threading.enumerate()) <= others
+    with pytest.raises(RuntimeError, match="closed"):
+        worker.submit(lambda: 1, latency_s=0.0, name="late")
+
+
+def test_a_job_may_not_touch_the_robot(worker, robot):
+    guarded = GuardedRobot(robot, Watchdog())
+    with pytest.raises(RuntimeError, match=r"'odometry' was asked for inside a job"):
+        worker.submit(guarded.odometry, latency_s=0.0, name="bad").result()
 
 
 def test_what_the_work_raised_is_raised_by_result(clock):

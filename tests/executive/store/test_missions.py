@@ -12,7 +12,7 @@ from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.run.journal import TickNote
 from executive.store.missions import MissionState, MissionStore
-from executive.tree.snapshot import NodeState, Transition
+from executive.tree.snapshot import Change, NodeState
 from skills.api import Cause
 from skills.robot import Pose2D
 
@@ -28,11 +28,22 @@ def path(tmp_path):
 
 
 def changed(path_id, status, cause=None, message=""):
-    return Transition(path_id, NodeState(), NodeState(status, cause, message))
+    return Change(path_id, NodeState(), NodeState(status, cause, message))
 
 
 def note(*changes, now_s=1.0, board=None, pose=None, checkpoints=None):
     return TickNote(now_s, changes, board or {}, pose, checkpoints or {})
+
+
+def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose(path):
+    with MissionStore(path) as store:
+        mission, kept = store.add(REQUEST, queued=False).id, []
+        journal = store.journal(mission)
+        journal.keep_world = lambda: kept.append(store.has_steps(mission))
+        journal.note(note(pose=Pose2D(1.0, 2.0, 0.5)))
+        assert (kept, store.mission(mission).pose) == ([], Pose2D(1.0, 2.0, 0.5))
+        journal.note(note(changed("a/b", Status.RUNNING), now_s=1.1))
+        assert (kept, store.has_steps(mission)) == ([False], True)
 
 
 def test_missions_keep_their_order_and_states(path):

@@ -22,13 +22,15 @@ def make(seed=3):
 def kept(tmp_path_factory):
     """A plant that was given up while its robot walked, and where it kept its state."""
     simulation, path = make(), tmp_path_factory.mktemp("kept") / "flat.plant"
-    simulation.keep_in(path, label="7")
+    keep = simulation.keep_in(path, label="7")
     robot = simulation.robots["Alice"]
     lease = robot.acquire_lease("test")
     for _ in range(30):
         robot.drive(0.6, 0.0, 0.4, until_s=simulation.clock.now() + 0.5, lease=lease)
         robot.set_gripper(0.6, 30.0, until_s=simulation.clock.now() + 0.5, lease=lease)
         simulation.clock.advance(0.05)
+    assert read_snapshot(path).number == 2  # at the beginning and after a second
+    keep()
     return simulation, path
 
 

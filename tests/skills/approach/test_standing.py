@@ -9,7 +9,7 @@ from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectObservation, Thing
 from skills.approach.skill import grasp_cost, observed_target
-from skills.approach.standing import is_comfortable, standing_poses
+from skills.approach.standing import free_places, is_comfortable, reachable
 from skills.grasp.planning import GeometricGraspPlanner
 from skills.robot import Pose2D
 
@@ -28,7 +28,7 @@ class _Table:
 
 
 def _poses(reach_cost=lambda pose: 0.0):
-    return standing_poses((2.15, 0.0), Pose2D(0.5, 0.3, 0.0), _Table(), CAPABILITIES, reach_cost)
+    return reachable(free_places((2.15, 0.0), Pose2D(0.5, 0.3, 0.0), _Table(), CAPABILITIES), reach_cost)
 
 
 def test_the_body_keeps_off_the_table_and_faces_the_thing():

@@ -3,7 +3,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from planar_robot import Bench, Box
+from planar_robot import Bench, Box, NamingWorker
 
 from skills.api import Cause, Failed, Running, Step, Succeeded
 from skills.navigate.skill import Navigate, NavigateInputs
@@ -240,3 +240,24 @@ def test_planned_path_is_published_with_the_robots_name():
     topic, message = bench.published[0]
     assert topic == "path" and message["robot"] == "alice"
     assert message["poses"][0][:2] == pytest.approx([START.x_m, START.y_m], abs=0.05)
+
+
+class WaitingWorker(NamingWorker):
+    """Does work before `submit` comes back."""
+
+    def submit(self, work, *, latency_s, name):
+        job = super().submit(work, latency_s=latency_s, name=name)
+        job.withdraw()
+        return job
+
+
+def test_the_way_is_the_same_whether_work_is_done_at_once_or_beside_the_ticks():
+    ways = []
+    for worker in (NamingWorker, WaitingWorker):
+        bench, way = Bench(START, unmapped=[Box(3.5, 3.4, 3.7, 3.6)]), []
+        bench.worker = worker(bench.clock)
+        go(bench, CORRIDOR, each=lambda bench=bench, way=way: way.append(str(bench.robot.pose)))
+        ways.append((way, bench.worker.names))
+        bench.worker.close()
+    assert len(ways[0][0]) > 50
+    assert ways[0] == ways[1]

@@ -11,9 +11,8 @@ from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import load_grid_map
 from skills.navigate.footprint import Footprint, footprint_clear, footprint_clearance_m, pose_array
-from skills.navigate.motion_cost import PlannerOptions
 from skills.navigate.path import path_length
-from skills.navigate.planner import NoWayError, plan_path
+from skills.navigate.planner import LatticePlanner, NoWayError, plan_path
 from skills.robot import Pose2D
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)
@@ -34,7 +33,7 @@ def test_clearance_of_the_outline_is_exact_at_sides_ends_and_corners():
 def test_way_leads_through_both_doors_and_clears_them():
     costmap = costmap_of()
     path = plan_path(costmap, FOOTPRINT, LEFT_ROOM, RIGHT_ROOM)
-    assert footprint_clearance_m(costmap, FOOTPRINT, path.poses).min() >= PlannerOptions().margin_m - 0.01
+    assert footprint_clearance_m(costmap, FOOTPRINT, path.poses).min() >= LatticePlanner().margin_m - 0.01
     for door_x in (2.45, 7.45):
         inside = np.abs(path.poses[:, 1] - 4.05) < 0.05
         assert np.min(np.abs(path.poses[inside, 0] - door_x)) < 0.2

@@ -102,7 +102,7 @@ def test_a_localiser_that_cannot_search_is_a_failed_precondition():
 def test_searching_changes_nothing_until_it_is_accepted():
     bench = lost_bench(FAR)
     before = bench.localiser.estimate()
-    found = bench.localiser.search(bench.robot.scan(), None)
+    found = bench.localiser.search(bench.robot.scan(), bench.localiser.estimate(), None)
     assert bench.localiser.estimate().X_WO.IsExactlyEqualTo(before.X_WO)
     bench.localiser.accept(found)
     assert bench.localiser.estimate().X_WO.IsNearlyEqualTo(found.X_WO, 1e-9)

@@ -26,7 +26,7 @@ def test_the_place_is_that_of_the_robot():
 def test_a_lost_place_can_be_searched_and_accepted():
     robot, place = ScriptedRobot(VirtualClock()), KnownPlace()
     place.localised = False
-    found = place.search(robot.scan(), None)
+    found = place.search(robot.scan(), place.estimate(), None)
     place.accept(found)
     assert place.estimate().localised
     assert isinstance(place, SearchingLocaliser)

@@ -36,6 +36,12 @@ class ScriptedBackend:
     def judge(self, tree, result):
         self.asked.append((tree.mission_name, result.outcome))
 
+    def attach(self, profile):
+        self.asked.append(profile)
+
+    def work(self):
+        return {"calls": len(self.robot.calls)}
+
     def leave(self, artifacts, out):
         return None
 

@@ -78,7 +78,7 @@ def test_goes_around_a_thing_that_the_lidar_sees():
     step, _ = go(bench, OTHER_ROOM)
     assert isinstance(step, Succeeded), step.message
     assert bench.robot.least_clearance_m > 0.03
-    assert bench.worker.names.count("plan a way") >= 2
+    assert bench.worker.names.count("plan a path") >= 2
 
 
 def test_goes_around_a_thing_too_low_for_the_lidar():

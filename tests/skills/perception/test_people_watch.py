@@ -65,11 +65,29 @@ def test_both_front_cameras_are_looked_through_more_often_while_something_unexpl
     assert bench.worker.names.count("look for people") == len(detector.pictures)
 
 
-def test_depth_is_asked_for_only_when_somebody_is_seen():
-    bench, detector, _ = watched(seconds=4.0)
-    assert bench.robot.images_taken == sum(detector.pictures)
-    bench, detector, _ = watched(person_at(3.5, 5.5), seconds=4.0)
-    assert bench.robot.images_taken > sum(detector.pictures)
+def depths_asked_for(people, *, with_lidar):
+    """Whether each picture of some seconds was taken with depth."""
+    bench, asked = Bench(START, unmapped=people), []
+    take = bench.robot.image
+    bench.robot.image = lambda source, **wanted: asked.append(wanted["depth"]) or take(source, **wanted)
+    if not with_lidar:
+        bench.robot.scan = lambda: None
+    watch = PeopleWatch(replace(bench.context(), detector=PeopleDetector(bench, people)))
+    look(bench, watch, 2.0)
+    return asked, watch.people()
+
+
+def test_depth_is_taken_only_where_somebody_may_be_near():
+    asked, _ = depths_asked_for([], with_lidar=True)
+    assert set(asked) == {False}
+    asked, people = depths_asked_for([person_at(3.5, 5.5)], with_lidar=True)
+    assert (asked[-1], len(people)) == (True, 1)
+
+
+def test_who_is_suspected_without_depth_is_looked_at_with_depth_at_once():
+    asked, people = depths_asked_for([person_at(3.5, 5.5)], with_lidar=False)
+    assert asked[:4] == [False, False, True, True]
+    assert len(people) == 1
 
 
 def test_a_person_counts_when_seen_twice_and_the_second_look_comes_soon():

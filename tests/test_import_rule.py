@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 OURS = ("executive", "skills", "plant")
 WORDS = ("class_ids", "command", "errors", "geometry", "knowledge", "yaml_source")
 HOMES = (
-    tuple(f"executive.mission.{name}" for name in WORDS),
+    (*(f"executive.mission.{name}" for name in WORDS), "executive.record.profile", "executive.record.work"),
     ("executive.language",),
     ("executive.speech",),
     ("executive.mission",),

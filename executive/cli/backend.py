@@ -41,17 +41,17 @@ class Backend(Protocol):
             InputError: there is no such robot, or something that it needs cannot be read.
         """
 
+    def work(self) -> Mapping[str, int]:
+        """What the backend itself computed, as counters by name; empty for a real robot."""
+
+    def attach(self, profile: Profile) -> None:
+        """Time the backend's own subsystems."""
+
     def show_live(self) -> Scene | None:
         """Begin to show the world, where that can be done."""
 
     def judge(self, tree: CompiledTree, result: RobotResult) -> RefereeReport | None:
         """What a referee saw; None where there is none."""
-
-    def work(self) -> Mapping[str, int]:
-        """What it computed so far, as counters by name."""
-
-    def time_parts(self, profile: Profile) -> None:
-        """Let its parts be timed from now on."""
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Write what was recorded into a folder; the recording's path, None where there is none."""

@@ -75,8 +75,7 @@ def run(
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=not no_wake, console=console)
         asked = Request(say, file, world, not no_wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
-        begin = partial(run_simulated, profile=timing)
-        finished, page = _run_kept(asked, kept_in, begin, quiet=quiet, console=console, page=page_of)
+        finished, page = _run_kept(asked, kept_in, quiet=quiet, console=console, page=page_of, profile=timing)
     if timing is not None:
         for line in lines(timing.table()):
             console.print(line, markup=False)
@@ -125,7 +124,7 @@ def evaluate(
 
 
 def _run_kept(
-    asked: Request, store: Path, begin: Callable[..., Finished], *, quiet: bool, console: Console, page: PageOf
+    asked: Request, store: Path, *, quiet: bool, console: Console, page: PageOf, profile: Profile | None
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
     prepared = prepare(asked)
@@ -139,7 +138,7 @@ def _run_kept(
         with kept(missions, mission) as ended:
             control = control_for(console, quiet=quiet) if shown is None else shown.control
             durable = new_run(missions, mission)
-            start = partial(begin, prepared, page=shown, durable=durable)
+            start = partial(run_simulated, prepared, page=shown, durable=durable, profile=profile)
             talk = None if shown is None else shown.conversation
             finished = show_run(start, prepared, console, control=control, quiet=quiet, conversation=talk)
             ended(finished.report)

@@ -22,7 +22,7 @@ def profiled(
     worker: LockStepWorker,
 ) -> Callable[..., Any]:
     """The run with its parts timed; what none of them takes is the executive's own."""
-    backend.time_parts(profile)
+    backend.attach(profile)
     profile.attach("localiser", entry.localiser, "update")
     profile.attach("costmap", entry.costmap, "update", "add_points", "clearance_m")
     if isinstance(entry.detector, CountedDetector):

@@ -50,6 +50,20 @@ class SimulatedBackend:
         durable.journal.keep_world = self._simulation.keep_in(durable.plant, label=durable.label)
         return replace(entry, journal=durable.journal)
 
+    def work(self) -> Mapping[str, int]:
+        """The plant's counters."""
+        counts: Mapping[str, int] = self._simulation.work()
+        return counts
+
+    def attach(self, profile: Profile) -> None:
+        """Time the plant's steps, the referee, and each robot's control, sensors and pictures."""
+        profile.attach("plant", self._simulation.clock, "advance")
+        profile.attach("referee", self._simulation.referee, "observe")
+        for robot in self._simulation.robots.values():
+            profile.attach("joint control", robot, "control")
+            profile.attach("LiDAR and other sensors", robot, "sense")
+            profile.attach("rendering", robot, "image")
+
     def show_live(self) -> Scene:
         """The plant's live scene."""
         scene: Scene = self._simulation.show_live()
@@ -60,19 +74,6 @@ class SimulatedBackend:
         verdict = judge(self._simulation, tree, result)
         events = self._simulation.referee.events
         return RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops, events)
-
-    def work(self) -> Mapping[str, int]:
-        """What the plant computed."""
-        return self._simulation.work()
-
-    def time_parts(self, profile: Profile) -> None:
-        """Plant, referee, and each robot's control, sensors and pictures."""
-        profile.attach("plant", self._simulation.clock, "advance")
-        profile.attach("referee", self._simulation.referee, "observe")
-        for robot in self._simulation.robots.values():
-            profile.attach("joint control", robot, "control")
-            profile.attach("LiDAR and other sensors", robot, "sense")
-            profile.attach("rendering", robot, "image")
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Write recording and pictures, where the run was recorded."""

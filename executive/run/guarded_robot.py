@@ -109,7 +109,12 @@ class GuardedRobot:
         return guarded_call
 
     def _elsewhere(self, verb: str, call: Callable[[], Any], limit_s: float) -> Any:
-        """A verb outside the main thread. Pictures are not watched there: what renders them is bound to its thread."""
+        """A verb outside the main thread. Pictures are not watched there: what renders them is bound to its thread.
+
+        Raises RuntimeError inside a job in lock-step for all but `capabilities`, which never change.
+        """
         if in_lock_step_job():
+            if verb == "capabilities":
+                return call()
             raise RuntimeError(f"'{verb}' was asked for inside a job: read the robot before, or by `Worker.sense`")
         return call() if verb == "image" else done_aside(call, verb, limit_s)

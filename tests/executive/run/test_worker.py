@@ -8,6 +8,9 @@ import pytest
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.watchdog import Watchdog
 from executive.run.worker import LockStepWorker, ThreadWorker
+from plant.spot.capabilities import spot_capabilities
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot
 
 
 def test_lock_step_result_appears_after_its_latency(clock):
@@ -88,6 +91,12 @@ def test_a_job_may_not_touch_the_robot(worker, robot):
     guarded = GuardedRobot(robot, Watchdog())
     with pytest.raises(RuntimeError, match=r"'odometry' was asked for inside a job"):
         worker.submit(guarded.odometry, latency_s=0.0, name="bad").result()
+
+
+def test_a_job_may_ask_for_capabilities_which_never_change(worker):
+    guarded = GuardedRobot(ScriptedRobot(VirtualClock(), capabilities=spot_capabilities()), Watchdog())
+    job = worker.submit(guarded.capabilities, latency_s=0.0, name="good")
+    assert job.result() == spot_capabilities()
 
 
 def test_what_the_work_raised_is_raised_by_result(clock):

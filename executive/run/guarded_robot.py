@@ -18,6 +18,8 @@ class GarbageError(RuntimeError):
     """A verb of the Robot protocol gave back what the protocol does not allow."""
 
 
+_NEVER_CHANGING = frozenset({"capabilities"})
+"""Verbs that a job may ask as well: their answers stay the same."""
 _NOTHING_YET: Final = object()
 
 
@@ -110,6 +112,6 @@ class GuardedRobot:
 
     def _elsewhere(self, verb: str, call: Callable[[], Any], limit_s: float) -> Any:
         """A verb outside the main thread. Pictures are not watched there: what renders them is bound to its thread."""
-        if in_lock_step_job():
+        if in_lock_step_job() and verb not in _NEVER_CHANGING:
             raise RuntimeError(f"'{verb}' was asked for inside a job: read the robot before, or by `Worker.sense`")
         return call() if verb == "image" else done_aside(call, verb, limit_s)

@@ -18,6 +18,8 @@ class GarbageError(RuntimeError):
     """A verb of the Robot protocol gave back what the protocol does not allow."""
 
 
+_NEVER_CHANGING = frozenset({"capabilities"})
+"""Verbs that a job may ask as well: their answers stay the same."""
 _NOTHING_YET: Final = object()
 
 
@@ -109,12 +111,9 @@ class GuardedRobot:
         return guarded_call
 
     def _elsewhere(self, verb: str, call: Callable[[], Any], limit_s: float) -> Any:
-        """A verb outside the main thread. Pictures are not watched there: what renders them is bound to its thread.
-
-        Raises RuntimeError inside a job in lock-step for all but `capabilities`, which never change.
-        """
+        """A verb outside the main thread. Pictures are not watched there: what renders them is bound to its thread."""
         if in_lock_step_job():
-            if verb == "capabilities":
+            if verb in _NEVER_CHANGING:
                 return call()
             raise RuntimeError(f"'{verb}' was asked for inside a job: read the robot before, or by `Worker.sense`")
         return call() if verb == "image" else done_aside(call, verb, limit_s)

@@ -16,6 +16,7 @@ from skills.api import Cause, Failed, Running, Skill, Succeeded
 def leaf_of(context):
     def make(name, steps, log, **hooks):
         class Listed(Skill):
+            name: ClassVar[str] = "listed"
             Inputs: ClassVar[type] = dict
 
             def begin(self, inputs):

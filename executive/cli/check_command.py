@@ -12,16 +12,16 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from executive.cli.assembly import abilities_of, itinerary_of
+from executive.cli.feasibility import abilities_of, itinerary_of
 from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import DependencyParser, load_parser
 from executive.mission.errors import InputError
 from executive.mission.knowledge import Knowledge
 from executive.mission.mission import MissionFile, load_mission, mission_from_file, overridden
-from executive.tree.check import PlannedWays, check_tree
+from executive.tree.check import check_tree
 from executive.tree.compiler import CompiledTree, compile_mission
-from executive.tree.estimate import Estimate, load_estimates
+from executive.tree.estimate import Estimate, Itinerary, load_estimates
 from executive.tree.registry import installed_skills
 from executive.view.collapse import folded_to
 from executive.view.model import node_view
@@ -69,16 +69,16 @@ class Checker:
             knowledge = overridden(loaded, opened.knowledge)
             mission = mission_from_file(loaded, parser=self.parser, knowledge=knowledge)
             tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
+            checked = check_tree(
+                tree,
+                knowledge=knowledge,
+                start=opened.world.start,
+                abilities=abilities_of(),
+                itinerary=opened.ways,
+                estimates=load_estimates(),
+            )
         except InputError as error:
             return CheckedFile(file, _placed(file, (error, *error.others)))
-        checked = check_tree(
-            tree,
-            knowledge=knowledge,
-            start=opened.world.start,
-            abilities=abilities_of(),
-            itinerary=opened.ways,
-            estimates=load_estimates(),
-        )
         return CheckedFile(file, _placed(file, checked.errors), tree, checked.estimate)
 
     def _open(self, loaded: MissionFile) -> _Opened:
@@ -100,7 +100,7 @@ class _Opened:
 
     world: World
     knowledge: Knowledge
-    ways: PlannedWays
+    ways: Itinerary
 
 
 def check(

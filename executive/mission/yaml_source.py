@@ -51,7 +51,7 @@ def read_yaml(path: Path | str) -> YamlSource:
     try:
         text = _text(file)
         _refuse_aliases(text, file)
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        root = _composed(text)
         data = None if root is None else _plain(root)
     except OSError as error:
         raise InputError(f"cannot read it ({error.strerror})", mend="name a file that exists", file=file) from error
@@ -87,6 +87,15 @@ def _text(file: Path) -> str:
         what = f"it is too large ({size} bytes; at most {MAX_BYTES} are read)"
         raise InputError(what, mend="split it into files that use each other", file=file, line=1)
     return file.read_text(encoding="utf-8")
+
+
+def _composed(text: str) -> yaml.Node | None:
+    """The document as nodes, read fast; of a broken one the slow reader says more."""
+    try:
+        node: yaml.Node | None = yaml.compose(text, Loader=yaml.CSafeLoader)
+    except yaml.YAMLError:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    return node
 
 
 def _refuse_aliases(text: str, file: Path) -> None:

@@ -7,10 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Box as BoxShape
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
-from pydrake.planning import BodyShapeDescription, RobotDiagramBuilder, SceneGraphCollisionChecker
 
 from skills.arm.kinematics import ArmModel
 from skills.robot import Capabilities, FloatArray
@@ -40,6 +37,9 @@ class ArmScene:
         joint_positions_rad: Mapping[str, float],
         padding_m: float = 0.01,
     ) -> None:
+        from pydrake.multibody.parsing import Parser
+        from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
+
         self.model = model
         builder = RobotDiagramBuilder()
         plant = builder.plant()
@@ -106,6 +106,9 @@ class ArmScene:
         return q
 
     def _add(self, group: str, box: Box, instance: str, body: str) -> None:
+        from pydrake.geometry import Box as BoxShape
+        from pydrake.planning import BodyShapeDescription
+
         shape = BodyShapeDescription(BoxShape(*box.size_m), box.X_FG, instance, body)
         self._checker.AddCollisionShape(group, shape)
 

@@ -53,6 +53,7 @@ def read_yaml(path: Path | str) -> YamlSource:
         _refuse_aliases(text, file)
         root = _composed(text)
         data = None if root is None else _plain(root)
+        places = list(_walk(root, ()))
     except OSError as error:
         raise InputError(f"cannot read it ({error.strerror})", mend="name a file that exists", file=file) from error
     except UnicodeDecodeError as error:
@@ -72,7 +73,7 @@ def read_yaml(path: Path | str) -> YamlSource:
     except RecursionError as error:
         raise InputError("it is nested too deeply", mend="write it flatter", file=file, line=1) from error
     lines: dict[KeyPath, int] = {}
-    for key_path, line in _walk(root, ()):
+    for key_path, line in places:
         if key_path in lines:
             what = f"key {key_path[-1]!r} stands twice (first in line {lines[key_path]})"
             raise InputError(what, mend="remove one of the two", file=file, line=line)

@@ -33,7 +33,17 @@ if TYPE_CHECKING:
     from skills.navigate.footprint import Footprint
     from skills.navigate.path import Path as WayPath
 
-__all__ = ["DEFAULT_FILE", "SLOTS", "RobotStack", "StackError", "default_stack", "plain", "stack_of", "stack_schema"]
+__all__ = [
+    "DEFAULT_FILE",
+    "SLOTS",
+    "RobotStack",
+    "StackError",
+    "default_component",
+    "default_stack",
+    "plain",
+    "stack_of",
+    "stack_schema",
+]
 
 SLOTS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -189,9 +199,20 @@ class StackError(ValueError):
 @cache
 def default_stack() -> RobotStack:
     """The stack that comes with the project."""
+    return stack_of(_default_data())
+
+
+@cache
+def _default_data() -> dict[str, Any]:
     import yaml
 
-    return stack_of(yaml.safe_load(DEFAULT_FILE.read_text(encoding="utf-8")))
+    data: dict[str, Any] = yaml.load(DEFAULT_FILE.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
+    return data
+
+
+def default_component(slot: str) -> Any:
+    """The component that fills a slot of the stack that comes with the project; of the others nothing is imported."""
+    return _component(slot, _default_data()[slot])[1]
 
 
 def stack_of(data: Any) -> RobotStack:
@@ -227,9 +248,7 @@ def components(slot: str) -> Mapping[str, type]:
 
 
 def _names(slot: str) -> list[str]:
-    import yaml
-
-    first = yaml.safe_load(DEFAULT_FILE.read_text(encoding="utf-8"))[slot][USE]
+    first = _default_data()[slot][USE]
     return sorted({entry.name for entry in entry_points(group=SLOTS[slot])}, key=lambda name: (name != first, name))
 
 

@@ -4,24 +4,18 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from xml.etree import ElementTree
 
 from executive.cli.goal_conditions import promises_of
 from executive.mission.errors import InputError
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
-from executive.tree.check import Abilities, PlannedWays
 from executive.tree.compiler import CompiledTree
-from plant.models.catalogue import load_catalogue
 from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
-from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError
 from skills.detection import Detector
 from skills.estimate.grid_map import MapError, load_grid_map
-from skills.navigate.footprint import Footprint
-from skills.perception.attributes import known_attributes
 from skills.perception.detector.network_file import ModelFileError
 from skills.robot import Pose2D
 from skills.stack import DetectorComponent, RobotStack, default_stack
@@ -94,26 +88,3 @@ def judge(simulation: Simulation, tree: CompiledTree, result: RobotResult) -> Ve
     """What the referee says of the mission's goal conditions."""
     verdict: Verdict = simulation.referee.judge(promises_of(tree, result))
     return verdict
-
-
-def itinerary_of(world: World) -> PlannedWays:
-    """Ways on a world's surveyed map, for the robot's footprint. Raises InputError when the map cannot be read."""
-    try:
-        keepout_map = load_grid_map(world.keepout_map_path)
-    except (MapError, OSError) as error:
-        raise InputError(str(error)) from error
-    return PlannedWays(default_stack().costmap.build(keepout_map), Footprint.of(spot_capabilities()))
-
-
-@cache
-def abilities_of() -> Abilities:
-    """What the robot can lift, and what the things weigh that there are models of."""
-    masses = {name: _mass_kg(one.path()) for name, one in load_catalogue().items() if one.file is not None}
-    arm = spot_capabilities().arm
-    lift_kg = 0.0 if arm is None else arm.max_payload_kg
-    return Abilities(masses, lift_kg, frozenset(shared_detector().class_names), known_attributes())
-
-
-def _mass_kg(sdf: Path) -> float:
-    """The mass of a model, all its links together."""
-    return sum(float(mass.text or 0.0) for mass in ElementTree.parse(sdf).iter("mass"))

@@ -12,15 +12,15 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from executive.cli.assembly import abilities_of, itinerary_of
+from executive.cli.feasibility import abilities_of, itinerary_of
 from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.cli.requests import prepare
 from executive.language import load_parser
 from executive.mission.errors import InputError
 from executive.mission.request import Request
-from executive.tree.check import PlannedWays, check_tree
+from executive.tree.check import check_tree
 from executive.tree.compiler import CompiledTree
-from executive.tree.estimate import Estimate, load_estimates
+from executive.tree.estimate import Estimate, Itinerary, load_estimates
 from executive.tree.node_view import node_view
 from executive.view.collapse import folded_to
 from executive.view.text import to_rich
@@ -53,7 +53,7 @@ class Checker:
 
     def __init__(self, world: str | None = None) -> None:
         self._world, self._parser = world, cache(load_parser)
-        self._ways: dict[Path, PlannedWays] = {}
+        self._ways: dict[Path, Itinerary] = {}
 
     def check(self, file: Path) -> CheckedFile:
         """Check one file; raises nothing for what stands in it."""
@@ -63,16 +63,16 @@ class Checker:
             tree, world = prepared.tree, prepared.world
             if world.folder not in self._ways:
                 self._ways[world.folder] = itinerary_of(world)
+            checked = check_tree(
+                tree,
+                knowledge=prepared.knowledge,
+                start=world.start,
+                abilities=abilities_of(),
+                itinerary=self._ways[world.folder],
+                estimates=load_estimates(),
+            )
         except InputError as error:
             return CheckedFile(file, _placed(file, (error, *error.others)), tree)
-        checked = check_tree(
-            tree,
-            knowledge=prepared.knowledge,
-            start=world.start,
-            abilities=abilities_of(),
-            itinerary=self._ways[world.folder],
-            estimates=load_estimates(),
-        )
         return CheckedFile(file, _placed(file, checked.errors), tree, checked.estimate)
 
 

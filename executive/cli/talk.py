@@ -36,7 +36,7 @@ class LateParser:
 
     def load_ahead(self) -> None:
         """Begin to load it."""
-        threading.Thread(target=self, name="errand-parser", daemon=True).start()
+        threading.Thread(target=lambda: self().load(), name="errand-parser", daemon=True).start()
 
 
 def conversation_of(

@@ -7,12 +7,14 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache, cached_property
 from itertools import islice
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from executive.language.nouns import FloatArray, NounKind, NounKinds, noun_examples
 from executive.language.repairs import repaired
@@ -44,12 +46,27 @@ class DependencyParser(Protocol):
 class SpacyParser:
     """spaCy with the English model that comes as a package; its word vectors also judge the kinds of nouns."""
 
-    def __init__(self, pipeline: Language) -> None:
-        self._pipeline = pipeline
-        self._nouns = NounKinds.learn(noun_examples(), self.vector)
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
         self._kinds: dict[tuple[str, ...], NounKind | None] = {}
-        frequent = islice(pipeline.vocab.vectors.keys(), FREQUENT_WORDS)
-        self._frequent = np.sort(np.fromiter(frequent, dtype=np.uint64))
+
+    def load(self) -> None:
+        """Load the model now, in any thread."""
+        self.parse("go")
+
+    @cached_property
+    def _pipeline(self) -> Language:
+        return _pipeline_in(self._folder)
+
+    @cached_property
+    def _nouns(self) -> NounKinds:
+        return NounKinds.learn(noun_examples(), self.vector)
+
+    @cached_property
+    def _frequent(self) -> npt.NDArray[np.uint64]:
+        """The keys of the frequent words, in order."""
+        frequent = islice(self._pipeline.vocab.vectors.keys(), FREQUENT_WORDS)
+        return np.sort(np.fromiter(frequent, dtype=np.uint64))
 
     def parse(self, text: str) -> tuple[Token, ...]:
         """The words of `text`, in order."""
@@ -89,10 +106,9 @@ class SpacyParser:
         return float(first.similarity(second)) if first.has_vector and second.has_vector else 0.0
 
 
+@cache
 def load_parser() -> SpacyParser:
-    """Load the model (about half a second).
-
-    Its store of strings is left out: that holds every word of the vectors, and only the labels are ever looked up.
+    """The parser of this process; its model is loaded when it is first needed.
 
     Raises:
         InputError: the model's package is not installed.
@@ -101,14 +117,29 @@ def load_parser() -> SpacyParser:
     folders = [] if spec is None or spec.origin is None else sorted(Path(spec.origin).parent.glob("en_core_web_*"))
     if not folders:
         raise InputError(f"the language model {_MODEL_PACKAGE!r} is missing", mend="install it with 'make env'")
+    return SpacyParser(folders[-1])
+
+
+def _pipeline_in(folder: Path) -> Language:
+    """The model in a folder.
+
+    Its store of strings is left out: that holds every word of the vectors, and only the labels are ever looked up. The
+    tokenizer's rules come from the folder alone, not first from the language's defaults, which takes as long again.
+    """
     with _spacy_without_command_line():
-        from spacy.util import load_model_from_path
+        from spacy.tokenizer import Tokenizer
+        from spacy.util import get_model_meta, load_config, load_model_from_config, registry
+    left_out = ["senter", "ner", "strings"]
+    registry.tokenizers("errand.empty", func=lambda: lambda pipeline: Tokenizer(pipeline.vocab))
+    config = load_config(folder / "config.cfg")
+    config["nlp"]["tokenizer"] = {"@tokenizers": "errand.empty"}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"\[W095\]")  # trained with a release a little older
-        pipeline = load_model_from_path(folders[-1], exclude=["senter", "ner", "strings"])
+        pipeline = load_model_from_config(config, vocab=True, exclude=left_out, meta=get_model_meta(folder))
+        pipeline.from_disk(folder, exclude=left_out)
     for label in (label for _, pipe in pipeline.pipeline for label in getattr(pipe, "labels", ())):
         pipeline.vocab.strings.add(label)
-    return SpacyParser(pipeline)
+    return pipeline
 
 
 @contextmanager

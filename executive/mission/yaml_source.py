@@ -51,8 +51,9 @@ def read_yaml(path: Path | str) -> YamlSource:
     try:
         text = _text(file)
         _refuse_aliases(text, file)
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        root = _composed(text)
         data = None if root is None else _plain(root)
+        places = list(_walk(root, ()))
     except OSError as error:
         raise InputError(f"cannot read it ({error.strerror})", mend="name a file that exists", file=file) from error
     except UnicodeDecodeError as error:
@@ -72,7 +73,7 @@ def read_yaml(path: Path | str) -> YamlSource:
     except RecursionError as error:
         raise InputError("it is nested too deeply", mend="write it flatter", file=file, line=1) from error
     lines: dict[KeyPath, int] = {}
-    for key_path, line in _walk(root, ()):
+    for key_path, line in places:
         if key_path in lines:
             what = f"key {key_path[-1]!r} stands twice (first in line {lines[key_path]})"
             raise InputError(what, mend="remove one of the two", file=file, line=line)
@@ -87,6 +88,15 @@ def _text(file: Path) -> str:
         what = f"it is too large ({size} bytes; at most {MAX_BYTES} are read)"
         raise InputError(what, mend="split it into files that use each other", file=file, line=1)
     return file.read_text(encoding="utf-8")
+
+
+def _composed(text: str) -> yaml.Node | None:
+    """The document as nodes, read fast; of a broken one the slow reader says more."""
+    try:
+        node: yaml.Node | None = yaml.compose(text, Loader=yaml.CSafeLoader)
+    except yaml.YAMLError:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    return node
 
 
 def _refuse_aliases(text: str, file: Path) -> None:

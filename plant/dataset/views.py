@@ -12,9 +12,9 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from plant.dataset.compose import Placed
 from plant.dataset.room import Obstacle, Room
 from plant.dataset.silhouette import project
+from plant.models.spot.description import CAMERAS
 from plant.pictures import look_at
 from plant.sensors.camera_spec import CameraSpec, load_cameras
-from plant.spot.sensing import CAMERAS
 from skills.robot import FloatArray, Intrinsics
 
 BODY_SHARE = 0.4

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
-from pydrake.geometry import (
-    ClippingRange,
-    ColorRenderCamera,
-    DepthRange,
-    DepthRenderCamera,
-    RenderCameraCore,
-)
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.systems.sensors import CameraInfo
 
 from skills.robot import Intrinsics
+
+if TYPE_CHECKING:
+    from pydrake.geometry import ColorRenderCamera, DepthRenderCamera, RenderCameraCore
 
 FAR_M = 40.0
 NEAR_M = 0.05
@@ -112,15 +108,22 @@ def colour_render_camera(
     intrinsics: Intrinsics, renderer: str, *, near_m: float = NEAR_M, far_m: float = FAR_M
 ) -> ColorRenderCamera:
     """Drake's colour camera with these intrinsics; what is nearer or farther is cut away."""
+    from pydrake.geometry import ColorRenderCamera
+
     return ColorRenderCamera(_core(intrinsics, renderer, near_m, far_m), False)
 
 
 def depth_render_camera(intrinsics: Intrinsics, renderer: str, range_m: tuple[float, float]) -> DepthRenderCamera:
     """Drake's depth camera with these intrinsics and this range."""
+    from pydrake.geometry import DepthRange, DepthRenderCamera
+
     return DepthRenderCamera(_core(intrinsics, renderer, NEAR_M / 2.0, range_m[1] + 1.0), DepthRange(*range_m))
 
 
 def _core(intrinsics: Intrinsics, renderer: str, near_m: float, far_m: float) -> RenderCameraCore:
+    from pydrake.geometry import ClippingRange, RenderCameraCore
+    from pydrake.systems.sensors import CameraInfo
+
     info = CameraInfo(  # the renderer counts the principal point from the pixel's corner, Intrinsics from its centre
         width=intrinsics.width,
         height=intrinsics.height,

@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from plant.models.spot.description import LEGS, spot_facts, spot_urdf
+from plant.models.spot.description import CAMERAS, JAW, LEGS, spot_facts, spot_urdf
 from plant.sensors.camera_spec import load_cameras
-from plant.spot.model import JAW
-from plant.spot.sensing import CAMERAS
 from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities
 
 

@@ -13,6 +13,7 @@ from pydrake.systems.framework import Context
 
 from plant.locomotion.carrier import Carrier, CarrierLimits
 from plant.models.spot.description import (
+    JAW,
     LEGS,
     LOOKS_PACKAGE,
     arm_joint_names,
@@ -23,7 +24,6 @@ from plant.models.spot.description import (
 from plant.models.spot.looks import looks_folder
 from skills.robot import FloatArray, Pose2D
 
-JAW = "arm_f1x"
 _LEG_GAINS = (600.0, 12.0)
 _ARM_GAINS = {
     "arm_sh0": (900.0, 45.0),

@@ -6,7 +6,6 @@ import math
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -14,7 +13,7 @@ from pydrake.geometry import FrameId, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
-from plant.models.spot.description import arm_joint_names, spot_facts
+from plant.models.spot.description import CAMERAS, arm_joint_names, spot_facts
 from plant.scene import RENDERER, Scene
 from plant.sensors.battery import BatteryModel, BatterySpec
 from plant.sensors.camera import Camera
@@ -28,7 +27,6 @@ from plant.snapshot.values import State
 from plant.spot.model import SpotModel
 from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Joints, Odometry, Pose2D, Scan
 
-CAMERAS = Path(__file__).parents[1] / "models" / "spot" / "cameras.yaml"
 HAND_LINK = "arm_wr1"
 _FRAME_OF_LINK = {"body": "body", HAND_LINK: "hand"}
 _LIDAR_PERIOD_S = 0.1

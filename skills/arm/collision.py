@@ -7,10 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Box as BoxShape
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import Parser
-from pydrake.planning import BodyShapeDescription, RobotDiagramBuilder, SceneGraphCollisionChecker
 
 from skills.api import NO_WORK_COUNTER, WorkCounter
 from skills.arm.kinematics import ArmModel
@@ -43,6 +40,9 @@ class ArmScene:
         work: WorkCounter = NO_WORK_COUNTER,
     ) -> None:
         """`work` counts the checks."""
+        from pydrake.multibody.parsing import Parser
+        from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
+
         self.model, self._work = model, work
         builder = RobotDiagramBuilder()
         plant = builder.plant()
@@ -111,6 +111,9 @@ class ArmScene:
         return q
 
     def _add(self, group: str, box: Box, instance: str, body: str) -> None:
+        from pydrake.geometry import Box as BoxShape
+        from pydrake.planning import BodyShapeDescription
+
         shape = BodyShapeDescription(BoxShape(*box.size_m), box.X_FG, instance, body)
         self._checker.AddCollisionShape(group, shape)
 

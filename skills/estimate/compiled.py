@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
@@ -15,7 +15,30 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 def compiled(function: FunctionT) -> FunctionT:
     """Compile at the first call, single-threaded and without reordering of floating point: equal runs stay equal."""
-    return cast(FunctionT, njit(cache=True, nogil=True)(function))
+    return cast(FunctionT, _Compiled(function))
+
+
+class _Compiled:
+    """A function to be compiled. numba is imported at the first call, as that takes half a second."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+        self._function = function
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.machine_code(*arguments)
+
+    @functools.cached_property
+    def machine_code(self) -> Callable[..., Any]:
+        """The function as numba has it; so are, in its module, the compiled functions that it calls."""
+        from numba import njit
+
+        names = self._function.__globals__
+        for name in self._function.__code__.co_names:
+            if isinstance(names.get(name), _Compiled):
+                names[name] = names[name].machine_code
+        code: Callable[..., Any] = njit(cache=True, nogil=True)(self._function)
+        return code
 
 
 @compiled

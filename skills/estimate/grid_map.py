@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from skills.estimate.compiled import distances
 from skills.robot import FloatArray
@@ -87,10 +86,11 @@ def signed_distance(occupied: BoolGrid, resolution_m: float) -> NDArray[np.float
     """Distance (m) from each cell's centre to the boundary of the occupied cells, negative inside them."""
     if not occupied.any():
         return np.full(occupied.shape, math.hypot(*occupied.shape) * resolution_m, dtype=np.float32)
-    outside = np.asarray(distance_transform_edt(~occupied))
-    inside = np.asarray(distance_transform_edt(occupied))
-    cells = np.where(occupied, 0.5 - inside, outside - 0.5)
-    return np.ascontiguousarray(cells * resolution_m, dtype=np.float32)
+    outside, inside = (
+        cv2.distanceTransform(cells.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        for cells in (~occupied, occupied)
+    )
+    return np.ascontiguousarray(np.where(occupied, 0.5 - inside, outside - 0.5) * resolution_m, dtype=np.float32)
 
 
 def load_grid_map(path: Path) -> GridMap:

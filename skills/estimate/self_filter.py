@@ -7,8 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
 
 from skills.robot import Capabilities, FloatArray, Joints, Pose2D
 
@@ -21,6 +19,9 @@ class ArmShape:
             raise ValueError("ArmShape: the robot has no arm")
         self._names = capabilities.arm.joint_names
         self._hand_m = 0.0 if capabilities.gripper is None else capabilities.gripper.length_m
+        from pydrake.multibody.parsing import Parser
+        from pydrake.multibody.plant import MultibodyPlant
+
         self._plant = MultibodyPlant(0.0)
         Parser(self._plant).AddModelsFromString(capabilities.description, "urdf")
         self._plant.Finalize()

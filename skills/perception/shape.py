@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.optimize import least_squares
 
 from skills.robot import FloatArray
 
@@ -60,6 +59,8 @@ def circle_seen(xy: FloatArray, p_WC: FloatArray, largest_m: float = 0.09) -> tu
 
     def residuals(centre: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.norm(xy - centre, axis=1) - radius)
+
+    from scipy.optimize import least_squares
 
     fit = least_squares(residuals, guess, loss="soft_l1", f_scale=0.004)
     spread = float(np.median(np.abs(fit.fun)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from skills.api import Surface
 from skills.geometry import inside_polygon
@@ -34,6 +33,8 @@ def free_spots(view: SurfaceView, candidates: FloatArray, avoid_W: Sequence[Floa
     """
     if len(candidates) == 0 or len(view.plane_points) == 0:
         return np.empty((0, 2))
+    from scipy.spatial import cKDTree
+
     seen = cKDTree(view.plane_points.p_W[:, :2])
     around = np.array([len(found) for found in seen.query_ball_point(candidates, 0.04)])
     things = [cluster.points.p_W[:, :2] for cluster in view.clusters] + list(avoid_W)

@@ -13,6 +13,9 @@ from xml.etree import ElementTree
 
 import yaml
 
+FACTS = Path(__file__).with_name("spot.yaml")
+CAMERAS = Path(__file__).with_name("cameras.yaml")
+JAW = "arm_f1x"
 LEGS = ("fl", "fr", "hl", "hr")
 LOOKS_PACKAGE = "spot_looks"
 _SIDES = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
@@ -22,7 +25,7 @@ _MESH_PREFIX = {"fl": "front_left", "fr": "front_right", "hl": "rear_left", "hr"
 @cache
 def spot_facts() -> Mapping[str, Any]:
     """The facts in `spot.yaml`."""
-    facts: Mapping[str, Any] = yaml.load(Path(__file__).with_name("spot.yaml").read_text(), Loader=yaml.CSafeLoader)
+    facts: Mapping[str, Any] = yaml.load(FACTS.read_text(), Loader=yaml.CSafeLoader)
     return facts
 
 

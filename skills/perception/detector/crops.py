@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from onnxruntime import InferenceSession
 
 from skills.perception.detector.proposals import (
     CROP_PX,
@@ -19,6 +18,9 @@ from skills.perception.detector.proposals import (
     rows_of,
 )
 from skills.perception.detector.scales import Scales
+
+if TYPE_CHECKING:
+    from onnxruntime import InferenceSession
 
 __all__ = ["classified", "crops_about", "refined"]
 

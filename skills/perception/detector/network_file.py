@@ -11,12 +11,14 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import onnxruntime
 
 from skills.perception.detector.processor import adds_byte_products_exactly
+
+if TYPE_CHECKING:
+    import onnxruntime
 
 __all__ = ["Inputs", "ModelFileError", "Network", "NetworkKind", "Outputs", "load_network", "sealed"]
 
@@ -115,6 +117,8 @@ class _Reader:
 
     def session(self, content: bytes) -> onnxruntime.InferenceSession:
         """The network, ready to run."""
+        import onnxruntime
+
         try:
             return onnxruntime.InferenceSession(content, _session_options(), providers=["CPUExecutionProvider"])
         except Exception as error:  # the library has no common class of its own for them
@@ -158,7 +162,9 @@ class _Reader:
 
 
 def _session_options() -> onnxruntime.SessionOptions:
-    options = onnxruntime.SessionOptions()
+    from onnxruntime import SessionOptions
+
+    options = SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.use_deterministic_compute = True
     if not adds_byte_products_exactly():

@@ -1,0 +1,61 @@
+"""What is known beforehand of whether a mission can be done: the ways in its world, and what the robot is able to."""
+
+from __future__ import annotations
+
+from functools import cache, cached_property
+from pathlib import Path
+from xml.etree import ElementTree
+
+from executive.cli.kept_ways import KeptWays, kept_ways_of
+from executive.mission.errors import InputError
+from executive.tree.check import Abilities, PlannedWays
+from executive.tree.estimate import Itinerary, Way
+from plant.models.catalogue import load_catalogue
+from plant.models.spot.description import FACTS
+from plant.spot.capabilities import spot_capabilities
+from plant.worlds.world import World
+from skills.perception.attributes import known_attributes
+from skills.perception.class_forms import class_forms
+from skills.robot import Pose2D
+from skills.stack import default_component
+
+
+class _WaysOnMap(Itinerary):
+    """Ways on a world's surveyed map for the robot's footprint; the map is read when the first is asked for."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+
+    @cached_property
+    def _ways(self) -> PlannedWays:
+        from skills.estimate.grid_map import MapError, load_grid_map
+        from skills.navigate.footprint import Footprint
+
+        try:
+            keepout_map = load_grid_map(self._world.keepout_map_path)
+        except (MapError, OSError) as error:
+            raise InputError(str(error)) from error
+        return PlannedWays(default_component("costmap").build(keepout_map), Footprint.of(spot_capabilities()))
+
+    def way(self, start: Pose2D, goal: Pose2D) -> Way:
+        """The way from start to goal. Raises ValueError with one sentence when there is none, InputError."""
+        return self._ways.way(start, goal)
+
+
+def itinerary_of(world: World) -> KeptWays:
+    """Ways on a world's surveyed map. When there is no such map, the first way raises InputError."""
+    return kept_ways_of(world, _WaysOnMap(world), FACTS)
+
+
+@cache
+def abilities_of() -> Abilities:
+    """What the robot can lift, and what the things weigh that there are models of."""
+    masses = {name: _mass_kg(one.path()) for name, one in load_catalogue().items() if one.file is not None}
+    arm = spot_capabilities().arm
+    lift_kg = 0.0 if arm is None else arm.max_payload_kg
+    return Abilities(masses, lift_kg, frozenset(class_forms()), known_attributes())
+
+
+def _mass_kg(sdf: Path) -> float:
+    """The mass of a model, all its links together."""
+    return sum(float(mass.text or 0.0) for mass in ElementTree.parse(sdf).iter("mass"))

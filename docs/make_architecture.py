@@ -49,10 +49,10 @@ class Box:
 
 ROW, LOWER = 70, 182
 UNDERSTAND = Box(40, ROW, 150, 70, "language", ("sentence to commands",))
-MISSION = Box(230, ROW, 150, 70, "missionfile", ("YAML, checked",))
-COMPILE = Box(420, ROW, 150, 70, "compiling", ("commands to a tree",))
-TREE = Box(610, ROW, 150, 70, "behaviours", ("guards, recovery", "and skill leaves"))
-RUN = Box(800, ROW, 150, 70, "runner", ("time, ticks, leases",))
+MISSION = Box(230, ROW, 150, 70, "mission", ("YAML, checked",))
+COMPILE = Box(420, ROW, 150, 70, "tree/compiling", ("node specs, plain data",))
+TREE = Box(610, ROW, 150, 70, "tree/behaviours", ("guards, recovery", "and skill leaves"))
+RUN = Box(800, ROW, 150, 70, "run", ("time, ticks, leases",))
 KNOW = Box(135, LOWER, 150, 60, "knowledge", ("places, things, people",))
 STORE = Box(325, LOWER, 150, 60, "store", ("queue and resume",))
 RECORD = Box(515, LOWER, 150, 60, "record", ("log.mcap",))

@@ -14,11 +14,12 @@ from importlib import resources
 from typing import Final, Protocol, runtime_checkable
 
 import yaml
+from rapidfuzz.distance import OSA
 
 from executive.language.sounds import sound_distance
 from executive.mission.knowledge import Knowledge
 
-__all__ = ["Mended", "WordFacts", "look_alikes", "mend_spelling", "spelling_distance", "synonyms_of", "words_for"]
+__all__ = ["Mended", "WordFacts", "look_alikes", "mend_spelling", "synonyms_of", "words_for"]
 
 ALIKE_SOUND: Final = 0.16
 ALIKE_MEANING: Final = 0.65
@@ -100,20 +101,6 @@ def mend_spelling(text: str, knowledge: Knowledge, facts: WordFacts) -> Mended:
     return Mended("".join([*pieces, text[end:]]), tuple(notes))
 
 
-def spelling_distance(first: str, second: str) -> int:
-    """How many slips lie between two words: letters too few, too many, wrong, or two swapped (Damerau 1964)."""
-    before: list[int] = []
-    above = list(range(len(second) + 1))
-    for row, letter in enumerate(first, start=1):
-        line = [row]
-        for column, other in enumerate(second, start=1):
-            cost = min(above[column] + 1, line[-1] + 1, above[column - 1] + (letter != other))
-            swapped = row > 1 and column > 1 and letter == second[column - 2] and first[row - 2] == other
-            line.append(min(cost, before[column - 2] + 1) if swapped else cost)
-        before, above = above, line
-    return above[-1]
-
-
 def _note(spoken: str, name: str) -> str:
     return f"I take '{spoken}' to be {name}"
 
@@ -166,9 +153,8 @@ def _may_be_right(word: str, facts: WordFacts) -> bool:
 
 
 def _slips(word: str, name: str) -> int:
-    """The spelling distance, or the difference in length where that is too large already."""
-    apart = abs(len(word) - len(name))
-    return apart if apart > 2 else spelling_distance(word, name)
+    """How many slips lie between two words: letters too few, too many, wrong, or two swapped; above 2 it says 3."""
+    return OSA.distance(word, name, score_cutoff=2)
 
 
 def _slips_allowed(name: str) -> int:
@@ -177,10 +163,9 @@ def _slips_allowed(name: str) -> int:
 
 def _slip(word: str, name: str) -> float:
     """How likely a word is a slip for a name: below 1 when it looks or sounds alike, the less the likelier."""
-    if len(word) >= _FEWEST_LETTERS - 1 and spelling_distance(word, name) <= _slips_allowed(name) // 2 + (
-        len(name) > 3
-    ):
-        return spelling_distance(word, name) / len(name)
+    slips = _slips(word, name)
+    if len(word) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(name) // 2 + (len(name) > 3):
+        return slips / len(name)
     sound = sound_distance(word, name)
     return sound if sound <= ALIKE_SOUND else 1.0
 

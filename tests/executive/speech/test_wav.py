@@ -10,7 +10,7 @@ from executive.mission.errors import InputError
 from executive.speech.sound import RATE_HZ, joined
 from executive.speech.wav import read_wav
 
-PCM, FLOAT, A_LAW, EXTENSIBLE = 1, 3, 6, 0xFFFE
+PCM, FLOAT, UNKNOWN, EXTENSIBLE = 1, 3, 0x4242, 0xFFFE
 EDGE = 400  # samples at either end, where a change of the rate has no neighbours to look at
 
 
@@ -41,7 +41,7 @@ def test_every_width_is_read(tmp_path, tag, bits, half):
 
 
 def test_the_extensible_head_tells_the_kind_further_on(tmp_path):
-    extra = struct.pack("<HHIH", 22, 16, 0, PCM) + bytes(14)
+    extra = struct.pack("<HHIH", 22, 16, 0, PCM) + bytes.fromhex("0000 0000 1000 8000 00aa 0038 9b71")
     file = write_raw_wav(tmp_path / "a.wav", struct.pack("<h", 2**14) * 9, tag=EXTENSIBLE, bits=16, extra=extra)
     assert len(joined(read_wav(file))) == 9
 
@@ -108,8 +108,8 @@ def test_a_file_without_sound_is_told(tmp_path):
     assert "no sound" in _refusal(write_wav(tmp_path / "a.wav", []))
 
 
-def test_a_compressed_file_is_told(tmp_path):
-    assert "kind 6" in _refusal(write_raw_wav(tmp_path / "a.wav", b"\0" * 99, tag=A_LAW, bits=8))
+def test_samples_of_an_unknown_kind_are_told(tmp_path):
+    assert "no wav file" in _refusal(write_raw_wav(tmp_path / "a.wav", b"\0" * 99, tag=UNKNOWN, bits=8))
 
 
 def test_a_rate_that_nobody_uses_is_told(tmp_path):

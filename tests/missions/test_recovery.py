@@ -63,7 +63,7 @@ class Mission:
             settings=RunSettings(seed=self.seed),
             observer=observer,
         ).worst
-        return result, judge(self.simulation, self.tree, self.knowledge, result)
+        return result, judge(self.simulation, self.tree, result)
 
     def ended(self, part: str) -> list[str]:
         """How the nodes with `part` in their path ids ended, in order."""

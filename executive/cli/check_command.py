@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -15,7 +14,6 @@ from rich.markup import escape
 from executive.cli.feasibility import abilities_of, itinerary_of
 from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.cli.requests import prepare
-from executive.language import load_parser
 from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.tree.check import check_tree
@@ -46,20 +44,20 @@ class CheckedFile:
 
 
 class Checker:
-    """Checks files; the parser and the ways planned in each world are shared among them.
+    """Checks files; the ways planned in each world are shared among them.
 
     `world` stands in for the files' own.
     """
 
     def __init__(self, world: str | None = None) -> None:
-        self._world, self._parser = world, cache(load_parser)
+        self._world = world
         self._ways: dict[Path, Itinerary] = {}
 
     def check(self, file: Path) -> CheckedFile:
         """Check one file; raises nothing for what stands in it."""
         tree: CompiledTree | None = None
         try:
-            prepared = prepare(Request(file=file, world=self._world), parser=self._parser, ask=None)
+            prepared = prepare(Request(file=file, world=self._world), ask=None)
             tree, world = prepared.tree, prepared.world
             if world.folder not in self._ways:
                 self._ways[world.folder] = itinerary_of(world)

@@ -11,7 +11,7 @@ from rich.console import Console
 from executive.cli.backend import Scene
 from executive.cli.replay_command import served, wait
 from executive.cli.requests import Prepared, prepare
-from executive.cli.talk import LateParser, conversation_of
+from executive.cli.talk import conversation_of, load_ahead
 from executive.conversation import ReplyKind
 from executive.mission.errors import InputError
 from executive.mission.request import Request
@@ -39,8 +39,7 @@ class PageView:
         self.control = Control(attended=True)
         self._feed = Feed()
         self._progress = ProgressWatch(self._feed)
-        self._parser = LateParser()
-        self.conversation = conversation_of(prepared, self.control, self._parser)
+        self.conversation = conversation_of(prepared, self.control)
         self.conversation.listen(lambda waiting: self._feed.tell("asked", asked_json(waiting)))
         self._server: PageServer | None = None
         self._watch: ControlWatch | None = None
@@ -48,7 +47,7 @@ class PageView:
     def begin(self, log: EventLog, scene: Scene | None) -> None:
         """Serve the page and print its address. Raises InputError when the port is taken."""
         log.listen(self._feed)
-        self._parser.load_ahead()
+        load_ahead()
         sentences = {"say": said(self._hear), **({} if self._later is None else {"queue": said(self._later)})}
         actions = {**control_actions(self.control), **sentences, **({} if scene is None else {"ease": easing(scene)})}
         content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)

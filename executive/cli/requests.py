@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from executive.cli.answers import answerer, ask_at_terminal
 from executive.cli.worlds import knowledge_of, open_world
-from executive.language import DependencyParser, Understanding, load_parser
+from executive.language import Understanding, load_parser
 from executive.language.questions import Answerer
 from executive.mission.command import parse_command
 from executive.mission.errors import InputError
@@ -45,14 +44,12 @@ class Prepared:
 def prepare(
     request: Request,
     *,
-    parser: Callable[[], DependencyParser] | None = None,
     ask: Answerer | None = ask_at_terminal,
 ) -> Prepared:
     """Understand a request, and compile it.
 
     Args:
         request: what the user asks for.
-        parser: loads the language's parser; loaded anew unless given.
         ask: who is asked where somebody sits at a terminal and the request's policy allows it; None: nobody.
 
     Raises:
@@ -62,14 +59,14 @@ def prepare(
     if not request.only_commands and (request.file is None) == (request.sentence is None):
         raise InputError("a mission file or --say is needed, and not both", mend='try: --say "Hey Alice, ..."')
     if request.file is not None:
-        return _filed(request, request.file, parser or load_parser, ask)
+        return _filed(request, request.file, ask)
     world = open_world(request.world or request.world_name or DEFAULT_WORLD)
     knowledge = knowledge_of(world)
     if request.sentence is None:
         return _prepared(request, _commanded(request, world), world, knowledge)
     meant = understood(
         request.sentence,
-        parser=(parser or load_parser)(),
+        parser=load_parser(),
         knowledge=knowledge,
         require_wake=request.require_wake,
         answer=answerer(request.answers, request.questions, ask),
@@ -78,13 +75,13 @@ def prepare(
     return _prepared(replace(request, sentence=meant.text), mission, world, knowledge, meant)
 
 
-def _filed(request: Request, file: Path, parser: Callable[[], DependencyParser], ask: Answerer | None) -> Prepared:
+def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:
     """That of a mission file; the request's world stands in for the file's own."""
     loaded = load_mission(file)
     world = open_world(request.world) if request.world is not None else _own_world(loaded)
     knowledge = overridden(loaded, knowledge_of(world))
     answer = answerer(request.answers, request.questions or loaded.questions, ask)
-    mission = mission_from_file(loaded, parser=parser(), knowledge=knowledge, answer=answer)
+    mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
     text = file.read_text(encoding="utf-8")
     return _prepared(replace(request, text=text), mission, world, knowledge)
 

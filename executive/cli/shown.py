@@ -12,7 +12,7 @@ from rich.console import Console
 from executive.cli.live import live_view
 from executive.cli.mission_run import Finished, both
 from executive.cli.requests import Prepared
-from executive.cli.talk import LateParser, conversation_of
+from executive.cli.talk import conversation_of, load_ahead
 from executive.conversation import Conversation
 from executive.run.control import Control
 from executive.run.runner import Observer
@@ -46,15 +46,14 @@ def show_run(
         console.print(f"{told}.", markup=False)
     for command in prepared.mission.commands:
         console.print(str(command), markup=False)
-    parser = LateParser()
-    talk = conversation or conversation_of(prepared, control, parser)
+    talk = conversation or conversation_of(prepared, control)
     talk.begun(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
     if quiet:
         finished = start(control=control, observer=None if conversation is None else talk.observe)
     else:
         with live_view(prepared.tree, console, control, say=lambda text: talk.hear(text).text) as observer:
             if control.attended and conversation is None:
-                parser.load_ahead()
+                load_ahead()
             finished = start(control=control, observer=both(observer, talk.observe))
         console.print(to_rich(finished.tree, collapsed=False))
     for line in finished.report.lines():

@@ -50,10 +50,6 @@ class SpacyParser:
         self._folder = folder
         self._kinds: dict[tuple[str, ...], NounKind | None] = {}
 
-    def load(self) -> None:
-        """Load the model now, in any thread."""
-        self.parse("go")
-
     @cached_property
     def _pipeline(self) -> Language:
         return _pipeline_in(self._folder)

@@ -4,7 +4,7 @@ import pytest
 
 from executive.cli.requests import prepare
 from executive.cli.simulated import run_simulated
-from executive.cli.talk import LateParser, conversation_of
+from executive.cli.talk import conversation_of
 from executive.mission.request import Request
 from executive.run.control import Control
 
@@ -12,7 +12,7 @@ from executive.run.control import Control
 @pytest.mark.mission
 def test_a_corrected_mission_is_fulfilled_as_corrected(tmp_path):
     prepared, control = prepare(Request("go to the kitchen", out=tmp_path, record=False)), Control(pace=None)
-    conversation = conversation_of(prepared, control, LateParser())
+    conversation = conversation_of(prepared, control)
     conversation.begun(prepared.tree, memory=prepared.meant.memory)
     said = [(1.0, "where are you"), (2.0, "no, to the bathroom"), (4.0, "wait"), (6.0, "go on")]
     replies = []

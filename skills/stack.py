@@ -11,7 +11,7 @@ import dataclasses
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
@@ -247,13 +247,20 @@ def components(slot: str) -> Mapping[str, type]:
     return MappingProxyType({name: _loaded(slot, name, SLOTS[slot]) for name in _names(slot)})
 
 
+@cache
+def _installed() -> EntryPoints:
+    """All entry points of the environment, read once: each reading opens the files of all distributions."""
+    return entry_points()
+
+
 def _names(slot: str) -> list[str]:
     first = _default_data()[slot][USE]
-    return sorted({entry.name for entry in entry_points(group=SLOTS[slot])}, key=lambda name: (name != first, name))
+    names = {entry.name for entry in _installed().select(group=SLOTS[slot])}
+    return sorted(names, key=lambda name: (name != first, name))
 
 
 def _loaded(slot: str, name: str, group: str) -> type:
-    (entry, *_) = entry_points(group=group, name=name)
+    (entry, *_) = _installed().select(group=group, name=name)
     try:
         component: type = entry.load()
     except Exception as defect:
@@ -266,7 +273,7 @@ def _loaded(slot: str, name: str, group: str) -> type:
 @cache
 def skill_options() -> Mapping[str, type]:
     """The options class of each installed skill that has one."""
-    skills = {entry.name: entry.load() for entry in entry_points(group=SKILL_GROUP)}
+    skills = {entry.name: entry.load() for entry in _installed().select(group=SKILL_GROUP)}
     found = {name: skill.Options for name, skill in sorted(skills.items()) if hasattr(skill, "Options")}
     return MappingProxyType({name: kind for name, kind in found.items() if dataclasses.fields(kind)})
 

@@ -248,19 +248,19 @@ def components(slot: str) -> Mapping[str, type]:
 
 
 @cache
-def _installed() -> EntryPoints:
-    """All entry points of the environment, read once: each reading opens the files of all distributions."""
-    return entry_points()
+def _installed(group: str) -> EntryPoints:
+    """The entry points of a group, read once: each reading opens the files of all distributions."""
+    return entry_points(group=group)
 
 
 def _names(slot: str) -> list[str]:
     first = _default_data()[slot][USE]
-    names = {entry.name for entry in _installed().select(group=SLOTS[slot])}
+    names = {entry.name for entry in _installed(SLOTS[slot])}
     return sorted(names, key=lambda name: (name != first, name))
 
 
 def _loaded(slot: str, name: str, group: str) -> type:
-    (entry, *_) = _installed().select(group=group, name=name)
+    (entry, *_) = _installed(group).select(name=name)
     try:
         component: type = entry.load()
     except Exception as defect:
@@ -273,7 +273,7 @@ def _loaded(slot: str, name: str, group: str) -> type:
 @cache
 def skill_options() -> Mapping[str, type]:
     """The options class of each installed skill that has one."""
-    skills = {entry.name: entry.load() for entry in _installed().select(group=SKILL_GROUP)}
+    skills = {entry.name: entry.load() for entry in _installed(SKILL_GROUP)}
     found = {name: skill.Options for name, skill in sorted(skills.items()) if hasattr(skill, "Options")}
     return MappingProxyType({name: kind for name, kind in found.items() if dataclasses.fields(kind)})
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields
 from functools import cache
 from importlib import resources
 from typing import Any, Final
@@ -96,32 +96,19 @@ class Lexicon:
 def lexicon() -> Lexicon:
     """The dictionaries that come with the package."""
     verbs, words = _read("verbs.yaml"), _read("words.yaml")
+    read = {**verbs, **words}
+    plain: dict[str, Any] = {
+        each.name: _KINDS[each.type](read[each.name]) for each in fields(Lexicon) if each.type in _KINDS
+    }
     return Lexicon(
+        **plain,
         verbs=_kinds(verbs),
-        at_is_goal=frozenset(verbs["at_is_goal"]),
-        goal_wanted=frozenset(verbs["goal_wanted"]),
-        source_wanted=frozenset(verbs["source_wanted"]),
-        goes_back=frozenset(verbs["goes_back"]),
-        enters=frozenset(verbs["enters"]),
-        leaves=frozenset(verbs["leaves"]),
-        bare_goal=frozenset(verbs["bare_goal"]),
-        needs=_phrases(words["needs"]),
         prepositions={
             tuple(phrase.split()): PrepositionRole(role)
             for role, phrases in words["prepositions"].items()
             for phrase in phrases
         },
-        fillers=_phrases(words["fillers"]),
-        refusals=_longest_first(words["refusals"]),
-        searches=_longest_first(words["searches"]),
         short_forms=words["short_forms"],
-        asides=_longest_first(words["asides"]),
-        praises=_longest_first(words["praises"]),
-        hesitations=_longest_first(words["hesitations"]),
-        openers=_longest_first(words["openers"]),
-        requests=_longest_first(words["requests"]),
-        **{name: frozenset(words[name]) for name in _WORD_SETS},
-        negations=_phrases(words["negations"]),
         corrections={tuple(p.split()): soft for soft in (False, True) for p in words["corrections"][_SOFTNESS[soft]]},
         light_nouns={verb: frozenset(nouns) for verb, nouns in words["light_nouns"].items()},
     )
@@ -130,29 +117,6 @@ def lexicon() -> Lexicon:
 # Plain words: "on" is no truth value.
 _Loader: Final = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _SOFTNESS: Final = {False: "certain", True: "soft"}
-_WORD_SETS: Final = (
-    "speaker",
-    "pronouns",
-    "here",
-    "levels",
-    "there",
-    "people",
-    "everyone",
-    "directions",
-    "worn",
-    "quantities",
-    "fixtures",
-    "somebody",
-    "subjects",
-    "asks",
-    "told",
-    "light_whole",
-    "written",
-    "prepared",
-    "gives",
-    "hands",
-    "calls",
-)
 
 
 def _phrases(texts: Iterable[str]) -> frozenset[Phrase]:
@@ -174,3 +138,11 @@ def _kinds(verbs: Mapping[str, Iterable[str]]) -> dict[Phrase, frozenset[VerbKin
 
 def _longest_first(phrases: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(phrases, key=len, reverse=True))
+
+
+_KINDS: Final[Mapping[Any, Callable[[Iterable[str]], object]]] = {
+    "frozenset[str]": frozenset,
+    "frozenset[Phrase]": _phrases,
+    "tuple[str, ...]": _longest_first,
+}
+"""How the fields are read that are plain lists in the files, by their types."""

@@ -29,9 +29,7 @@ def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
     """The words with their repairs, from left to right."""
     found = list(tokens)
     for at in range(1, len(found)):
-        if _attribute(found, at):
-            found[at] = replace(found[at], pos="ADJ", tag="JJ", head=at + 1, relation="amod")
-        elif found[at].word == "no" and _pos(found, at + 1) not in ("NOUN", "ADJ"):
+        if found[at].word == "no" and _pos(found, at + 1) not in ("NOUN", "ADJ"):
             found[at] = replace(found[at], pos="INTJ", tag="UH", relation="intj")
         elif _contracted(found, at):
             found[at] = replace(found[at], pos="AUX", tag="VBZ", lemma="be", relation="root")
@@ -45,8 +43,6 @@ def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
             found[at] = replace(found[at], pos="PROPN", tag="NNP", relation="obl", head=at - 1)
         elif _goal(found, at) or _department(found, at):
             found[at] = replace(found[at], pos="NOUN", tag="NN", relation="obl", head=at - 1)
-        elif (noun := _owned(found, at)) is not None:
-            _own(found, at, noun)
         elif found[at].pos == "NOUN" and (found[at - 1].tag, found[at - 1].relation) == ("DT", "mark"):
             found[at - 1] = replace(found[at - 1], relation="det", head=at)
         elif _place_one(found, at):
@@ -76,11 +72,6 @@ def _named_thing(tokens: Sequence[Token], at: int) -> bool:
     """Whether a word behind an article that was read as an adverb is the noun ("the brolly")."""
     adverb = tokens[at].tag == "RB" and tokens[at - 1].tag in ("DT", "PRP$")
     return adverb and _pos(tokens, at + 1) in _AFTER_NOUN
-
-
-def _attribute(tokens: Sequence[Token], at: int) -> bool:
-    """Whether a verb before a noun is an attribute of it ("clean towels")."""
-    return tokens[at].pos == "VERB" and is_attribute(tokens[at].text) and _pos(tokens, at + 1) == "NOUN"
 
 
 def _container(tokens: Sequence[Token], at: int) -> bool:
@@ -139,15 +130,6 @@ def _shown(tokens: Sequence[Token], at: int) -> bool:
     return verb and pointed and (token.word,) not in lexicon().verbs and _pos(tokens, at + 1) not in ("PRON", "DET")
 
 
-def _owned(tokens: Sequence[Token], at: int) -> int | None:
-    """The noun that a lost possessive belongs to: "glasses" in "would like her reading glasses"."""
-    if tokens[at].tag != "PRP$" or tokens[at].relation == "poss":
-        return None
-    end = next((n for n in range(at + 1, len(tokens)) if tokens[n].tag not in ("VBG", "JJ", "NN")), len(tokens))
-    noun = end if end < len(tokens) and tokens[end].tag == "NNS" else end - 1
-    return noun if noun > at and tokens[noun].pos == "NOUN" else None
-
-
 def _place_one(tokens: Sequence[Token], at: int) -> bool:
     """Whether "one" is the number of a place without article ("room one"), unlike "the kitchen one"."""
     before = tokens[max(at - 3, 0) : at]
@@ -192,13 +174,6 @@ def _show(tokens: list[Token], at: int) -> None:
     tokens[at - 1] = replace(tokens[at - 1], pos="DET", tag="DT", relation="det", head=head)
     relation, above = ("compound", head) if whole else ("obj", at - 2)
     tokens[at] = replace(tokens[at], pos="NOUN", tag="NN", relation=relation, head=above)
-
-
-def _own(tokens: list[Token], at: int, noun: int) -> None:
-    """Make a possessive, and the words behind it, depend on the noun."""
-    tokens[at] = replace(tokens[at], relation="poss", head=noun)
-    for n in range(at + 1, noun):
-        tokens[n] = replace(tokens[n], relation="amod" if tokens[n].tag == "JJ" else "compound", head=noun)
 
 
 def _part_verb(tokens: list[Token], at: int) -> None:

@@ -45,7 +45,7 @@ def test_the_arcs_are_drawn(tmp_path: Path):
     assert result.exit_code == 0
     drawing = (tmp_path / "arcs.svg").read_text(encoding="utf-8")
     assert drawing.startswith("<svg")
-    assert ">mug</text>" in drawing
+    assert ">mug</tspan>" in drawing
 
 
 @pytest.mark.parametrize(

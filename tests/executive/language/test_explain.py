@@ -7,6 +7,7 @@ from executive.language.explain import tree_lines
 from executive.language.explain_svg import arcs_svg
 from executive.language.explain_text import explanation_lines
 
+SVG = "{http://www.w3.org/2000/svg}"
 SENTENCE = "could you give Robin the hammer from the workshop, and bring two cokes here"
 
 
@@ -88,8 +89,8 @@ def test_every_word_stands_once_in_the_tree(explained):
 
 def test_the_drawing_has_every_word_and_an_arc_for_each_relation(explained):
     drawing = ElementTree.fromstring(arcs_svg(explained.tokens))
-    texts = [e.text for e in drawing.iter("{http://www.w3.org/2000/svg}text") if e.get("class") == "word"]
-    arcs = [e for e in drawing.iter("{http://www.w3.org/2000/svg}path") if e.get("class") == "arc"]
+    texts = [e.text for e in drawing.iter(f"{SVG}tspan") if e.get("class") == "displacy-word"]
+    arcs = [e for e in drawing.iter(f"{SVG}path") if e.get("class") == "displacy-arc"]
     assert texts == [token.text for token in explained.tokens]
     assert len(arcs) == sum(token.head is not None for token in explained.tokens)
 

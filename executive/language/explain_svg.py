@@ -21,5 +21,4 @@ def arcs_svg(tokens: Sequence[TokenRow]) -> str:
             side = "left" if places[token.index] == start else "right"
             arcs.append({"start": start, "end": end, "label": token.relation, "dir": side})
     words = [{"text": token.text, "tag": token.pos, "lemma": None} for token in tokens]
-    drawing: str = DependencyRenderer({"distance": 110}).render_svg("arcs", words, arcs)
-    return drawing
+    return DependencyRenderer({"distance": 110}).render_svg("arcs", words, arcs).strip() + "\n"

@@ -11,7 +11,6 @@ from rich.table import Table
 
 from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
-from executive.cli.queue_run import run_queue
 from executive.cli.requests import prepare
 from executive.mission.request import Request
 from executive.store.missions import MissionState, MissionStore, StoredMission
@@ -81,6 +80,8 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Run all that is queued, each mission in the world as the one before has left it."""
+    from executive.cli.queue_run import run_queue
+
     console = console_for(as_json)
     with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
         results = run_queue(missions, console, quiet=quiet)

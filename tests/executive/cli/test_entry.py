@@ -16,6 +16,9 @@ IMPORTS = [
     (["parse", "--open", "fetch me a drink"], {"spacy"}),
     (["parse", "Hey Alice, fetch me a drink"], {"spacy"}),
     (["check", str(MISSIONS / "fetch_drink.yaml")], {"cv2", "pydrake"}),
+    (["queue", "--help"], {"pydrake"}),
+    (["log", "--help"], {"cv2"}),
+    (["new-skill", "--help"], set()),
 ]
 
 

@@ -23,7 +23,7 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from plant.locomotion.carrier import CarrierLimits
+from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.scene import Scene
 from plant.scenery import add_model, add_scenery
 from plant.spot.model import SpotModel
@@ -68,7 +68,7 @@ def build_diagram(
     robot_names: Sequence[str],
     looks: bool = True,
     carried: bool = True,
-    locomotion: CarrierLimits | None = None,
+    locomotion: FloatingBaseLimits | None = None,
     render: bool = True,
     time_step_s: float = TIME_STEP_S,
     renderer_parameters: RenderEngineVtkParams | None = None,

@@ -14,7 +14,7 @@ from pydrake.systems.framework import Context
 
 from plant.diagram import LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
-from plant.locomotion.carrier import CarrierLimits
+from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.sleeping import Sleepers
@@ -164,7 +164,7 @@ class Simulation:
         record: bool = False,
         looks: bool = True,
         charge: float = 1.0,
-        locomotion: CarrierLimits | None = None,
+        locomotion: FloatingBaseLimits | None = None,
         extra_models: Sequence[LooseModel] = (),
     ) -> None:
         """Build the plant of `world`; things and people stand where the seed puts them.

@@ -1,1 +1,1 @@
-"""How a body moves: leg kinematics, the trot, and the carrier that bears the body for now."""
+"""How a body moves: leg kinematics, the trot, and the planar floating base that bears the body for now."""

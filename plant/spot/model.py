@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RevoluteJoint
 from pydrake.systems.framework import Context
 
-from plant.locomotion.carrier import Carrier, CarrierLimits
+from plant.locomotion.floating_base import FloatingBase, FloatingBaseLimits
 from plant.models.spot.description import (
     JAW,
     LEGS,
@@ -37,7 +37,7 @@ _ARM_GAINS = {
 
 
 class SpotModel:
-    """Spot's bodies, joints and carrier in a plant."""
+    """Spot's bodies, joints and floating base in a plant."""
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class SpotModel:
         *,
         looks: bool,
         carried: bool = True,
-        limits: CarrierLimits | None = None,
+        limits: FloatingBaseLimits | None = None,
     ) -> None:
         """Add the robot to `plant` (before Finalize); a robot that is not carried keeps its free base."""
         self.plant = plant
@@ -59,7 +59,7 @@ class SpotModel:
         (self.instance,) = parser.AddModelsFromString(spot_urdf(looks=meshes is not None), "urdf")
         plant.RenameModelInstance(self.instance, name)
         self.body = plant.GetBodyByName("body", self.instance)
-        self.carrier = Carrier(plant, name, self.body, limits) if carried else None
+        self.floating_base = FloatingBase(plant, name, self.body, limits) if carried else None
         for joint, (p, d) in self._gains().items():
             plant.GetJointActuatorByName(joint, self.instance).set_controller_gains(PdControllerGains(p=p, d=d))
 
@@ -73,12 +73,12 @@ class SpotModel:
 
     def instances(self) -> tuple[ModelInstanceIndex, ...]:
         """The model instances that make up this robot."""
-        return (self.instance,) if self.carrier is None else (self.instance, self.carrier.instance)
+        return (self.instance,) if self.floating_base is None else (self.instance, self.floating_base.instance)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
         """Let links of this robot pass each other, and its legs the floor while it is carried."""
         filters.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(self.geometries())))
-        if self.carrier is not None:
+        if self.floating_base is not None:
             legs = [geometry for leg in LEGS for geometry in self.geometries(leg)]
             filters.Apply(CollisionFilterDeclaration().ExcludeBetween(GeometrySet(legs), floor))
 
@@ -100,8 +100,8 @@ class SpotModel:
         for joint, angle in facts["stowed"].items():
             self._joint(joint).set_angle(context, angle)
         height = facts["capabilities"]["standing_height"]
-        if self.carrier is not None:
-            self.carrier.place(context, pose, height)
+        if self.floating_base is not None:
+            self.floating_base.place(context, pose, height)
         else:
             self.plant.SetFreeBodyPose(context, self.body, pose.transform(height))
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.systems.framework import Context
 
-from plant.locomotion.carrier import Velocity
+from plant.locomotion.floating_base import Velocity
 from plant.locomotion.trot import BodyMotion, Trot
 from plant.models.spot.description import spot_facts
 from plant.snapshot.values import State, array_of
@@ -221,14 +221,14 @@ class SpotRobot:
 
     def state(self) -> State:
         """What the robot itself keeps: servos, gait, sensors. Commands and leases do not outlive its computer."""
-        carrier = self._model.carrier
+        floating_base = self._model.floating_base
         return {
             "arm_hold": None if self._book.running(Part.ARM) is not None else self._arm_hold.tolist(),
             "jaw": [self._jaw_goal.opening_rad, self._jaw_goal.force_n, self._jaw_still_s],
             "posture": list(self._posture),
             "legs": self._leg_servos.state(),
             "trot": self._trot.state(),
-            "carrier": None if carrier is None else carrier.state_kept(),
+            "floating_base": None if floating_base is None else floating_base.state_kept(),
             "sensors": self._sensors.state(),
         }
 
@@ -248,8 +248,8 @@ class SpotRobot:
         self._posture = (state["posture"][0], state["posture"][1])
         self._leg_servos.restore(state["legs"])
         self._trot.restore(state["trot"])
-        if self._model.carrier is not None:
-            self._model.carrier.restore(state["carrier"])
+        if self._model.floating_base is not None:
+            self._model.floating_base.restore(state["floating_base"])
         self._sensors.restore(state["sensors"], now_s)
 
     # -- inside ---------------------------------------------------------------------------------------------------
@@ -292,8 +292,8 @@ class SpotRobot:
             self._arm_hold, self._arm_rate = joints[self._index.arm], np.zeros(len(self._index.arm))
         if part is Part.GRIPPER:
             self._jaw_goal = self._stopped_jaw(max(0.0, -float(joints[self._index.jaw])))
-        if part is Part.POSTURE and self._model.carrier is not None:
-            self._posture = self._model.carrier.posture
+        if part is Part.POSTURE and self._model.floating_base is not None:
+            self._posture = self._model.floating_base.posture
 
     def _stopped_jaw(self, opening_rad: float) -> JawGoal:
         """A moving jaw stays where it is; one that has hold of a thing keeps its force, or gets that of before."""
@@ -345,15 +345,15 @@ class SpotRobot:
             self._book.finish(Part.GRIPPER, CommandState.DONE, "" if arrived else "stopped by a thing in the jaw")
 
     def _drive_body(self, base: Sequence[float], dt_s: float) -> None:
-        carrier = self._model.carrier
-        if carrier is None:
+        floating_base = self._model.floating_base
+        if floating_base is None:
             return
         active = self._book.running(Part.VELOCITY)
         wanted = active.payload if active is not None and isinstance(active.payload, Velocity) else Velocity()
-        carrier.control(self._context, base, wanted, self._posture, dt_s, stopping=active is None)
+        floating_base.control(self._context, base, wanted, self._posture, dt_s, stopping=active is None)
 
     def _legs(self, base: Sequence[float], dt_s: float) -> tuple[FloatArray, FloatArray]:
-        if self._model.carrier is None:
+        if self._model.floating_base is None:
             return self._leg_servos.rest_rad, np.zeros_like(self._leg_servos.rest_rad)
         motion = self._motion(base)
         feet_W = self._trot.step(motion, dt_s)
@@ -361,14 +361,14 @@ class SpotRobot:
         return self._leg_servos.set_points(_feet_ahead(feet_W, motion, X_WB, dt_s), dt_s)
 
     def _motion(self, base: Sequence[float]) -> BodyMotion:
-        carrier = self._model.carrier
-        velocity = carrier.velocity if carrier is not None else Velocity()
+        floating_base = self._model.floating_base
+        velocity = floating_base.velocity if floating_base is not None else Velocity()
         return BodyMotion(base[0], base[1], base[2], velocity.vx, velocity.vy, velocity.wz)
 
     def _base(self, positions: FloatArray) -> Sequence[float]:
-        """The carrier's (x, y, yaw, height, pitch)."""
-        carrier = self._model.carrier
-        return (0.0,) * 5 if carrier is None else carrier.state(positions)
+        """The floating base's (x, y, yaw, height, pitch)."""
+        floating_base = self._model.floating_base
+        return (0.0,) * 5 if floating_base is None else floating_base.state(positions)
 
     def _positions(self) -> FloatArray:
         positions: FloatArray = self._model.plant.GetPositions(self._context)

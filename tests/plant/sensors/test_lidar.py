@@ -18,7 +18,7 @@ FRICTION = CoulombFriction(0.8, 0.8)
 
 
 class Scene:
-    """A world with static shapes, a carrier body with a shape of its own, and a moving ball."""
+    """A world with static shapes, a floating base with a shape of its own, and a moving ball."""
 
     def __init__(self, statics, spec=QUIET, ball_W=(0.0, 50.0, 0.0), X_BL=None):
         builder = DiagramBuilder()

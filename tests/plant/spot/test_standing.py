@@ -1,4 +1,4 @@
-"""Spot's own legs, without the carrier."""
+"""Spot's own legs, without the floating base."""
 
 import numpy as np
 import pytest

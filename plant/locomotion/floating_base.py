@@ -1,4 +1,4 @@
-"""The carrier that bears the body until the legs do: five joints of one degree of freedom with effort limits.
+"""The planar floating base that bears the body until the legs do: five joints with effort limits.
 
 World -> prismatic x -> prismatic y -> revolute yaw -> prismatic height -> revolute pitch -> weld -> body.
 """
@@ -32,7 +32,7 @@ from skills.robot import FloatArray, Pose2D
 
 
 @dataclass(frozen=True)
-class CarrierLimits:
+class FloatingBaseLimits:
     """A planar floating base that bears the body: what it can do; forces in N, torques in N m."""
 
     speed_m_s: float = 1.6
@@ -63,14 +63,16 @@ _AXES = ("x", "y", "yaw", "height", "pitch")
 _GAINS = {"x": (8e3, 2e3), "y": (8e3, 2e3), "yaw": (2e3, 4e2), "height": (6e4, 3e3), "pitch": (8e3, 4e2)}
 
 
-class Carrier:
+class FloatingBase:
     """Bears one robot's body and drives it to a velocity and a posture with limited force and acceleration."""
 
-    def __init__(self, plant: MultibodyPlant, name: str, body: RigidBody, limits: CarrierLimits | None = None) -> None:
+    def __init__(
+        self, plant: MultibodyPlant, name: str, body: RigidBody, limits: FloatingBaseLimits | None = None
+    ) -> None:
         """Add the joints to `plant` (before Finalize) and weld `body` to the last of them."""
         self._plant = plant
-        self._limits = limits or CarrierLimits()
-        self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_carrier")
+        self._limits = limits or FloatingBaseLimits()
+        self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_floating_base")
         self._joints = self._add_joints(name, body)
         self._velocity = Velocity()
         self._target = [0.0] * 5
@@ -82,15 +84,15 @@ class Carrier:
         parent: RigidBody = self._plant.world_body()
         joints: list[Joint] = []
         for axis in _AXES:
-            child = body if axis == _AXES[-1] else self._add_link(f"{name}_carrier_{axis}")
+            child = body if axis == _AXES[-1] else self._add_link(f"{name}_floating_base_{axis}")
             frames = (
-                self._add_frame(f"{name}_carrier_{axis}_F", parent),
-                self._add_frame(f"{name}_carrier_{axis}_M", child),
+                self._add_frame(f"{name}_floating_base_{axis}_F", parent),
+                self._add_frame(f"{name}_floating_base_{axis}_M", child),
             )
             kind = RevoluteJoint if axis in ("yaw", "pitch") else PrismaticJoint
             direction = np.array(directions[axis], dtype=np.float64)
-            joint = self._plant.AddJoint(kind(f"{name}_carrier_{axis}", *frames, direction))
-            actuator: JointActuator = self._plant.AddJointActuator(f"{name}_carrier_{axis}", joint, efforts[axis])
+            joint = self._plant.AddJoint(kind(f"{name}_floating_base_{axis}", *frames, direction))
+            actuator: JointActuator = self._plant.AddJointActuator(f"{name}_floating_base_{axis}", joint, efforts[axis])
             actuator.set_controller_gains(PdControllerGains(p=_GAINS[axis][0], d=_GAINS[axis][1]))
             joints.append(joint)
             parent = child

@@ -15,13 +15,13 @@ from plant.locomotion.floating_base import FloatingBase, FloatingBaseLimits
 from plant.models.spot.description import (
     JAW,
     LEGS,
-    LOOKS_PACKAGE,
+    VISUALS_PACKAGE,
     arm_joint_names,
     leg_joint_names,
     spot_facts,
     spot_urdf,
 )
-from plant.models.spot.looks import looks_folder
+from plant.models.spot.visuals import visuals_folder
 from skills.robot import FloatArray, Pose2D
 
 _LEG_GAINS = (600.0, 12.0)
@@ -53,10 +53,10 @@ class SpotModel:
         self.name = name
         parser = Parser(plant)
         parser.SetAutoRenaming(True)
-        meshes = looks_folder() if looks else None
+        meshes = visuals_folder() if looks else None
         if meshes is not None:
-            parser.package_map().Add(LOOKS_PACKAGE, meshes)
-        (self.instance,) = parser.AddModelsFromString(spot_urdf(looks=meshes is not None), "urdf")
+            parser.package_map().Add(VISUALS_PACKAGE, meshes)
+        (self.instance,) = parser.AddModelsFromString(spot_urdf(visuals=meshes is not None), "urdf")
         plant.RenameModelInstance(self.instance, name)
         self.body = plant.GetBodyByName("body", self.instance)
         self.floating_base = FloatingBase(plant, name, self.body, limits) if carried else None

@@ -1,6 +1,6 @@
 """Spot's model as URDF text, made of the facts in `spot.yaml` and of primitive shapes.
 
-Meshes for the looks come from a data package, where it is installed; without it the collision shapes are drawn.
+Visual meshes come from a data package, where it is installed; without it the collision shapes are drawn.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ FACTS = Path(__file__).with_name("spot.yaml")
 CAMERAS = Path(__file__).with_name("cameras.yaml")
 JAW = "arm_f1x"
 LEGS = ("fl", "fr", "hl", "hr")
-LOOKS_PACKAGE = "spot_looks"
+VISUALS_PACKAGE = "spot_visuals"
 _SIDES = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
 _MESH_PREFIX = {"fl": "front_left", "fr": "front_right", "hl": "rear_left", "hr": "rear_right"}
 
@@ -29,22 +29,22 @@ def spot_facts() -> Mapping[str, Any]:
     return facts
 
 
-def spot_urdf(*, looks: bool = False) -> str:
+def spot_urdf(*, visuals: bool = False) -> str:
     """URDF text of Spot with arm and LiDAR; root link `body`, free.
 
-    With `looks` the visuals are meshes under `package://spot_looks/`, else the collision shapes.
+    With `visuals` they are meshes under `package://spot_visuals/`, else the collision shapes.
     """
     facts = spot_facts()
     robot = ElementTree.Element("robot", name="spot")
     for name, rgba in facts["colours"].items():
         material = ElementTree.SubElement(robot, "material", name=name)
         ElementTree.SubElement(material, "color", rgba=_text(rgba))
-    _add_link(robot, "body", facts["body"], looks=looks)
+    _add_link(robot, "body", facts["body"], visuals=visuals)
     for leg in LEGS:
-        _add_leg(robot, leg, facts["legs"], looks=looks)
+        _add_leg(robot, leg, facts["legs"], visuals=visuals)
     parent = "body"
     for part in facts["arm"]:
-        _add_link(robot, part["link"], part, looks=looks)
+        _add_link(robot, part["link"], part, visuals=visuals)
         _add_joint(robot, part["link"], parent, part["link"], part)
         parent = "arm_wr1" if part["link"] == "arm_wr1" else part["link"]
     _add_lidar(robot, facts["lidar"])
@@ -56,14 +56,14 @@ def _text(values: Iterable[float]) -> str:
     return " ".join(f"{value:.9g}" for value in values)
 
 
-def _add_leg(robot: ElementTree.Element, leg: str, facts: Mapping[str, Any], *, looks: bool) -> None:
+def _add_leg(robot: ElementTree.Element, leg: str, facts: Mapping[str, Any], *, visuals: bool) -> None:
     parent = "body"
     for link, name in (("hip", "hip"), ("upper_leg", "uleg"), ("lower_leg", "lleg")):
         part = _mirrored(facts[link], leg, flip_x=link == "hip")
         if link == "lower_leg":
             part["foot"] = facts["foot"]
-        part["looks"] = _leg_looks(leg, link)
-        _add_link(robot, f"{leg}_{name}", part, looks=looks)
+        part["visuals"] = _leg_visuals(leg, link)
+        _add_link(robot, f"{leg}_{name}", part, visuals=visuals)
         _add_joint(robot, f"{leg}_{part['joint']}", parent, f"{leg}_{name}", part)
         parent = f"{leg}_{name}"
 
@@ -78,7 +78,7 @@ def _mirrored(part: Mapping[str, Any], leg: str, *, flip_x: bool) -> dict[str, A
     return mirrored
 
 
-def _leg_looks(leg: str, link: str) -> list[dict[str, str]]:
+def _leg_visuals(leg: str, link: str) -> list[dict[str, str]]:
     prefix = _MESH_PREFIX[leg]
     if link == "upper_leg":
         return [
@@ -88,7 +88,7 @@ def _leg_looks(leg: str, link: str) -> list[dict[str, str]]:
     return [{"mesh": f"{prefix}_{link}.obj", "colour": "black"}]
 
 
-def _add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any], *, looks: bool) -> None:
+def _add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any], *, visuals: bool) -> None:
     link = ElementTree.SubElement(robot, "link", name=name)
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "origin", xyz=_text(part["com"]))
@@ -98,9 +98,9 @@ def _add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any], *,
     shapes = list(_shapes(part))
     for index, (shape, friction) in enumerate(shapes):
         _add_collision(link, f"{name}_{index}", shape, friction)
-    if looks:
-        for index, look in enumerate(part.get("looks", ())):
-            _add_mesh(link, f"{name}_look_{index}", look)
+    if visuals:
+        for index, mesh in enumerate(part.get("visuals", ())):
+            _add_mesh(link, f"{name}_visual_{index}", mesh)
     else:
         for index, (shape, _) in enumerate(shapes):
             visual = _add_shape(ElementTree.SubElement(link, "visual", name=f"{name}_shape_{index}"), shape)
@@ -141,11 +141,11 @@ def _add_collision(link: ElementTree.Element, name: str, shape: Mapping[str, Any
         ElementTree.SubElement(properties, "drake:mu_static", value=str(friction))
 
 
-def _add_mesh(link: ElementTree.Element, name: str, look: Mapping[str, str]) -> None:
+def _add_mesh(link: ElementTree.Element, name: str, mesh: Mapping[str, str]) -> None:
     visual = ElementTree.SubElement(link, "visual", name=name)
     geometry = ElementTree.SubElement(visual, "geometry")
-    ElementTree.SubElement(geometry, "mesh", filename=f"package://{LOOKS_PACKAGE}/{look['mesh']}")
-    ElementTree.SubElement(visual, "material", name=look["colour"])
+    ElementTree.SubElement(geometry, "mesh", filename=f"package://{VISUALS_PACKAGE}/{mesh['mesh']}")
+    ElementTree.SubElement(visual, "material", name=mesh["colour"])
 
 
 def _add_joint(robot: ElementTree.Element, name: str, parent: str, child: str, part: Mapping[str, Any]) -> None:
@@ -175,7 +175,7 @@ def _add_lidar(robot: ElementTree.Element, lidar: Mapping[str, Any]) -> None:
             {"box": mast, "xyz": (0, 0, -(height + mast[2]) / 2)},
         ],
     }
-    _add_link(robot, "lidar", part, looks=False)
+    _add_link(robot, "lidar", part, visuals=False)
     joint = ElementTree.SubElement(robot, "joint", name="lidar_mount", type="fixed")
     ElementTree.SubElement(joint, "origin", xyz=_text(lidar["xyz"]))
     ElementTree.SubElement(joint, "parent", link="body")

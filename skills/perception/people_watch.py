@@ -32,8 +32,8 @@ _SAME_YAW_RAD: Final = 0.05
 class PeopleOptions:
     """How often the watch looks (s), how late the answer comes (s), and what counts as a person.
 
-    It looks every `period_s` while somebody may be near: the costmap shows something within `near_m` that the map does
-    not explain, or somebody is known. It looks every `idle_s` otherwise.
+    A camera looks every `period_s` while it may show somebody: somebody is known, or the costmap has something within
+    `near_m` that the map does not explain, no farther than `view_rad` off its axis. All look every `idle_s` otherwise.
     A person counts once seen twice within `same_m`, at least `least_score` sure; a second look follows the first after
     `again_s`. Who should be in a picture and is not for `misses` times has gone. Who is out of all pictures is
     remembered for `memory_s`, and for `beside_s` as long as the costmap knows something within `beside_m` of the place.
@@ -42,6 +42,7 @@ class PeopleOptions:
     period_s: float = 0.5
     idle_s: float = 2.0
     near_m: float = 5.0
+    view_rad: float = 1.0
     again_s: float = 0.2
     latency_s: float = 0.15
     least_score: float = 0.5
@@ -83,7 +84,7 @@ class PeopleWatch:
         self._options = options or PeopleOptions()
         knows = PERSON in context.detector.class_names
         self._cameras = context.robot.capabilities().body_cameras if knows else ()
-        self._looked_s = -math.inf
+        self._looked_s = self._all_looked_s = -math.inf
         self._soon = self._suspected = False
         self._job: Job[_Look] | None = None
         self._seen: tuple[SeenPerson, ...] = ()
@@ -100,31 +101,37 @@ class PeopleWatch:
                 self._take(look)
             return
         now_s = self._context.clock.now()
-        sources = cameras_towards(velocity, self._cameras)
-        if sources and now_s >= self._looked_s + self._period_s():
+        cameras, with_depth = self._due(cameras_towards(velocity, self._cameras), now_s)
+        if cameras:
             self._looked_s, self._soon = now_s, False
-            X_WO, here_W = self._context.localiser.estimate().X_WO, self._context.pose()
-            robot, with_depth = self._context.robot, self._suspected or self._somebody_may_be_near()
+            X_WO, here_W, robot = self._context.localiser.estimate().X_WO, self._context.pose(), self._context.robot
             self._job = self._context.worker.sense(
-                lambda: [robot.image(source, depth=with_depth) for source in sources],
+                lambda: [robot.image(camera.source, depth=with_depth) for camera in cameras],
                 lambda images: self._look(images, X_WO, here_W, with_depth),
                 latency_s=self._options.latency_s,
                 name="look for people",
             )
 
-    def _period_s(self) -> float:
-        """How long after the last look the next one follows (s)."""
-        options = self._options
-        if self._soon:
-            return 0.0 if self._suspected else options.again_s
-        return options.period_s if self._somebody_may_be_near() else options.idle_s
+    def _due(self, cameras: Sequence[CameraCapabilities], now_s: float) -> tuple[Sequence[CameraCapabilities], bool]:
+        """The cameras whose next picture is due, and whether depth is wanted with it."""
+        options, since_s = self._options, now_s - self._looked_s
+        if self._soon or self._seen:
+            period_s = (0.0 if self._suspected else options.again_s) if self._soon else options.period_s
+            return (cameras if since_s >= period_s else ()), True
+        if now_s >= self._all_looked_s + options.idle_s:
+            self._all_looked_s = now_s
+            return cameras, bool(self._showing_something(cameras))
+        return (self._showing_something(cameras) if since_s >= options.period_s else ()), True
 
-    def _somebody_may_be_near(self) -> bool:
-        """Whether somebody is known, or something stands near that the map does not explain, as far as can be told."""
+    def _showing_something(self, cameras: Sequence[CameraCapabilities]) -> Sequence[CameraCapabilities]:
+        """Those that have something in view that the map does not explain; all where the costmap cannot tell."""
         costmap, here = self._context.costmap, self._context.pose()
-        if self._seen or not isinstance(costmap, LayeredView):
-            return True
-        return bool(np.any(np.linalg.norm(costmap.seen_m() - (here.x_m, here.y_m), axis=1) < self._options.near_m))
+        if not isinstance(costmap, LayeredView):
+            return cameras
+        off_W = costmap.seen_m() - (here.x_m, here.y_m)
+        near_W = off_W[np.linalg.norm(off_W, axis=1) < self._options.near_m]
+        bearings_rad = np.arctan2(near_W[:, 1], near_W[:, 0]) - here.yaw_rad
+        return [each for each in cameras if _shown(bearings_rad - each.heading_rad, self._options.view_rad)]
 
     def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D, with_depth: bool) -> _Look:
         """People in one picture of each camera; without depth only whether there may be somebody."""
@@ -206,7 +213,12 @@ def _inside(image: Image, X_WO: RigidTransform, points_W: FloatArray, reach_m: f
     return bool(np.any(inside & (p_C[2] > _NEAREST_M) & (p_C[2] < reach_m)))
 
 
-def cameras_towards(velocity: FloatArray, known: Sequence[CameraCapabilities]) -> tuple[str, ...]:
+def _shown(off_axis_rad: FloatArray, view_rad: float) -> bool:
+    """Whether any of some bearings lies so near to a camera's axis."""
+    return bool(np.any(np.cos(off_axis_rad) > math.cos(view_rad)))
+
+
+def cameras_towards(velocity: FloatArray, known: Sequence[CameraCapabilities]) -> tuple[CameraCapabilities, ...]:
     """The body cameras that look where a body-frame velocity leads; those ahead when the robot stands or turns."""
     vx, vy = float(velocity[0]), float(velocity[1])
     heading_rad = 0.0
@@ -214,4 +226,4 @@ def cameras_towards(velocity: FloatArray, known: Sequence[CameraCapabilities]) -
         heading_rad = math.copysign(math.pi / 2, vy)
     elif vx < 0.0:
         heading_rad = math.pi
-    return tuple(camera.source for camera in known if camera.looks_towards(heading_rad))
+    return tuple(camera for camera in known if camera.looks_towards(heading_rad))

@@ -30,7 +30,7 @@ from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 
 CONTROL_PERIOD_S = 0.01
-SLEEP_PERIOD_STEPS = 2
+SLEEP_PERIOD_STEPS = 5
 REFEREE_PERIOD_STEPS = 5
 SETTLING_S = 1.5
 
@@ -106,7 +106,7 @@ class Engine:
                 self._sleepers.update(self.now())
             self._command_robots()
             self._steps += 1
-            self._simulator.AdvanceTo(self.now())
+            self._simulator.AdvanceTo(self.now(), interruptible=False)
             self.work["plant_steps"] += round(CONTROL_PERIOD_S / self.world.plant.time_step())
             for every, observer in self._observers:
                 if self._steps % every == 0:

@@ -31,7 +31,7 @@ from skills.perception.class_forms import class_forms
 from skills.perception.coverage import Coverage
 from skills.perception.detection_3d import FLOOR, Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in, is_dark
-from skills.perception.surface_segmentation import Cluster, view_surface
+from skills.perception.surface_segmentation import Cluster, view_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.robot import FloatArray, Image
 
@@ -301,7 +301,7 @@ class Detect(ArmSkill[DetectInputs]):
 
         def examine() -> Look:
             found = detections_in(detector, image, FAINT_SCORE)
-            views = (view_surface(image, place.X_WO, surface) for surface in inputs.surfaces)
+            views = view_surfaces(image, place.X_WO, inputs.surfaces)
             clusters = tuple(cluster for view in views if view is not None for cluster in view.clusters)
             return Look(image, place, found, detections_3d(image, place, found, inputs.surfaces), clusters)
 

@@ -82,7 +82,7 @@ def _rectangle(xy: FloatArray, height: float) -> SeenShape:
 
 def without_strays(xy: FloatArray, cell_m: float = 0.006) -> FloatArray:
     """Points whose grid cell holds at least two of them, or all when that leaves too few."""
-    cells = np.floor(xy / cell_m).astype(np.int64)
-    _, inverse, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    kept = xy[counts[inverse.ravel()] >= 2]
+    columns, rows = np.floor((xy - xy.min(axis=0)) / cell_m).astype(np.int64).T
+    cells = rows * (columns.max() + 1) + columns
+    kept = xy[np.bincount(cells)[cells] >= 2]
     return kept if len(kept) >= 8 else xy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -57,7 +58,18 @@ class SurfaceView:
 
 def view_surface(image: Image, X_WO: RigidTransform, surface: Surface, margin_m: float = 0.03) -> SurfaceView | None:
     """Plane and clusters of one surface in a picture; None when too little of the surface is seen."""
-    cloud = cloud_from_image(image, X_WO)
+    return next(view_surfaces(image, X_WO, (surface,), margin_m))
+
+
+def view_surfaces(
+    image: Image, X_WO: RigidTransform, surfaces: Sequence[Surface], margin_m: float = 0.03
+) -> Iterator[SurfaceView | None]:
+    """The same for each of some surfaces."""
+    cloud, p_WC = cloud_from_image(image, X_WO), camera_pose_W(image, X_WO).translation()
+    return (_view(cloud, p_WC, surface, margin_m) for surface in surfaces)
+
+
+def _view(cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: float) -> SurfaceView | None:
     above = cloud.p_W[:, 2] - surface.height_m
     cloud = cloud.where((above > -_PLANE_BAND_M) & (above < _HIGHEST_M))
     cloud = cloud.where(inside_polygon(cloud.p_W[:, :2], surface.polygon_W, margin_m))
@@ -66,7 +78,6 @@ def view_surface(image: Image, X_WO: RigidTransform, surface: Surface, margin_m:
         return None
     height = cloud.p_W[:, 2] - plane.z(cloud.p_W[:, :2])
     standing = cloud.where(height > max(_LOWEST_M, 3.0 * plane.noise_m))
-    p_WC = camera_pose_W(image, X_WO).translation()
     clusters = tuple(_cluster(points, surface.name, plane, p_WC) for points in _groups(standing))
     return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
 

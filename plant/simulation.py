@@ -30,6 +30,7 @@ from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 
 CONTROL_PERIOD_S = 0.01
+CONTROL_PERIOD_STEPS = 2
 SLEEP_PERIOD_STEPS = 5
 REFEREE_PERIOD_STEPS = 5
 SETTLING_S = 1.5
@@ -104,7 +105,8 @@ class Engine:
         for _ in range(max(1, round(dt_s / CONTROL_PERIOD_S))):
             if self._steps % SLEEP_PERIOD_STEPS == 0:
                 self._sleepers.update(self.now())
-            self._command_robots()
+            if self._steps % CONTROL_PERIOD_STEPS == 0:
+                self._command_robots()
             self._steps += 1
             self._simulator.AdvanceTo(self.now(), interruptible=False)
             self.work["plant_steps"] += round(CONTROL_PERIOD_S / self.world.plant.time_step())
@@ -149,7 +151,7 @@ class Engine:
 
     def _command_robots(self) -> None:
         for spot in self._spots.values():
-            spot.control(self.now(), CONTROL_PERIOD_S)
+            spot.control(self.now(), CONTROL_PERIOD_STEPS * CONTROL_PERIOD_S)
 
 
 class Simulation:

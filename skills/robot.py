@@ -39,17 +39,15 @@ class Pose2D:
 
     def transform(self, z_m: float = 0.0) -> RigidTransform:
         """The same pose as a RigidTransform at height z_m."""
-        from pydrake.math import RigidTransform, RollPitchYaw
+        from pydrake.math import RigidTransform, RotationMatrix
 
-        return RigidTransform(RollPitchYaw(0.0, 0.0, self.yaw_rad), [self.x_m, self.y_m, z_m])
+        return RigidTransform(RotationMatrix.MakeZRotation(self.yaw_rad), [self.x_m, self.y_m, z_m])
 
     @staticmethod
     def from_transform(X_AB: RigidTransform) -> Pose2D:
         """The planar part of X_AB."""
-        from pydrake.math import RollPitchYaw
-
-        p = X_AB.translation()
-        return Pose2D(float(p[0]), float(p[1]), float(RollPitchYaw(X_AB.rotation()).yaw_angle()))
+        (xx, _, _, x), (yx, _, _, y), _ = X_AB.GetAsMatrix34().tolist()
+        return Pose2D(x, y, math.atan2(yx, xx))
 
 
 class BaseKind(enum.Enum):

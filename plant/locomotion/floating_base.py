@@ -47,7 +47,7 @@ class FloatingBaseLimits:
     torque_nm: float = 120.0
     lift_n: float = 900.0
     pitch_torque_nm: float = 250.0
-    lead_m: float = 0.01
+    lead_m: float = 0.02
 
 
 @dataclass(frozen=True)

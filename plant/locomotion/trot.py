@@ -7,12 +7,11 @@ of its next stance.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from plant.models.spot.description import LEGS
-from plant.snapshot.values import State, array_of
+from plant.snapshot.values import State
 from skills.robot import FloatArray
 
 _PAIRS = ((0, 3), (1, 2))  # indices into LEGS: fl with hr, fr with hl
@@ -52,17 +51,17 @@ class Trot:
 
     def __init__(self, nominal_B: FloatArray, parameters: TrotParameters | None = None) -> None:
         """`nominal_B`: (4, 2) resting places of the feet in the body frame."""
-        self._nominal_B = nominal_B
+        self._nominal_B: list[list[float]] = nominal_B.tolist()
         self._parameters = parameters or TrotParameters()
-        self._feet_W = np.zeros((len(LEGS), 3))
-        self._lift_W = np.zeros((len(LEGS), 3))
+        self._feet_W = [[0.0, 0.0, 0.0] for _ in LEGS]
+        self._lift_W = [[0.0, 0.0, 0.0] for _ in LEGS]
         self._swinging: int | None = None
         self._next_pair = 0
         self._progress_s = 0.0
 
     def reset(self, motion: BodyMotion) -> None:
         """Put all feet to rest under a body at this pose."""
-        self._feet_W = self._places(motion, 0.0, 0.0)
+        self._feet_W = [[*self._place(foot, motion, 0.0), self._parameters.foot_radius_m] for foot in range(len(LEGS))]
         self._swinging = None
         self._progress_s = 0.0
 
@@ -72,55 +71,62 @@ class Trot:
         lifted = _PAIRS[self._swinging] if self._swinging is not None else ()
         return tuple(foot not in lifted for foot in range(len(LEGS)))
 
-    def step(self, motion: BodyMotion, dt_s: float) -> FloatArray:
-        """Advance by dt_s; returns the feet's centres in the world frame, (4, 3)."""
+    def step(self, motion: BodyMotion, dt_s: float) -> Sequence[Sequence[float]]:
+        """Advance by dt_s; returns the feet's centres (x, y, z) in the world frame, to be read before the next step."""
         if self._swinging is None:
             self._maybe_lift(motion)
         if self._swinging is not None:
             self._swing(motion, dt_s)
-        return self._feet_W.copy()
+        return self._feet_W
 
     def state(self) -> State:
         """Where the feet are in their gait."""
         gait = {"swinging": self._swinging, "next_pair": self._next_pair, "progress_s": self._progress_s}
-        return {"feet_W": self._feet_W.tolist(), "lift_W": self._lift_W.tolist(), **gait}
+        return {"feet_W": _copied(self._feet_W), "lift_W": _copied(self._lift_W), **gait}
 
     def restore(self, state: State) -> None:
         """Go on from such a state."""
-        self._feet_W, self._lift_W = array_of(state["feet_W"]), array_of(state["lift_W"])
+        self._feet_W, self._lift_W = _copied(state["feet_W"]), _copied(state["lift_W"])
         self._swinging, self._next_pair = state["swinging"], state["next_pair"]
         self._progress_s = state["progress_s"]
 
     def _maybe_lift(self, motion: BodyMotion) -> None:
         moving = math.hypot(motion.vx, motion.vy) > 0.02 or abs(motion.wz) > 0.05
         if not moving:
-            offsets = self._feet_W - self._places(motion, 0.0, 0.0)
-            worst = [max(math.hypot(*offsets[foot, :2]) for foot in pair) for pair in _PAIRS]
+            worst = [max(self._off_place_m(foot, motion) for foot in pair) for pair in _PAIRS]
             if max(worst) < self._parameters.rest_tolerance_m:
                 return
-            self._next_pair = int(np.argmax(worst))
+            self._next_pair = worst.index(max(worst))
         self._swinging = self._next_pair
         self._next_pair = 1 - self._next_pair
         self._progress_s = 0.0
-        self._lift_W = self._feet_W.copy()
+        self._lift_W = _copied(self._feet_W)
 
     def _swing(self, motion: BodyMotion, dt_s: float) -> None:
         assert self._swinging is not None
         p = self._parameters
         self._progress_s += dt_s
         share = min(1.0, self._progress_s / p.swing_s)
-        landing = self._places(motion, p.swing_s - min(self._progress_s, p.swing_s), p.swing_s / 2)
+        ahead_s = p.swing_s - min(self._progress_s, p.swing_s) + p.swing_s / 2  # the middle of the next stance
         blend = share * share * (3 - 2 * share)
+        height_m = p.foot_radius_m + p.swing_height_m * math.sin(math.pi * share)
         for foot in _PAIRS[self._swinging]:
-            self._feet_W[foot] = (1 - blend) * self._lift_W[foot] + blend * landing[foot]
-            self._feet_W[foot, 2] = p.foot_radius_m + p.swing_height_m * math.sin(math.pi * share)
+            (x, y), (lift_x, lift_y, _) = self._place(foot, motion, ahead_s), self._lift_W[foot]
+            self._feet_W[foot] = [(1 - blend) * lift_x + blend * x, (1 - blend) * lift_y + blend * y, height_m]
         if share >= 1.0:
             self._swinging = None
 
-    def _places(self, motion: BodyMotion, until_landing_s: float, half_stance_s: float) -> FloatArray:
-        """Resting places under the body as it will be in the middle of the next stance, (4, 3)."""
-        x, y, yaw = motion.ahead(until_landing_s + half_stance_s)
+    def _place(self, foot: int, motion: BodyMotion, ahead_s: float) -> tuple[float, float]:
+        """Resting place (x, y) of a foot under the body as it will be so much later."""
+        x, y, yaw = motion.ahead(ahead_s)
         c, s = math.cos(yaw), math.sin(yaw)
-        turned_to_W = np.array([[c, s, 0.0], [-s, c, 0.0]])
-        places: FloatArray = self._nominal_B @ turned_to_W + (x, y, self._parameters.foot_radius_m)
-        return places
+        forward, left = self._nominal_B[foot]
+        return x + c * forward - s * left, y + s * forward + c * left
+
+    def _off_place_m(self, foot: int, motion: BodyMotion) -> float:
+        (x, y), (foot_x, foot_y, _) = self._place(foot, motion, 0.0), self._feet_W[foot]
+        return math.hypot(foot_x - x, foot_y - y)
+
+
+def _copied(rows: Sequence[Sequence[float]]) -> list[list[float]]:
+    return [list(row) for row in rows]

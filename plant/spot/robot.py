@@ -375,11 +375,18 @@ class SpotRobot:
         return positions
 
 
-def _feet_ahead(feet_W: FloatArray, motion: BodyMotion, X_WB: FloatArray, dt_s: float) -> FloatArray:
-    """Feet (4, 3) in the frame of a body that, from X_WB (3, 4), moves on for dt_s at the same height and tilt."""
+def _feet_ahead(
+    feet_W: Sequence[Sequence[float]], motion: BodyMotion, X_WB: FloatArray, dt_s: float
+) -> list[tuple[float, float, float]]:
+    """Feet in the frame of a body that, from X_WB (3, 4), moves on for dt_s at the same height and tilt."""
     x, y, yaw = motion.ahead(dt_s)
     c, s = math.cos(yaw - motion.yaw_rad), math.sin(yaw - motion.yaw_rad)
-    turned_back = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    feet_now_W = (feet_W - (x, y, 0.0)) @ turned_back + (motion.x_m, motion.y_m, 0.0)
-    feet_B: FloatArray = (feet_now_W - X_WB[:, 3]) @ X_WB[:, :3]
+    (xx, xy, xz, x0), (yx, yy, yz, y0), (zx, zy, zz, z0) = X_WB.tolist()
+    feet_B = []
+    for foot_x, foot_y, foot_z in feet_W:
+        ahead_x, ahead_y = foot_x - x, foot_y - y
+        dx = c * ahead_x + s * ahead_y + motion.x_m - x0
+        dy = c * ahead_y - s * ahead_x + motion.y_m - y0
+        dz = foot_z - z0
+        feet_B.append((xx * dx + yx * dy + zx * dz, xy * dx + yy * dy + zy * dz, xz * dx + yz * dy + zz * dz))
     return feet_B

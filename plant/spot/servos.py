@@ -52,12 +52,12 @@ class LegServos:
         self.rest_rad = rest_rad.copy()
         self._last = rest_rad.copy()
 
-    def set_points(self, feet_B: FloatArray, dt_s: float) -> tuple[FloatArray, FloatArray]:
-        """Positions and velocities (4, 3) of the leg joints for feet (4, 3) in the body frame.
+    def set_points(self, feet_B: Sequence[Sequence[float]], dt_s: float) -> tuple[FloatArray, FloatArray]:
+        """Positions and velocities (4, 3) of the leg joints for feet at (x, y, z) in the body frame.
 
         A foot out of reach keeps its leg as it was.
         """
-        solved = [self._solve(foot, p_BFoot) for foot, p_BFoot in enumerate(feet_B.tolist())]
+        solved = [self._solve(foot, p_BFoot) for foot, p_BFoot in enumerate(feet_B)]
         joints = np.minimum(np.maximum(solved, self._lower), self._upper)
         rates = np.minimum(np.maximum((joints - self._last) / dt_s, -_MAX_LEG_RATE_RAD_S), _MAX_LEG_RATE_RAD_S)
         self._last = joints

@@ -56,14 +56,15 @@ def _select(
     """The loop of `scan_points`."""
     points = np.empty((ranges.size, 5))
     count = 0
+    cosines, sines = np.cos(elevations), np.sin(elevations)
     for j in range(azimuths.shape[0]):
         ca, sa = math.cos(azimuths[j]), math.sin(azimuths[j])
         for i in range(elevations.shape[0]):
             r = float(ranges[i, j])
             if not r < limits[2]:
                 continue
-            ce = math.cos(elevations[i])
-            x, y, z = r * ce * ca, r * ce * sa, r * math.sin(elevations[i])
+            across = r * cosines[i]
+            x, y, z = across * ca, across * sa, r * sines[i]
             height = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2]
             if limits[0] <= height <= limits[1]:
                 points[count, 0] = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]

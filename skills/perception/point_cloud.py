@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from skills.robot import FloatArray, Image
+from skills.robot import FloatArray, Image, Intrinsics
 
 MIN_DEPTH_M = 0.15
 MAX_DEPTH_M = 4.0
@@ -35,17 +37,34 @@ def camera_pose_W(image: Image, X_WO: RigidTransform) -> RigidTransform:
     return X_WO @ image.frames.pose(image.camera_frame)
 
 
-def cloud_from_image(image: Image, X_WO: RigidTransform, max_depth_m: float = MAX_DEPTH_M) -> PointCloud:
-    """All valid depth pixels as world points; those of a grey picture are grey."""
+def cloud_from_image(
+    image: Image,
+    X_WO: RigidTransform,
+    max_depth_m: float = MAX_DEPTH_M,
+    heights_m: tuple[float, float] = (-math.inf, math.inf),
+) -> PointCloud:
+    """All valid depth pixels between two heights as world points; those of a grey picture are grey."""
     colour = np.repeat(image.grey[..., None], 3, axis=2) if image.colour is None else image.colour
-    lens, depth = image.depth_intrinsics, image.depth_m
-    rows, columns = np.nonzero((depth > MIN_DEPTH_M) & (depth < max_depth_m))
-    z = depth[rows, columns].astype(np.float64)
-    x, y = (columns - lens.cx) / lens.fx * z, (rows - lens.cy) / lens.fy * z
-    X_WC = camera_pose_W(image, X_WO)
-    p_W = np.stack([x, y, z], axis=1) @ X_WC.rotation().matrix().T + X_WC.translation()
-    pixels = _colour_pixels(image, np.stack([x / z, y / z], axis=1))
+    depth, X_WC = image.depth_m, camera_pose_W(image, X_WO)
+    x_C, y_C = _rays(image.depth_intrinsics)
+    R_WC, p_WC = X_WC.rotation().matrix(), X_WC.translation()
+    height = depth * (R_WC[2, 0] * x_C + R_WC[2, 1] * y_C[:, None] + R_WC[2, 2]).astype(np.float32) + p_WC[2]
+    low_m, high_m = heights_m
+    kept = (depth > MIN_DEPTH_M) & (depth < max_depth_m) & (height > low_m) & (height < high_m)
+    rows, columns = np.nonzero(kept)
+    rays = np.column_stack([x_C[columns], y_C[rows]])
+    z = depth[kept].astype(np.float64)[:, None]
+    p_W = z * (rays @ R_WC[:, :2].T + R_WC[:, 2]) + p_WC
+    pixels = _colour_pixels(image, rays)
     return PointCloud(p_W, pixels, colour[pixels[:, 1], pixels[:, 0]])
+
+
+@lru_cache(maxsize=8)
+def _rays(lens: Intrinsics) -> tuple[FloatArray, FloatArray]:
+    """x/z of each column (W,) and y/z of each row (H,) of a lens."""
+    return (np.arange(lens.width, dtype=np.float64) - lens.cx) / lens.fx, (
+        np.arange(lens.height, dtype=np.float64) - lens.cy
+    ) / lens.fy
 
 
 def _colour_pixels(image: Image, rays: FloatArray) -> NDArray[np.int64]:

@@ -65,7 +65,9 @@ def view_surfaces(
     image: Image, X_WO: RigidTransform, surfaces: Sequence[Surface], margin_m: float = 0.03
 ) -> Iterator[SurfaceView | None]:
     """The same for each of some surfaces."""
-    cloud, p_WC = cloud_from_image(image, X_WO), camera_pose_W(image, X_WO).translation()
+    levels_m = [surface.height_m for surface in surfaces]
+    band_m = (min(levels_m, default=0.0) - _PLANE_BAND_M, max(levels_m, default=0.0) + _HIGHEST_M)
+    cloud, p_WC = cloud_from_image(image, X_WO, heights_m=band_m), camera_pose_W(image, X_WO).translation()
     return (_view(cloud, p_WC, surface, margin_m) for surface in surfaces)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -63,10 +64,7 @@ class OnnxDetector:
 
         Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. Raises ValueError for what is no such picture.
         """
-        if len(pictures) < 2:
-            return [self._detect(picture) for picture in pictures]
-        with ThreadPoolExecutor(THREADS) as threads:
-            return list(threads.map(self._detect, pictures))
+        return _side_by_side(self._detect, pictures)
 
     def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[tuple[Detection, ...]]:
         """The objects of one class in each picture, quickly.
@@ -76,7 +74,7 @@ class OnnxDetector:
         """
         if class_name not in self.class_names:
             raise ValueError(f"the detector knows no class {class_name!r}")
-        return [self._detect_class(picture, self.class_names.index(class_name)) for picture in pictures]
+        return _side_by_side(partial(self._detect_class, number=self.class_names.index(class_name)), pictures)
 
     def _detect(self, picture: Picture) -> tuple[Detection, ...]:
         image, placed = letterbox(picture)
@@ -104,6 +102,16 @@ class OnnxDetector:
         found = candidates_of(boxes, scores, least, options.suppression.most_candidates)
         in_picture = replace(found, boxes=placed.to_picture(found.boxes))
         return detections_of(in_picture, self.class_names, options.threshold, options.suppression)
+
+
+def _side_by_side(
+    detect: Callable[[Picture], tuple[Detection, ...]], pictures: Sequence[Picture]
+) -> list[tuple[Detection, ...]]:
+    """What is in each picture, several at a time."""
+    if len(pictures) < 2:
+        return [detect(picture) for picture in pictures]
+    with ThreadPoolExecutor(THREADS) as threads:
+        return list(threads.map(detect, pictures))
 
 
 def _proposed(network: Network, image: Picture) -> tuple[Floats, Floats]:

@@ -14,7 +14,7 @@ def walk(trot, vx, vy, wz, seconds):
     feet, stances = [], []
     for _ in range(round(seconds / DT_S)):
         motion = BodyMotion(x, y, yaw, vx, vy, wz)
-        feet.append(trot.step(motion, DT_S))
+        feet.append(np.array(trot.step(motion, DT_S)))
         stances.append(trot.stance)
         x, y, yaw = motion.ahead(DT_S)
     return np.array(feet), np.array(stances), (x, y, yaw)
@@ -50,7 +50,7 @@ def test_feet_come_to_rest_under_the_body_when_it_stops():
     _, _, (x, y, yaw) = walk(trot, 0.8, 0.0, 0.6, 2.0)
     still = BodyMotion(x, y, yaw, 0.0, 0.0, 0.0)
     for _ in range(200):
-        feet = trot.step(still, DT_S)
+        feet = np.array(trot.step(still, DT_S))
     c, s = math.cos(yaw), math.sin(yaw)
     places = nominal_footholds() @ np.array([[c, s], [-s, c]]) + [x, y]
     assert np.abs(feet[:, :2] - places).max() < 0.03

@@ -370,6 +370,6 @@ class Skill(ABC, Generic[InputsT]):
     def undone(self, inputs: InputsT) -> str | None:
         """After a restart: why what an earlier success brought about is no longer so; None when it is, or is not seen.
 
-        Looks at what the sensors tell at once; moves nothing. Half a sentence, such as "the jaw is empty".
+        Looks at what the sensors tell at once; moves nothing. Half a sentence, such as "the gripper is empty".
         """
         return None

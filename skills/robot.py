@@ -83,7 +83,7 @@ class ArmCapabilities:
 
 @dataclass(frozen=True)
 class GripperCapabilities:
-    """The gripper: 0 is closed, `open_rad` is fully open (a positive jaw angle).
+    """The gripper: 0 is closed, `open_rad` is fully open (a positive finger angle).
 
     Geometry in the hand frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, fingertips at
     `tip_x_m`, the inner face of the fixed finger at `fixed_z_m`; the tips are 2 `half_breadth_m` wide along y and
@@ -274,7 +274,7 @@ class Joints:
 
 @dataclass(frozen=True)
 class Gripper:
-    """Jaw angle (0 closed), clamp force at the jaw tip (N), and whether the robot believes that it holds something."""
+    """Finger angle (0 closed), clamp force at the fingertip (N), whether the robot believes that it holds something."""
 
     stamp_s: float
     opening_rad: float
@@ -390,9 +390,9 @@ class Robot(Protocol):
         """Follow a joint trajectory; done when its end is reached and the arm is still."""
 
     def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the jaw to an opening with at most force_n at its tip; done when there or when held by a thing.
+        """Move the gripper to an opening with at most force_n at its tip; done when there or when held by a thing.
 
-        The jaw keeps its clamp force after the command's end: what is held stays held.
+        The gripper keeps its clamp force after the command's end: what is held stays held.
         """
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:

@@ -188,7 +188,7 @@ class RoutineSkill(Skill[InputsT]):
             trajectory = rest_of(trajectory, stopped_s - begun_s, self._stance_now().arm_rad)
 
     def move_gripper(self, opening_rad: float, force_n: float, message: str) -> Routine[None]:
-        """Move the jaw with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
+        """Move the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
         context = self.context
         stopped_s: float | None = 0.0
         while stopped_s is not None:

@@ -1,6 +1,6 @@
 """Grasp candidates from the shape of what is seen, and which of them the arm can carry out.
 
-The jaw closes along the hand's z axis, which is kept level: from the side with the wrist rolled for what stands,
+The gripper closes along the hand's z axis, which is kept level: from the side with the wrist rolled for what stands,
 from above for what lies. Along a long thing the local width counts, so that a hammer is taken by its handle.
 """
 
@@ -43,7 +43,7 @@ class Target:
 
 @dataclass(frozen=True)
 class GraspCandidate:
-    """A hand pose about a thing, the width between the jaws (m), what speaks against it, its tilt (rad, 0 level)."""
+    """A hand pose about a thing, the width between the fingers (m), what speaks against it, its tilt (rad, 0 level)."""
 
     X_BH: RigidTransform
     width_m: float

@@ -50,7 +50,7 @@ class HandOverOptions:
 
 
 class HandOver(ArmSkill[HandOverInputs]):
-    """Finds the person by LiDAR, goes before them, stretches out the arm; the thing stays in the jaw."""
+    """Finds the person by LiDAR, goes before them, stretches out the arm; the thing stays in the gripper."""
 
     name = "hand_over"
     Inputs = HandOverInputs
@@ -69,7 +69,7 @@ class HandOver(ArmSkill[HandOverInputs]):
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
         """Find, go, hold out."""
         if not self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the jaw to hand over")
+            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to hand over")
         person = yield from self._find(inputs.person)
         if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
             yield from self._go_before(person, inputs.person)

@@ -1,4 +1,4 @@
-"""The stow skill: the arm folded onto the body, or, with a thing in the jaw, the thing held near the body."""
+"""The stow skill: the arm folded onto the body, or, with a thing in the gripper, the thing held near the body."""
 
 from __future__ import annotations
 

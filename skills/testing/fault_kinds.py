@@ -26,7 +26,7 @@ SENSE_VERBS: Final = ("odometry", "imu", "scan", "image", "joints", "gripper", "
 MOTION_VERBS: Final = ("drive", "stand", "sit", "move_arm", "set_gripper")
 
 _OTHER_WORDS: Final[Mapping[str, str]] = MappingProxyType(
-    {"camera": "image", "lidar": "scan", "arm": "move_arm", "jaw": "set_gripper", "base": "drive", "body": "stand"}
+    {"camera": "image", "lidar": "scan", "arm": "move_arm", "base": "drive", "body": "stand"}
 )
 
 
@@ -85,7 +85,8 @@ def verb_of(word: str) -> str:
 
 
 def _among(match: re.Match[str], verbs: tuple[str, ...]) -> frozenset[str]:
-    verb = verb_of(match["verb"])
+    closes = match["verb"] == "gripper" and "set_gripper" in verbs
+    verb = "set_gripper" if closes else verb_of(match["verb"])
     if verb not in verbs:
         raise ValueError(f"'{match['verb']}' cannot do that; those that can are {', '.join(verbs)}")
     return frozenset((verb,))
@@ -114,7 +115,7 @@ def _raises(match: re.Match[str]) -> Effect:
 
 
 def _refuses(match: re.Match[str]) -> Effect:
-    return _answered(match, CommandStatus(CommandState.REFUSED, f"{verb_of(match['verb'])} is out of order"))
+    return _answered(match, CommandStatus(CommandState.REFUSED, f"{match['verb']} is out of order"))
 
 
 def _never_ends(match: re.Match[str]) -> Effect:

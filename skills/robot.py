@@ -87,7 +87,7 @@ class GripperCapabilities:
 
     Geometry in the hand frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, fingertips at
     `tip_x_m`, the inner face of the fixed finger at `fixed_z_m`; the tips are 2 `half_breadth_m` wide along y and
-    `tip_thickness_m` thick. A thing in the grip has its middle about `grip_x_m` ahead of H, and things up to
+    `tip_thickness_m` thick. An object in the grip has its middle about `grip_x_m` ahead of H, and objects up to
     `max_grasp_m` wide are taken. Hand, gripper and what it holds end `length_m` ahead of H.
     """
 
@@ -390,7 +390,7 @@ class Robot(Protocol):
         """Follow a joint trajectory; done when its end is reached and the arm is still."""
 
     def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the gripper to an opening with at most force_n at its tip; done when there or when held by a thing.
+        """Move the gripper to an opening with at most force_n at its tip; done when there or when held by an object.
 
         The gripper keeps its clamp force after the command's end: what is held stays held.
         """

@@ -77,7 +77,7 @@ def task_messages(
         stamp: the robot's clock (s).
         first_sequence: the number of the first message; the others follow.
         robot_name: whose commands they are.
-        classes: the classes that a thing's name stands for, as `Knowledge.classes`.
+        classes: the classes that an object's name stands for, as `Knowledge.classes`.
         position: where a command's goal is, (x, y) in the world frame (m).
 
     Raises:

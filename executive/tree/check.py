@@ -21,10 +21,10 @@ __all__ = ["Abilities", "Checked", "PlannedWays", "check_tree"]
 
 @dataclass(frozen=True)
 class Abilities:
-    """What is known of robot and things: masses (kg) of the classes that can be handled, and what the arm lifts (kg).
+    """What is known of robot and objects: masses (kg) of the classes that can be handled, and what the arm lifts (kg).
 
-    A class that is not in `masses_kg` has no model: there is no such thing in any world. `classes` and `attributes` are
-    those that the robot knows by sight; one that it does not know spoils a search for several.
+    A class that is not in `masses_kg` has no model: no world has such an object. `classes` and `attributes` are those
+    that the robot knows by sight; one that it does not know spoils a search for several.
     """
 
     masses_kg: Mapping[str, float]
@@ -74,14 +74,14 @@ def check_tree(
     itinerary: Itinerary,
     estimates: Estimates,
 ) -> Checked:
-    """Check a compiled mission that begins at `start`: are its things there and light enough, its places in reach?"""
+    """Check a compiled mission that begins at `start`: are its objects there and light enough, its places in reach?"""
     impossible = tuple(error for part in tree.parts for error in _impossible(part, tree, knowledge, abilities))
     estimate, unreachable = estimate_tree(tree.root, start=start, itinerary=itinerary, estimates=estimates)
     return Checked((*impossible, *unreachable), estimate)
 
 
 def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[InputError]:
-    """What makes a command impossible: its thing is not known by sight, or nothing that it means can be lifted."""
+    """What makes a command impossible: its object is not known by sight, or nothing that it means can be lifted."""
     command = part.command
     if command is None or command.task not in (Task.GRASP, Task.FIND) or command.object is None:
         return

@@ -225,8 +225,8 @@ def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...
 
 
 def _thing(value: Any, knowledge: Knowledge, path: Path) -> Thing:
-    """A thing in words, by its own name."""
-    said = thing(_name(value, "a thing in words", path))
+    """An object in words, by its own name."""
+    said = thing(_name(value, "an object in words", path))
     known = knowledge.thing(said.name)
     if known is None:
         raise _unknown("thing", said.name, knowledge.thing_names(), knowledge, path)

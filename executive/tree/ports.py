@@ -51,7 +51,7 @@ def _default(field: dataclasses.Field[Any]) -> str:
 
 
 def plain(value: Any) -> str:
-    """A value in few words: numbers short, enum members by name, things and surfaces by their own text or name."""
+    """A value in few words: numbers short, enum members by name, objects and surfaces by their own text or name."""
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, enum.Enum):

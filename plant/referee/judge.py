@@ -43,7 +43,7 @@ def offered(story: ObjectStory, p_WP: FloatArray) -> bool:
 
 
 def judge(promises: Sequence[Promise], truth: Truth, *, collisions: int, drops: int) -> Verdict:
-    """The verdict on all promises: the last is judged as things stand, earlier ones by the record."""
+    """The verdict on all promises: the last is judged by the present state, earlier ones by the record."""
     findings = [_judge_one(promises, i, truth) for i in range(len(promises))]
     why = " ".join(finding.sentence for finding in findings) or "Nothing was promised."
     return Verdict(all(finding.holds for finding in findings), why, collisions, drops)
@@ -90,7 +90,7 @@ def _judge_handed_over(promise: Promise, truth: Truth, past: bool) -> Finding:
 
 
 def _why_not_handed(promise: Promise, things: Sequence[ObjectStory], people: Mapping[str, FloatArray]) -> str:
-    """The sentence on a hand-over that failed: of the thing in a gripper, or else of what was wanted."""
+    """The sentence on a hand-over that failed: of the object in a gripper, or else of what was wanted."""
     held = [story for story in things if story.held_by is not None]
     if not held:
         return f"No {_wanted(promise)} from {_where(promise.source)} is in a gripper."

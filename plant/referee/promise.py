@@ -51,7 +51,7 @@ def _inside(polygon: tuple[tuple[float, float], ...], x: float, y: float) -> boo
 
 @dataclass(frozen=True)
 class Promise:
-    """One thing promised.
+    """One goal condition.
 
     `classes` are the object classes that fulfil it and `count` how many objects (0 counts as 1); `source` is where
     they were to be taken from (empty: anywhere) or, for an answer, where was to be looked; `goal` where they or the

@@ -96,7 +96,7 @@ class Referee:
         self._note_offers(time_s)
 
     def judge(self, promises: Sequence[Promise]) -> Verdict:
-        """Whether all promises hold as things stand. Raises ValueError before the first look."""
+        """Whether all promises hold now. Raises ValueError before the first look."""
         if not self._bases:
             raise ValueError("the referee has not observed anything yet")
         truth = Truth(

@@ -1,4 +1,4 @@
-"""The approach skill: stand where the thing seen can be grasped, then look at it again."""
+"""The approach skill: stand where the object seen can be grasped, then look at it again."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STILL_BEFORE_M = 1.3
 
 @dataclass(frozen=True)
 class ApproachInputs:
-    """The thing as it was seen, and the surfaces around (at least the one that it lies on)."""
+    """The object as it was seen, and the surfaces around (at least the one that it lies on)."""
 
     observation: ObjectObservation
     surfaces: tuple[Surface, ...]
@@ -58,9 +58,9 @@ class Approach(ArmSkill[ApproachInputs]):
     options: ApproachOptions
     outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PLANNING: "no free place to stand is near enough to the thing, or no way leads there",
+        Cause.PLANNING: "no free place to stand is near enough to the object, or no way leads there",
         Cause.EXECUTION: "the robot did not get to where it should stand",
-        Cause.POSTCONDITION: "the thing is not seen again from there",
+        Cause.POSTCONDITION: "the object is not seen again from there",
     }
     default_timeout_s = 150.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5, "observation": 3.0}
@@ -133,7 +133,7 @@ def grasp_cost(
     X_WB: RigidTransform,
     seen: ObjectObservation,
 ) -> float | None:
-    """Cost of the best grasp of a thing that the arm reaches with the body at X_WB, beyond the best there is.
+    """Cost of the best grasp of an object that the arm reaches with the body at X_WB, beyond the best there is.
 
     None when it reaches no grasp.
     """

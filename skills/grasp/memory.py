@@ -28,7 +28,7 @@ class TriedGrasp:
 
 
 def tried_grasp(candidate: GraspCandidate, centre_B: tuple[float, float], X_WB: RigidTransform) -> TriedGrasp:
-    """A candidate as it is remembered; `centre_B` is the thing's centre (x, y), X_WB the body's pose then."""
+    """A candidate as it is remembered; `centre_B` is the object's centre (x, y), X_WB the body's pose then."""
     R_WH = X_WB.rotation().matrix() @ candidate.X_BH.rotation().matrix()
     p_B = candidate.X_BH.translation() - np.array([*centre_B, 0.0])
     return TriedGrasp(_vector(R_WH[:, 0]), _vector(R_WH[:, 2]), _vector(X_WB.rotation().matrix() @ p_B))

@@ -1,4 +1,4 @@
-"""The grasp skill: look closely, choose a grasp, take the thing, lift it and make sure that it is held."""
+"""The grasp skill: look closely, choose a grasp, take the object, lift it and make sure that it is held."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 @dataclass(frozen=True)
 class GraspInputs:
-    """The thing to take, as it was seen; grasps like those in `avoid` are chosen only when there are no others."""
+    """The object to take, as it was seen; grasps like those in `avoid` are chosen only when there are no others."""
 
     observation: ObjectObservation
     avoid: tuple[TriedGrasp, ...] = ()
@@ -43,7 +43,7 @@ class GraspInputs:
 
 @dataclass(frozen=True)
 class CloseView:
-    """The thing and what is around it, seen closely; X_WB at that time."""
+    """The object and what is around it, seen closely; X_WB at that time."""
 
     target: Target
     boxes: tuple[Box, ...]
@@ -66,7 +66,7 @@ class GraspOptions:
 
 
 class Grasp(ArmSkill[GraspInputs]):
-    """Ends with the thing held near the body; on failure the gripper is opened and the arm stowed.
+    """Ends with the object held near the body; on failure the gripper is opened and the arm stowed.
 
     The output `tried` is `avoid` and the grasp of this attempt, also after a failure in which one was tried.
     """
@@ -80,7 +80,7 @@ class Grasp(ArmSkill[GraspInputs]):
         Cause.PRECONDITION: "the object is not where it was seen, the gripper is full, or there is no arm",
         Cause.PLANNING: "no grasp is within reach and free",
         Cause.EXECUTION: "the arm or the gripper did not get to where it was sent",
-        Cause.POSTCONDITION: "the gripper closed on nothing, or the thing slipped out",
+        Cause.POSTCONDITION: "the gripper closed on nothing, or the object slipped out",
     }
     default_timeout_s = 120.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
@@ -165,7 +165,7 @@ class Grasp(ArmSkill[GraspInputs]):
                 return
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
-        """A view of the thing from 0.4 m; the plane and what stands around come with it."""
+        """A view of the object from 0.4 m; the plane and what stands around come with it."""
         message = f"looking closely at the {seen.thing}"
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
         surface = _square(seen.position_W, base_m, seen.surface or "surface")
@@ -237,7 +237,7 @@ class Grasp(ArmSkill[GraspInputs]):
                     raise
             else:
                 return
-        raise SkillFailure(Cause.PLANNING, "the arm cannot lift the thing from where it has hold of it")
+        raise SkillFailure(Cause.PLANNING, "the arm cannot lift the object from where it has hold of it")
 
     def _check_held(self, thing: str, opening_before_rad: float | None) -> float:
         gripper = self.context.robot.gripper()
@@ -248,7 +248,7 @@ class Grasp(ArmSkill[GraspInputs]):
         return gripper.opening_rad
 
     def _carry(self, view: CloseView, grasp: GraspCandidate, thing: str) -> Routine[None]:
-        """Draw back from the surface, hold the thing near the body, and check once more."""
+        """Draw back from the surface, hold the object near the body, and check once more."""
         opening = self._check_held(thing, None)
         X_HB = grasp.X_BH.inverse()
         self.held = [_held_box(X_HB, view.target_box)]
@@ -276,7 +276,7 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.move_gripper(0.9 * self.open_rad, GRIPPER_FORCE_N, "opening the gripper after the failure")
 
     def _draw_back(self) -> Routine[None]:
-        """Out of the thing's reach, since the closing gripper must not catch it."""
+        """Out of the object's reach, since the closing gripper must not catch it."""
         ahead = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
         for distance_m in _DRAW_BACK_M:
             try:
@@ -327,7 +327,7 @@ def _examine(
 
 
 def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:
-    """The surface as far as its own points show it, and the same all around the thing, since its edge may be unseen."""
+    """The surface as far as its own points show it, and as much all around the object, since its edge may be unseen."""
     xy = view.plane_points.p_W[:, :2]
     low, high = np.percentile(xy, [0.2, 99.8], axis=0)
     low, high = (
@@ -341,7 +341,7 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
 def _same_thing(
     view: SurfaceView, seen: ObjectObservation, found: tuple[Detection3D, ...], within_m: float
 ) -> Cluster | None:
-    """The cluster that is the thing: detected as of its class and nearest, else nearest of all; None: all are far."""
+    """The cluster that is the object: detected as of its class and nearest, else nearest of all; None: all are far."""
     expected = np.array(seen.position_W[:2])
 
     def off(cluster: Cluster) -> float:
@@ -374,7 +374,7 @@ def _target(cluster: Cluster, X_WB: RigidTransform) -> Target:
 
 
 def _held_box(X_HB: RigidTransform, box: Box) -> Box:
-    """A box in B as the upright box about it in H, for the thing once it is held."""
+    """A box in B as the upright box about it in H, for the object once it is held."""
     half = 0.5 * np.array(box.size_m)
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     X_HG = X_HB @ box.X_FG

@@ -1,4 +1,4 @@
-"""The hand-over skill: hold the thing out to a person, near enough to be taken, and keep holding it."""
+"""The hand-over skill: hold the object out to a person, near enough to be taken, and keep holding it."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class HandOverOptions:
 
 
 class HandOver(ArmSkill[HandOverInputs]):
-    """Finds the person by LiDAR, goes before them, stretches out the arm; the thing stays in the gripper."""
+    """Finds the person by LiDAR, goes before them, stretches out the arm; the object stays in the gripper."""
 
     name = "hand_over"
     Inputs = HandOverInputs
@@ -60,7 +60,7 @@ class HandOver(ArmSkill[HandOverInputs]):
         Cause.PRECONDITION: "nothing is held, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free way for the arm",
         Cause.EXECUTION: "the robot or its arm did not get there",
-        Cause.POSTCONDITION: "the thing is no longer held, or not near the person",
+        Cause.POSTCONDITION: "the object is no longer held, or not near the person",
     }
     default_timeout_s = 120.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
@@ -118,17 +118,17 @@ class HandOver(ArmSkill[HandOverInputs]):
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
             return hold_out_configuration(scene, R_BH, p_BP, self.p_HT, level_m, self.options.gaps_m, q)
 
-        yield from self.move_to(goal, f"holding the thing out to {name}", speed_rad_s=0.8)
+        yield from self.move_to(goal, f"holding the object out to {name}", speed_rad_s=0.8)
 
     def _checked(self, person: SeenPerson, name: str) -> Succeeded:
-        """Raise SkillFailure with cause POSTCONDITION unless the thing is held out near the person."""
+        """Raise SkillFailure with cause POSTCONDITION unless the object is held out near the person."""
         if not self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.POSTCONDITION, f"the thing was lost while it was held out to {name}")
+            raise SkillFailure(Cause.POSTCONDITION, f"the object was lost while it was held out to {name}")
         p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
         off = float(np.linalg.norm(p_BT[:2] - self._ahead(person)))
         if off > self.options.furthest_m:
-            raise SkillFailure(Cause.POSTCONDITION, f"the thing is held {off:.2f} m from {name}, which is too far")
-        return Succeeded(f"holding the thing out, {off:.2f} m from {name}")
+            raise SkillFailure(Cause.POSTCONDITION, f"the object is held {off:.2f} m from {name}, which is too far")
+        return Succeeded(f"holding the object out, {off:.2f} m from {name}")
 
     def _ahead(self, person: SeenPerson) -> FloatArray:
         """The person's axis (x, y) in the body frame."""
@@ -157,9 +157,9 @@ def hold_out_configuration(
     gaps_m: Sequence[float],
     q_near_rad: FloatArray,
 ) -> FloatArray:
-    """Arm angles with the thing before the person, as upright as it is held; level_m is its height in B.
+    """Arm angles with the object before the person, as upright as it is held; level_m is its height in B.
 
-    The person's axis is at p_BP (2,), the middle of the thing at p_HT. Raises PlanningError out of the arm's reach.
+    The person's axis is at p_BP (2,), the middle of the object at p_HT. Raises PlanningError out of the arm's reach.
     """
     direction = math.atan2(p_BP[1], p_BP[0])
     heading = np.array([math.cos(direction), math.sin(direction), 0.0])
@@ -172,7 +172,7 @@ def hold_out_configuration(
         free = [q for q in scene.model.inverse(X_BH, margin_rad=0.05) if scene.free(q)]
         if free:
             return min(free, key=lambda q: float(np.max(np.abs(q - q_near_rad))))
-    raise PlanningError("the arm cannot hold the thing out near enough to the person from here")
+    raise PlanningError("the arm cannot hold the object out near enough to the person from here")
 
 
 def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:

@@ -1,4 +1,4 @@
-"""A nearly level plane on which things rest."""
+"""A nearly level plane on which objects rest."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["LevelPlane"]
 
 @dataclass(frozen=True)
 class LevelPlane:
-    """What a thing rests on: z = height_m + slope . ((x, y) - origin); noise_m is the spread of its points.
+    """What an object rests on: z = height_m + slope . ((x, y) - origin); noise_m is the spread of its points.
 
     In whichever frame with z upwards its points were given.
     """

@@ -1,4 +1,4 @@
-"""The size and place of a thing from the side of it that was seen."""
+"""The size and place of an object from the side of it that was seen."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from skills.robot import FloatArray
 
 @dataclass(frozen=True)
 class SeenShape:
-    """A box about a thing: centre (x, y) in W, length >= width, height above its surface (m), yaw of the length.
+    """A box about an object: centre (x, y) in W, length >= width, height above its surface (m), yaw of the length.
 
     `round` tells that its outline from above fits a circle.
     """
@@ -26,7 +26,7 @@ class SeenShape:
 
 
 def measure(points_W: FloatArray, plane_m: FloatArray, p_WC: FloatArray) -> SeenShape:
-    """Shape of the points (N, 3) of one thing, seen from p_WC; plane_m (N,) is the surface's height below each."""
+    """Shape of the points (N, 3) of one object, seen from p_WC; plane_m (N,) is the surface's height below each."""
     above = points_W[:, 2] - plane_m
     height = float(np.percentile(above, 98))
     if height > 0.06:
@@ -39,13 +39,13 @@ def measure(points_W: FloatArray, plane_m: FloatArray, p_WC: FloatArray) -> Seen
 
 
 def _upper(points_W: FloatArray, above: FloatArray, height: float) -> FloatArray:
-    """Points (x, y) without the lowest, where the thing meets the noise of its surface."""
+    """Points (x, y) without the lowest, where the object meets the noise of its surface."""
     kept = points_W[above > 0.3 * height, :2]
     return kept if len(kept) >= 8 else points_W[:, :2]
 
 
 def circle_seen(xy: FloatArray, p_WC: FloatArray, largest_m: float = 0.09) -> tuple[float, float, float] | None:
-    """Centre and radius, at most largest_m, of the visible front (N, 2) of a round thing; None when it is not round."""
+    """Centre and radius, at most largest_m, of the seen front (N, 2) of a round object; None when it is not round."""
     view = np.mean(xy, axis=0) - p_WC[:2]
     distance = float(np.linalg.norm(view))
     view = view / max(distance, 1e-6)

@@ -33,7 +33,7 @@ _APART_M = 0.035
 
 @dataclass(frozen=True)
 class Cluster:
-    """The points of one thing, the plane that it stands on, its shape and its box (u0, v0, u1, v1) in the picture."""
+    """The points of one object, the plane that it stands on, its shape and its box (u0, v0, u1, v1) in the picture."""
 
     points: PointCloud
     surface: str
@@ -43,7 +43,7 @@ class Cluster:
 
     @property
     def base_m(self) -> float:
-        """Height of the surface under the thing."""
+        """Height of the surface under the object."""
         return float(self.plane.z(np.array([self.shape.centre]))[0])
 
 
@@ -83,7 +83,7 @@ def _view(cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: float
 
 
 def fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:
-    """The plane near a surveyed height, robust against things standing on it; None when too few points show it."""
+    """The plane near a surveyed height, robust against objects standing on it; None when too few points show it."""
     near = points_W[np.abs(points_W[:, 2] - height_m) < _PLANE_BAND_M]
     if len(near) < 80:
         return None
@@ -98,7 +98,7 @@ def fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:
 
 
 def _refined(plane: LevelPlane, points_W: FloatArray) -> LevelPlane | None:
-    """One step of trimmed least squares; slopes beyond 2 degrees are taken for other things and dropped."""
+    """One step of trimmed least squares; slopes beyond 2 degrees are taken for clutter and dropped."""
     residual = points_W[:, 2] - plane.z(points_W[:, :2])
     inliers = points_W[np.abs(residual) < max(0.006, 2.5 * plane.noise_m)]
     if len(inliers) < 40:
@@ -134,7 +134,7 @@ def _cluster(points: PointCloud, surface: str, plane: LevelPlane, p_WC: FloatArr
 
 
 def parted(view: SurfaceView, detected: Detection3D) -> SurfaceView:
-    """The view with a detected thing cut out of a cluster that holds others as well, such as two things that touch.
+    """The view with a detected object cut out of a cluster that holds others as well, such as two objects that touch.
 
     What is above or below it is a part of it that its box left out.
     """
@@ -154,7 +154,7 @@ def parted(view: SurfaceView, detected: Detection3D) -> SurfaceView:
 
 
 def _own(pixels: NDArray[np.int64], of_thing: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which pixels (N, 2) lie among those of a thing, which may be only every few of them."""
+    """Which pixels (N, 2) lie among those of an object, which may be only every few of them."""
     width, height = np.maximum(pixels.max(axis=0), of_thing.max(axis=0)) + 1
     mask = np.zeros((height, width), dtype=np.uint8)
     mask[of_thing[:, 1], of_thing[:, 0]] = 1
@@ -163,7 +163,7 @@ def _own(pixels: NDArray[np.int64], of_thing: NDArray[np.int64]) -> NDArray[np.b
 
 
 def cluster_of(clusters: tuple[Cluster, ...], detected: Detection3D) -> Cluster | None:
-    """The cluster that a detected thing is: the one near it whose box overlaps the detection's most; None if none."""
+    """The cluster that a detected object is: the one near it whose box overlaps the detection's most; None if none."""
     near = [one for one in clusters if _apart(one, detected) < _SAME_THING_M + 0.5 * one.shape.length_m]
     overlaps = {id(one): box_overlap(one.box, detected.detection.box) for one in near}
     best = max(near, key=lambda one: overlaps[id(one)], default=None)

@@ -29,7 +29,7 @@ def spots(surface: Surface) -> FloatArray:
 def free_spots(view: SurfaceView, candidates: FloatArray, avoid_W: Sequence[FloatArray] = ()) -> FloatArray:
     """Candidates (N, 2) around which the surface is seen, with nothing on it within CLEARANCE_M.
 
-    `avoid_W` holds more points (M, 2) of things that stand there.
+    `avoid_W` holds more points (M, 2) of objects that stand there.
     """
     if len(candidates) == 0 or len(view.plane_points) == 0:
         return np.empty((0, 2))

@@ -30,7 +30,7 @@ class Answer(ExplainedDecorator):
     that `tells` repeats what was seen where.
 
     With `tallies` the child looks at all surfaces, and what its leaves saw, each under a blackboard key, is counted,
-    each thing once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
+    each object once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
     looked at, and else FAILURE as above.
     """
 

@@ -99,7 +99,7 @@ class BesideBoard(FromBoard):
 
 @dataclass(frozen=True)
 class SurfaceOfSighting(FromBoard):
-    """A port bound to the surface on which the thing under a blackboard key was seen; to all, when that is unknown."""
+    """A port bound to the surface on which the object under a blackboard key was seen; to all, when that is unknown."""
 
     gives: ClassVar[Any] = tuple[Surface, ...]
     surfaces: tuple[Surface, ...]

@@ -66,7 +66,7 @@ class Monitor(Explained, Behaviour):
 
 @dataclass(frozen=True)
 class Call:
-    """What calls an interrupt: `condition` is violated. It must not even wait for the handling of a thing to end when
+    """What calls an interrupt: `condition` is violated. It must not even wait for the handling of an object to end when
     `urgent` is violated, too."""
 
     condition: Condition

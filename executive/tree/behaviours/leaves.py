@@ -63,7 +63,7 @@ class RememberPose(Explained, Behaviour):
 
 
 class Pause(Explained, Behaviour):
-    """RUNNING for `duration_s` on the robot's clock, then SUCCESS: things may come to rest, readings may come in."""
+    """RUNNING for `duration_s` on the robot's clock, then SUCCESS: objects may come to rest, readings may come in."""
 
     def __init__(self, *, path_id: str, name: str, duration_s: float, clock: Clock) -> None:
         super().__init__(name)

@@ -45,8 +45,8 @@ def after(*causes: Cause, of: NodeSpec | None = None, own: bool = False) -> Trig
 class PlanBuilder:
     """Makes the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
 
-    `anywhere` says whether a thing that is not in its place is looked for elsewhere, too, but never on the surfaces in
-    `avoided`: what lies there is where it is to go.
+    `anywhere` says whether an object that is not in its place is looked for elsewhere, too, but never on the surfaces
+    in `avoided`: what lies there is where it is to go.
     """
 
     knowledge: Knowledge
@@ -138,14 +138,14 @@ class PlanBuilder:
         return known
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """The classes that a thing's name stands for.
+        """The classes that an object's name stands for.
 
         Raises:
             InputError: it is not known.
         """
         classes = self.knowledge.classes(self.knowledge.thing(name) or name)
         if not classes:
-            raise self.error(f"the thing '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
+            raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
         return classes
 
     def error(self, message: str, mend: str) -> InputError:

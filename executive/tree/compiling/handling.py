@@ -1,15 +1,15 @@
-"""Subtrees of handling things, with the recovery that fits each cause.
+"""Subtrees of handling objects, with the recovery that fits each cause.
 
 | what failed | cause | what is done before the next attempt |
 |---|---|---|
 | going somewhere | PLANNING, EXECUTION | see anew what stands in the way; back off; another pose nearby |
-| finding | not seen | from aside; where such things usually are; other surfaces (`search`) |
+| finding | not seen | from aside; where such objects usually are; other surfaces (`search`) |
 | standing before it | PLANNING | see anew what stands around; back off |
 | standing before it | others | look again |
 | grasping | POSTCONDITION (slipped) | look again, take another grasp |
 | grasping | PLANNING | look again; back off and stand anew |
 | grasping | PRECONDITION, EXECUTION | look again |
-| carrying | the thing was lost | find it on the surfaces near there, pick it up again |
+| carrying | the object was lost | find it on the surfaces near there, pick it up again |
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _grasp_plan(builder: PlanBuilder, near: str, tried: str) -> NodeSpec:
 
 
 def tuck_plan(builder: PlanBuilder) -> NodeSpec:
-    """Draw the arm in, twice if need be; where that does not work but the thing is held, go on with it."""
+    """Draw the arm in, twice if need be; where that does not work but the object is held, go on with it."""
     causes = frozenset({Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
     twice = builder.node(
         "retry", "draw in the arm, twice if need be", builder.skill("stow"), part="tuck-in", attempts=2, causes=causes
@@ -103,7 +103,7 @@ def tidied(builder: PlanBuilder, work: NodeSpec, *, only_after_failure: bool = F
 
 
 def unless_dropped(builder: PlanBuilder, item: Thing, carry: NodeSpec, guards: tuple[NodeSpec, ...]) -> NodeSpec:
-    """Carrying; when the thing is lost on the way (one of the guards breaks) it is picked up again where it was lost.
+    """Carrying; when the object is lost on the way (one of the guards breaks) it is picked up again where it was lost.
 
     Only surfaces can be looked at: what lies on the floor is not found, and the sentence says so.
     """

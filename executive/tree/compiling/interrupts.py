@@ -16,7 +16,7 @@ from skills.api import Cause
 from skills.robot import Pose2D
 
 HANDLING: Final = frozenset({"grasp", "place", "hand_over", "stow"})
-"""Skills that an interrupt lets come to their end, since a thing is half held meanwhile."""
+"""Skills that an interrupt lets come to their end, since an object is half held meanwhile."""
 MOST_CHARGES: Final = 5
 MOST_RELOCALISATIONS: Final = 5
 LOST_PATIENCE_S: Final = 2.0

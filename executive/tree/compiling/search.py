@@ -1,4 +1,4 @@
-"""Looking for a thing: which surfaces, in which order, and the subtree that visits them."""
+"""Looking for an object: which surfaces, in which order, and the subtree that visits them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ASIDE_M: Final = 0.45
 def surfaces_elsewhere(
     knowledge: Knowledge, thing: str, place: str | None, avoided: frozenset[str] = frozenset()
 ) -> tuple[str, ...]:
-    """The surfaces to look at when the thing is not in its place: where it usually is, then others of the same room,
+    """The surfaces to look at when the object is not in its place: where it usually is, then others of the same room,
     then any others; `MOST_ELSEWHERE` at most, and none that are `avoided`."""
     if place is None:
         return ()
@@ -82,7 +82,7 @@ def detect_plan(
     *,
     tallied: bool = False,
 ) -> NodeSpec:
-    """Look for the thing on some surfaces, by name or from the blackboard, from where the robot stands."""
+    """Look for the object on some surfaces, by name or from the blackboard, from where the robot stands."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(builder.surface, surfaces))
     ports = {"classes": builder.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
     tally = {"observations": tally_key(f"{builder.path_id}/detect")} if tallied else {}

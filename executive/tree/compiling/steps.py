@@ -30,7 +30,7 @@ def step_plan(builder: PlanBuilder) -> NodeSpec:
     """The subtree of the builder's command.
 
     Raises:
-        InputError: an unknown place or thing, or a command that cannot be carried out.
+        InputError: an unknown place or object, or a command that cannot be carried out.
     """
     return _BY_TASK[builder.command.task](builder)
 
@@ -43,7 +43,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     """
     thing = _required(builder, builder.command.object)
     if builder.command.item is not None:
-        raise builder.error("the one gripper cannot take hold of a second thing", "put the first one down before")
+        raise builder.error("the one gripper cannot take hold of a second object", "put the first one down before")
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
     surfaces = set(required_surfaces(builder, thing, place))
     if anywhere and builder.anywhere:
@@ -62,7 +62,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
 def find_plan(builder: PlanBuilder) -> NodeSpec:
     """Look at the surfaces of the place and answer yes or no; where it is asked where or how many, tell that, too.
 
-    The first thing that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
+    The first object that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
     """
     thing, count = _required(builder, builder.command.object), builder.command.object_count
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
@@ -116,7 +116,7 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
     if command.item is not None:
         return carry_plan(builder)
     if command.goal is None:
-        raise builder.error("the command asks for nothing", "name a place to go to, or a thing")
+        raise builder.error("the command asks for nothing", "name a place to go to, or an object")
     return builder.sequence(f"go to {command.goal}", go_near_plan(builder, _goal_pose(builder, command.goal)))
 
 
@@ -187,7 +187,7 @@ def _person_at_start(builder: PlanBuilder) -> str:
 
 def _required(builder: PlanBuilder, thing: Thing | None) -> Thing:
     if thing is None:
-        raise builder.error("the command names no thing", "say what it is about")
+        raise builder.error("the command names no object", "say what it is about")
     builder.classes(thing.name)
     return thing
 

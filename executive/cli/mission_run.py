@@ -71,7 +71,7 @@ def run_request(
             page.begin(log, backend.show_live())
         log_map(log, prepared)
         announce(log, clock, tree, prepared.knowledge, world=prepared.world.name, seed=request.seed)
-        with cancelled_by_signals(control or Control(pace=None)) as heeded, LockStepWorker(clock) as worker:
+        with cancelled_by_signals(control or Control(pace=None)) as controlled, LockStepWorker(clock) as worker:
             begin = run if profile is None else profiled(profile, run, backend, entry, worker)
             result = begin(
                 [entry],
@@ -79,7 +79,7 @@ def run_request(
                 worker=worker,
                 publish=artifacts if profile is None else profile.timed("log", artifacts),
                 settings=RunSettings(seed=request.seed),
-                control=heeded,
+                control=controlled,
                 observer=both(observer, page),
                 work=work,
                 profile=profile,

@@ -64,10 +64,10 @@ def _parts(root: NodeView) -> list[tuple[NodeView, str]]:
     return parts
 
 
-def _free(wish: str, taken: Collection[str]) -> str:
-    """The wish, with a number where that name is taken."""
-    names = (wish if number == 1 else f"{wish}{number}" for number in range(1, len(taken) + 2))
-    return next(name for name in names if name not in taken)
+def _free(name: str, taken: Collection[str]) -> str:
+    """The name, with a number where it is taken."""
+    names = (name if number == 1 else f"{name}{number}" for number in range(1, len(taken) + 2))
+    return next(free for free in names if free not in taken)
 
 
 def _tree(document: Element, tree_id: str, node: NodeView, steps: Mapping[int, str]) -> None:

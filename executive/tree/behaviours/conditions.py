@@ -180,7 +180,7 @@ class BatteryReserve(Condition):
 
     def violated(self, context: RunContext) -> Verdict:
         """A failure when the charge is below."""
-        battery, here = context.robot.battery(), Pose2D.from_transform(context.X_WB())
+        battery, here = context.robot.battery(), context.pose()
         way_m = 2.0 * math.hypot(here.x_m - self._dock.x_m, here.y_m - self._dock.y_m)
         least = max(self._low, self._per_m * way_m)
         if battery.charge >= least:

@@ -51,7 +51,7 @@ class RememberPose(Explained, Behaviour):
             self.message = "began before"
             return Status.SUCCESS
         if self._context.localiser.estimate().localised:
-            pose = self._context.for_skill(self.path_id).pose()
+            pose = self._context.pose()
             self._context.board.put(self._key, pose)
             self.message = f"stands at ({pose.x_m:.2f}, {pose.y_m:.2f}) m"
             return Status.SUCCESS
@@ -108,7 +108,7 @@ class SurfacesNear(Explained, Behaviour):
 
     def update(self) -> Status:
         """Look which surfaces are near."""
-        pose = self._context.for_skill(self.path_id).pose()
+        pose = self._context.pose()
         here = (pose.x_m, pose.y_m)
         near = sorted((distance_m(surface.polygon_W, here), k) for k, surface in enumerate(self._surfaces))
         found = tuple(self._surfaces[k] for distance, k in near if distance <= self._within_m)

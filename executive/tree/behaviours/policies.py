@@ -17,7 +17,7 @@ from executive.tree.node import NodeKind
 from skills.api import Asked, Cause, Failed, Question
 
 FINAL_CAUSES: Final = frozenset({Cause.ERROR, Cause.CANCELLED})
-"""A defect and somebody's wish to stop are neither skipped, nor asked about, nor tried again."""
+"""A defect and somebody's request to stop are neither skipped, nor asked about, nor tried again."""
 RETRY: Final = "retry"
 SKIP: Final = "skip"
 STOP: Final = "stop"

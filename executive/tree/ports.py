@@ -68,7 +68,7 @@ def plain(value: Any) -> str:
 
 
 def _record(value: Any) -> str:
-    fields = [field.name for field in dataclasses.fields(value)]
+    fields = [field.name for field in dataclasses.fields(value) if field.repr]
     if any("__str__" in vars(kind) for kind in type(value).__mro__[:-1]):
         return str(value)
     if "name" in fields:

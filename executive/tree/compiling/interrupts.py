@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Final
 
 from executive.tree.behaviours.board import FromBoard
+from executive.tree.behaviours.conditions import BatteryForWork, KnowsPlace, NoStopButton, OwnLease
 from executive.tree.behaviours.recovery import Recovery
-from executive.tree.behaviours.requirements import BatteryForWork, KnowsPlace, NoStopButton, OwnLease
 from executive.tree.compiling.builder import PlanBuilder, after, pose_2d
 from executive.tree.node import NodeSpec
 from skills.api import Cause
@@ -30,8 +30,8 @@ def watched(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
     """
     below = builder.at("watch")
     watches = (
-        below.node("monitor", "stop button released", part="stop-button", requirement=NoStopButton()),
-        below.node("monitor", "lease held", part="lease", requirement=OwnLease()),
+        below.node("monitor", "stop button released", part="stop-button", condition=NoStopButton()),
+        below.node("monitor", "lease held", part="lease", condition=OwnLease()),
         _battery_plan(below.at("battery")),
         _lost_plan(below.at("lost")),
     )
@@ -55,7 +55,7 @@ def _battery_plan(builder: PlanBuilder) -> NodeSpec:
         _relocalising(builder.at("lost"), work),
         spares=HANDLING,
         uses=MOST_CHARGES,
-        requirement=BatteryForWork(facts.low, dock),
+        condition=BatteryForWork(facts.low, dock),
         urgent=BatteryForWork(0.5 * facts.low, dock),
     )
 
@@ -79,9 +79,9 @@ def _lost_plan(builder: PlanBuilder) -> NodeSpec:
     find_out = builder.at("find-out").sequence("find out where it is", settle, builder.skill("relocalise"))
     return builder.node(
         "interrupt",
-        "place lost: find out where it is",
+        "localisation lost: find out where it is",
         find_out,
         spares=HANDLING,
         uses=MOST_RELOCALISATIONS,
-        requirement=KnowsPlace(patience_s=LOST_PATIENCE_S),
+        condition=KnowsPlace(patience_s=LOST_PATIENCE_S),
     )

@@ -10,7 +10,7 @@ from typing import Final
 from executive.mission.command import START, Task, Thing
 from executive.mission.geometry import inside
 from executive.tree.behaviours.board import FromBoard
-from executive.tree.behaviours.requirements import Holds
+from executive.tree.behaviours.conditions import Holds
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.compiling.handling import go_near_plan, pick_up_plan, tidied, tuck_plan, unless_dropped
 from executive.tree.compiling.search import (
@@ -173,7 +173,7 @@ def _put_on_plan(builder: PlanBuilder, surface: str, carry: NodeSpec) -> NodeSpe
 
 def _holding(builder: PlanBuilder, item: Thing, below: NodeSpec) -> NodeSpec:
     """A guard: what is carried stays in the gripper."""
-    return builder.node("guard", f"holding {item}", below, requirement=Holds(str(item)))
+    return builder.node("guard", f"holding {item}", below, condition=Holds(str(item)))
 
 
 def _person_at_start(builder: PlanBuilder) -> str:

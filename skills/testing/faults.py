@@ -92,10 +92,14 @@ class FaultyRobot:
         if name not in VERBS:
             return value
 
+        bind = inspect.signature(value).bind
+
         def faulty(*arguments: Any, **options: Any) -> Any:
-            given = tuple(inspect.signature(value).bind(*arguments, **options).arguments.values())
+            """The verb as the faults let it happen."""
+            given = tuple(bind(*arguments, **options).arguments.values())
             return self._call(name, lambda: value(*arguments, **options), given)
 
+        self.__dict__[name] = faulty
         return faulty
 
     def _call(self, verb: str, proceed: Callable[[], Any], arguments: tuple[Any, ...]) -> Any:

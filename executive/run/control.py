@@ -168,9 +168,7 @@ class Control:
         """Go on until a node changes its status, or for some ticks, and pause again.
 
         Skills in motion are suspended between steps, so that few ticks may not suffice for a motion to get anywhere.
-
-        Raises:
-            ValueError: ticks below 1.
+        Raises ValueError: ticks below 1.
         """
         if ticks is not None and ticks < 1:
             raise ValueError(f"a step of {ticks} ticks: at least 1 is needed")
@@ -223,8 +221,7 @@ class Control:
     def preempt(self, tree: CompiledTree) -> None:
         """Do another mission first; the one under way is suspended and taken up again afterwards.
 
-        Raises:
-            ValueError: no such robot in the run, or the mission is under way already.
+        Raises ValueError: no such robot in the run, or the mission is under way already.
         """
         self._refuse_mission(tree)
         self._ask_for(preempts=(*self._requests.preempts, tree))
@@ -242,10 +239,7 @@ class Control:
         """Do another mission instead of the one under way, which is given up.
 
         With `instead_of` it takes the place of the mission of that name: one that waits is not begun, and one that is
-        not under way just now is left alone, as by `preempt`.
-
-        Raises:
-            ValueError: no such robot in the run.
+        not under way just now is left alone, as by `preempt`. Raises ValueError: no such robot in the run.
         """
         self._refuse_robot(tree)
         self._ask_for(instead=(*self._requests.instead, Replacement(tree, instead_of)))

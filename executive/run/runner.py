@@ -101,12 +101,10 @@ def run(
 
     Each tick: poll `control`, advance the clock by the tick period, update each robot's estimators, tick each tree, log
     what changed. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree is not
-    ticked, and what passes does not count against any limit. Whatever happens, all trees and robots are stopped and
-    all leases returned before this returns. Without control, equal seeds give equal logs. `work` counts what is
-    computed, `profile` times the skills.
-
-    Raises:
-        ValueError: no entries, two robots of one name, or a breakpoint at a node that there is not.
+    ticked, and what passes does not count against any limit. Whatever happens, all trees and robots are stopped and all
+    leases returned before this returns. Without control, equal seeds give equal logs. `work` counts what is computed,
+    `profile` times the skills. Raises ValueError: no entries, two robots of one name, or a breakpoint at a node that
+    there is not.
     """
     names = [entry.robot.name for entry in entries]
     if not entries or len(set(names)) != len(names):

@@ -172,8 +172,7 @@ def load_skill_tests(
 ) -> SkillTestFile:
     """Read a file of skill tests and check it against the registered skills.
 
-    Raises:
-        InputError: with file, line and mend: broken YAML, unknown keys, no such skill, port or fault, wrong values.
+    Raises InputError: with file, line and mend: broken YAML, unknown keys, no such skill, port or fault, wrong values.
     """
     source = read_yaml(path)
     file = validate(SkillTestFile, source)

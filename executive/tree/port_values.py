@@ -43,10 +43,8 @@ def gathered(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, A
     """The value for each input port of the dataclass `inputs`, with its path in `values`.
 
     A unit may be left out of a port's name. What names no port, but fields of the one port that is a dataclass with
-    such fields, goes there: `{x: 1, y: 2, yaw: 0}` is the `goal` of navigate.
-
-    Raises:
-        PortValueError: a key names neither a port nor such a field.
+    such fields, goes there: `{x: 1, y: 2, yaw: 0}` is the `goal` of navigate. Raises PortValueError: a key names
+    neither a port nor such a field.
     """
     hints = field_types(inputs)
     found: dict[str, tuple[Path, Any]] = {}

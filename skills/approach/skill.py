@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, ObjectObservation, Running, Succeeded, Surface
-from skills.approach.standing import Standing, free_places, is_comfortable, reachable
+from skills.api import Cause, ObjectObservation, Succeeded, Surface
+from skills.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
@@ -20,7 +20,7 @@ from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.planning import within_reach
 from skills.grasp.posture import body_height_m
-from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.skill import NavigateInputs
 from skills.robot import Pose2D
 
 _STILL_BEFORE_M = 1.3
@@ -84,7 +84,9 @@ class Approach(ArmSkill[ApproachInputs]):
                     Cause.PLANNING, f"there is no free place to stand from which the {seen.thing} is within reach"
                 )
             yield from self.stow()
-            yield from self.go_to_one([place.pose for place in places[: self.options.tries]])
+            tolerances = (self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s)
+            goals = [NavigateInputs(place.pose, *tolerances) for place in places[: self.options.tries]]
+            yield from go_to_one(self, goals)
         return (yield from self._look_again(inputs))
 
     def undone(self, inputs: ApproachInputs) -> str | None:
@@ -92,20 +94,6 @@ class Approach(ArmSkill[ApproachInputs]):
         (x, y, _), pose = inputs.observation.position_W, self.context.pose()
         off_m = math.hypot(x - pose.x_m, y - pose.y_m)
         return None if off_m < _STILL_BEFORE_M else f"the robot is {off_m:.1f} m from the {inputs.observation.thing}"
-
-    def go_to_one(self, poses: list[Pose2D]) -> Routine[None]:
-        """Drive to the first of some poses to which there is a way."""
-        for k, pose in enumerate(poses):
-            goal = NavigateInputs(
-                pose, self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s
-            )
-            try:
-                yield from self.perform(Navigate(self.context), goal)
-                return
-            except SkillFailure as failure:
-                if k + 1 == len(poses) or failure.cause is not Cause.PLANNING:
-                    raise
-            yield Running("choosing another place to stand")
 
     def _look_again(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         seen = inputs.observation

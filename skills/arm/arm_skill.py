@@ -54,13 +54,15 @@ class ArmSkill(RoutineSkill[InputsT]):
         p_BP = self.X_WB().inverse() @ np.asarray(p_W)
         return float(np.linalg.norm(self.model.X_BH(self.q_rad()).translation() - p_BP)) < within_m
 
-    def try_shift_hand(self, offset_B: FloatArray, message: str) -> Routine[None]:
-        """Shift the hand where a straight way is found."""
+    def try_shift_hand(self, offset_B: FloatArray, message: str) -> Routine[bool]:
+        """Shift the hand where a straight way is found; whether there was one."""
         try:
             yield from self.shift_hand(offset_B, message)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
+            return False
+        return True
 
     @property
     def model(self) -> ArmModel:

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Surface
 from skills.arm.collision import Box
-from skills.geometry import inside_polygon
+from skills.geometry import grid_inside
 from skills.perception.detection_3d import depth_ahead_m
 from skills.perception.surface_segmentation import Cluster
 from skills.robot import FloatArray, Image
@@ -70,11 +70,7 @@ def _bins(values: FloatArray, among: NDArray[np.bool_], half_rad: float) -> list
 
 def _samples(surface: Surface, step_m: float = 0.1) -> FloatArray:
     """Points (N, 3) all over a surface, its corners included."""
-    corners = np.asarray(surface.polygon_W, dtype=float)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    grid = np.stack(np.meshgrid(np.arange(low[0], high[0], step_m), np.arange(low[1], high[1], step_m)), axis=-1)
-    rows = grid.reshape(-1, 2)
-    xy = np.concatenate([corners, rows[inside_polygon(rows, surface.polygon_W)]])
+    xy = np.concatenate([np.asarray(surface.polygon_W, dtype=float), grid_inside(surface.polygon_W, step_m)])
     return np.column_stack([xy, np.full(len(xy), surface.height_m)])
 
 

@@ -135,11 +135,8 @@ def _candidate(
     beside_m: float,
 ) -> GraspCandidate | None:
     tilt, lean = attitude
-    c, s = np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad)
-    x_axis = np.array([np.cos(tilt) * c, np.cos(tilt) * s, -np.sin(tilt)])
-    z_axis = side * np.array([-s, c, 0.0])
-    upright_hand = RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
-    R_BH = RotationMatrix(AngleAxis(lean, np.array([c, s, 0.0]))) @ upright_hand
+    ahead = np.array([np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad), 0.0])
+    R_BH = RotationMatrix(AngleAxis(lean, ahead)) @ hand_rotation(tilt, placement.azimuth_rad, side)
     if target.upright:
         height = float(np.clip(0.56 * target.height_m, 0.05, 0.095))
         depth = gripper.palm_x_m + placement.half_depth_m + 0.008
@@ -159,6 +156,14 @@ def _candidate(
     p_BT = np.array([*placement.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
     return GraspCandidate(X_BH, placement.width_m, float(cost), tilt)
+
+
+def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationMatrix:
+    """R_BH of a hand whose fingers point tilt_rad below level towards azimuth_rad; side (1, -1) turns it over."""
+    c, s = np.cos(azimuth_rad), np.sin(azimuth_rad)
+    x_axis = np.array([np.cos(tilt_rad) * c, np.cos(tilt_rad) * s, -np.sin(tilt_rad)])
+    z_axis = side * np.array([-s, c, 0.0])
+    return RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
 
 
 def _above_surface(height_m: float, spare_m: float) -> float:

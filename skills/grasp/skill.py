@@ -156,12 +156,7 @@ class Grasp(ArmSkill[GraspInputs]):
     def _lift_again(self, message: str) -> Routine[None]:
         """Lift what the gripper grips in the first way that the arm finds; where it finds none, it is carried low."""
         for way_B in lifts(self.model, self.model.X_BH(self.q_rad()), self._up_B()):
-            try:
-                yield from self.shift_hand(way_B, message)
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
-            else:
+            if (yield from self.try_shift_hand(way_B, message)):
                 return
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
@@ -230,12 +225,7 @@ class Grasp(ArmSkill[GraspInputs]):
         """Lift as planned or, where the hand came to stand otherwise, in another way. Raises SkillFailure."""
         others = lifts(self.model, self.model.X_BH(self.q_rad()), self._up_B())
         for lift_B in (planned_B, *others):
-            try:
-                yield from self.shift_hand(lift_B, message)
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
-            else:
+            if (yield from self.try_shift_hand(lift_B, message)):
                 return
         raise SkillFailure(Cause.PLANNING, "the arm cannot lift the object from where it has hold of it")
 
@@ -254,11 +244,7 @@ class Grasp(ArmSkill[GraspInputs]):
         self.held = [_held_box(X_HB, view.target_box)]
         message = f"carrying the {thing}"
         ahead = grasp.X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
-        try:
-            yield from self.shift_hand(-self.options.pull_back_m * ahead + 0.02 * self._up_B(), message)
-        except SkillFailure as failure:
-            if failure.cause is not Cause.PLANNING:
-                raise
+        yield from self.try_shift_hand(-self.options.pull_back_m * ahead + 0.02 * self._up_B(), message)
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
@@ -279,12 +265,7 @@ class Grasp(ArmSkill[GraspInputs]):
         """Out of the object's reach, since the closing gripper must not catch it."""
         ahead = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
         for distance_m in _DRAW_BACK_M:
-            try:
-                yield from self.shift_hand(-distance_m * ahead, "drawing back after the failure")
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
-            else:
+            if (yield from self.try_shift_hand(-distance_m * ahead, "drawing back after the failure")):
                 break
         yield from self.move_gripper(0.0, GRIPPER_FORCE_N, "closing the empty gripper")
 

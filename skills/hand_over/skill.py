@@ -12,12 +12,13 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Running, Succeeded
+from skills.approach.standing import go_to_one
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
-from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.skill import NavigateInputs
 from skills.perception.people import SeenPerson, people_in_scan
 from skills.robot import FloatArray, Pose2D
 
@@ -98,14 +99,9 @@ class HandOver(ArmSkill[HandOverInputs]):
         poses = facing_poses(person.place_W, self.context.pose(), self.options.stand_off_m)
         footprint = Footprint.of(self.context.robot.capabilities())
         free = [pose for pose in poses if footprint_clear(self.context.costmap, footprint, pose)]
-        for k, pose in enumerate(free[:3]):
-            try:
-                yield from self.perform(Navigate(self.context), NavigateInputs(pose, 0.08, 0.1, 0.5))
-                return
-            except SkillFailure as failure:
-                if k == min(len(free), 3) - 1 or failure.cause is not Cause.PLANNING:
-                    raise
-        raise SkillFailure(Cause.PLANNING, f"there is no free place to stand before {name}")
+        if not free:
+            raise SkillFailure(Cause.PLANNING, f"there is no free place to stand before {name}")
+        yield from go_to_one(self, [NavigateInputs(pose, 0.08, 0.1, 0.5) for pose in free[:3]])
 
     def _hold_out(self, person: SeenPerson, name: str) -> Routine[None]:
         """Stretch the arm towards the person."""

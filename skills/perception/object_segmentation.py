@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from skills.perception.class_forms import ClassForm
 from skills.perception.plane import LevelPlane
-from skills.perception.point_cloud import MAX_DEPTH_M, MIN_DEPTH_M
+from skills.perception.point_cloud import MAX_DEPTH_M, MIN_DEPTH_M, grid_labels
 from skills.robot import FloatArray, Image, Intrinsics
 
 Box = tuple[float, float, float, float]
@@ -196,17 +196,7 @@ def _fitted(points: FloatArray, height_m: float) -> LevelPlane | None:
     origin = near[:, :2].mean(axis=0)
     plane = LevelPlane((float(origin[0]), float(origin[1])), height_m, (0.0, 0.0), 0.005)
     for _ in range(3):
-        residual = near[:, 2] - plane.z(near[:, :2])
-        kept = near[np.abs(residual) < max(0.004, 2.0 * plane.noise_m)]
-        if len(kept) < _FEWEST_ON_PLANE:
-            return plane
-        design = np.column_stack([np.ones(len(kept)), kept[:, :2] - origin])
-        (height, sx, sy), *_ = np.linalg.lstsq(design, kept[:, 2], rcond=None)
-        if math.hypot(sx, sy) > 0.035:
-            height, sx, sy = float(np.median(kept[:, 2])), 0.0, 0.0
-        fitted = LevelPlane(plane.origin, float(height), (float(sx), float(sy)), 0.0)
-        noise = 1.48 * float(np.median(np.abs(kept[:, 2] - fitted.z(kept[:, :2]))))
-        plane = LevelPlane(fitted.origin, fitted.height_m, fitted.slope, max(noise, 0.001))
+        plane = plane.refined(near, max(0.004, 2.0 * plane.noise_m)) or plane
     return plane
 
 
@@ -288,12 +278,8 @@ def _groups_from_above(window: Window, standing: Mask) -> tuple[NDArray[np.int32
         return labels, 1
     about = standing & window.inside
     cell_m = 0.006 + 2.5 * window.pixel_m * float(np.median(window.z[about if np.any(about) else standing]))
-    cells = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / cell_m).astype(np.int64) + 1
-    counts = np.zeros(cells.max(axis=0) + 2, dtype=np.int32)
-    np.add.at(counts, (cells[:, 0], cells[:, 1]), 1)
-    count, grid = cv2.connectedComponents((counts >= 2).astype(np.uint8), connectivity=8)
-    labels[standing] = grid[cells[:, 0], cells[:, 1]]
-    return labels, int(count)
+    labels[standing], count = grid_labels(points[:, :2], cell_m, fewest=2)
+    return labels, count
 
 
 def _groups_in_picture(window: Window, standing: Mask, *, parted: bool) -> tuple[NDArray[np.int32], int]:

@@ -18,14 +18,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from skills.api import Detection
 from skills.perception.class_forms import ClassForm, class_forms
 from skills.perception.object_segmentation import Mask, ObjectSegment, Window, segment_object, window_about
 from skills.perception.plane import LevelPlane
-from skills.perception.shape import circle_seen, without_strays
+from skills.perception.shape import circle_seen, smallest_rectangle, without_strays
 from skills.robot import FloatArray, Image
 
 _UPRIGHT = 1.15
@@ -217,7 +216,7 @@ def _with_appendages(
     x, y, radius = tank
     turns = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
     rim = np.stack([x + radius * np.cos(turns), y + radius * np.sin(turns)], axis=1)
-    (cx, cy), length, width, yaw = _smallest_rectangle(np.concatenate([without_strays(points[:, :2]), rim]))
+    (cx, cy), length, width, yaw = smallest_rectangle(np.concatenate([without_strays(points[:, :2]), rim]))
     return Extents((float(cx), float(cy), base_m + 0.5 * height_m), length, width, height_m, yaw, False, sure_m)
 
 
@@ -265,15 +264,7 @@ def _outline(
     """A rectangle about points seen from above: middle, length, width, yaw of the length."""
     upper = points[points[:, 2] - base_m > 0.25 * height_m, :2]
     xy = without_strays(upper if len(upper) >= 12 else points[:, :2])
-    return _rectangle_along(xy, _main_yaw(xy)) if form.form == "long" else _smallest_rectangle(xy)
-
-
-def _smallest_rectangle(xy: FloatArray) -> tuple[FloatArray, float, float, float]:
-    middle = xy.mean(axis=0)
-    (x, y), (first, second), angle_deg = cv2.minAreaRect((xy - middle).astype(np.float32))
-    yaw = math.radians(angle_deg) + (0.0 if first >= second else 0.5 * math.pi)
-    yaw = (yaw + 0.5 * math.pi) % math.pi - 0.5 * math.pi
-    return middle + [x, y], float(max(first, second)), float(min(first, second)), yaw
+    return _rectangle_along(xy, _main_yaw(xy)) if form.form == "long" else smallest_rectangle(xy)
 
 
 def _main_yaw(xy: FloatArray) -> float:

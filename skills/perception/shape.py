@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -35,7 +36,8 @@ def measure(points_W: FloatArray, plane_m: FloatArray, p_WC: FloatArray) -> Seen
         if circle is not None:
             x, y, radius = circle
             return SeenShape((x, y), 2 * radius, 2 * radius, height, 0.0, True)
-    return _rectangle(_upper(points_W, above, height), height)
+    (x, y), length, width, yaw = smallest_rectangle(without_strays(_upper(points_W, above, height)))
+    return SeenShape((float(x), float(y)), length, width, height, yaw, False)
 
 
 def _upper(points_W: FloatArray, above: FloatArray, height: float) -> FloatArray:
@@ -69,15 +71,13 @@ def circle_seen(xy: FloatArray, p_WC: FloatArray, largest_m: float = 0.09) -> tu
     return float(fit.x[0]), float(fit.x[1]), float(radius)
 
 
-def _rectangle(xy: FloatArray, height: float) -> SeenShape:
-    """The smallest rectangle about points (N, 2), without stray ones."""
-    kept = without_strays(xy)
-    (x, y), (first, second), angle_deg = cv2.minAreaRect((kept - kept.mean(axis=0)).astype(np.float32))
-    yaw = np.radians(angle_deg) + (0.0 if first >= second else np.pi / 2)
-    centre = kept.mean(axis=0) + (x, y)
-    yaw = float((yaw + np.pi / 2) % np.pi - np.pi / 2)
-    length, width = float(max(first, second)), float(min(first, second))
-    return SeenShape((float(centre[0]), float(centre[1])), length, width, height, yaw, False)
+def smallest_rectangle(xy: FloatArray) -> tuple[FloatArray, float, float, float]:
+    """The smallest rectangle about points (N, 2): middle, length, width, yaw of the length in [-pi/2, pi/2)."""
+    middle = xy.mean(axis=0)
+    (x, y), (first, second), angle_deg = cv2.minAreaRect((xy - middle).astype(np.float32))
+    yaw = math.radians(angle_deg) + (0.0 if first >= second else 0.5 * math.pi)
+    yaw = (yaw + 0.5 * math.pi) % math.pi - 0.5 * math.pi
+    return middle + [x, y], float(max(first, second)), float(min(first, second)), yaw
 
 
 def without_strays(xy: FloatArray, cell_m: float = 0.006) -> FloatArray:

@@ -18,6 +18,7 @@ from skills.arm.poses import look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.geometry import wrap
+from skills.grasp.candidates import hand_rotation
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import free_spots, spots
@@ -198,11 +199,7 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self.move_gripper(0.75 * self.open_rad, GRIPPER_FORCE_N, "letting go")
         yield from self.pause(0.3, "letting go")
         fingers = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
-        try:
-            yield from self.shift_hand(-0.16 * fingers, "drawing the hand back")
-        except SkillFailure as failure:
-            if failure.cause is not Cause.PLANNING:
-                raise
+        if not (yield from self.try_shift_hand(-0.16 * fingers, "drawing the hand back")):
             yield from self.shift_hand(-0.08 * fingers, "drawing the hand back")
 
     def _check(self, surface: Surface, spot_W: FloatArray) -> Routine[None]:
@@ -273,15 +270,8 @@ def _side(carried: RotationMatrix, azimuth: float) -> list[RotationMatrix]:
 
 def _from_above(azimuth: float) -> list[RotationMatrix]:
     """Fingers down, or as far down as may be; the gripper closes level."""
-    rotations = []
-    for tilt in np.radians([90.0, 75.0, 60.0, 45.0]):
-        x_axis = np.array([np.cos(tilt) * np.cos(azimuth), np.cos(tilt) * np.sin(azimuth), -np.sin(tilt)])
-        for z_axis in (
-            np.array([-np.sin(azimuth), np.cos(azimuth), 0]),
-            np.array([np.sin(azimuth), -np.cos(azimuth), 0]),
-        ):
-            rotations.append(RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1)))
-    return rotations
+    tilts = np.radians([90.0, 75.0, 60.0, 45.0])
+    return [hand_rotation(tilt, azimuth, side) for tilt in tilts for side in (1.0, -1.0)]
 
 
 def _nearest_spot(surface: Surface, X_WB: RigidTransform) -> FloatArray:

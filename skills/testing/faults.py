@@ -40,8 +40,7 @@ class Fault:
 def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> Fault:
     """The fault of these words.
 
-    Raises:
-        ValueError: no kind has such words, or they name something that the robot does not have; with the mend.
+    Raises ValueError: no kind has such words, or they name something that the robot does not have; with the mend.
     """
     when = _WHEN.fullmatch(" ".join(words.split()))
     what = words if when is None else when["what"]

@@ -74,8 +74,7 @@ class _Item:
 def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> tuple[NodeSpec, tuple[StepPart, ...]]:
     """The root of a mission's tree, and its parts in order.
 
-    Raises:
-        InputError: unknown names, ports wired wrongly, commands that cannot be carried out; all in `others`.
+    Raises InputError: unknown names, ports wired wrongly, commands that cannot be carried out; all in `others`.
     """
     base = f"{slug(mission.robot_name)}/{slug(mission.name)}"
     assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name))

@@ -76,8 +76,7 @@ class PlanBuilder:
     ) -> NodeSpec:
         """A leaf that runs the registered skill `name`; inputs that are no binding are constants.
 
-        Raises:
-            InputError: no skill of that name is registered.
+        Raises InputError: no skill of that name is registered.
         """
         if name not in self.registry:
             raise self.error(f"there is no skill '{name}'", f"registered are {listing(sorted(self.registry))}")
@@ -127,22 +126,14 @@ class PlanBuilder:
         return Surface(name=name, polygon_W=facts.polygon, height_m=facts.height)
 
     def place(self, name: str) -> str:
-        """The known place that `name` means.
-
-        Raises:
-            InputError: it is not known.
-        """
+        """The known place that `name` means. Raises InputError: it is not known."""
         known = self.knowledge.place(name)
         if known is None:
             raise self.error(f"the place '{name}' is not known", suggestion(name, self.knowledge.place_names()))
         return known
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """The classes that an object's name stands for.
-
-        Raises:
-            InputError: it is not known.
-        """
+        """The classes that an object's name stands for. Raises InputError: it is not known."""
         classes = self.knowledge.classes(self.knowledge.thing(name) or name)
         if not classes:
             raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.thing_names()))

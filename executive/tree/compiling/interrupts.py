@@ -25,8 +25,7 @@ LOST_PATIENCE_S: Final = 2.0
 def watched(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
     """The mission under its watches, the last node below; `builder` is the mission's own.
 
-    Raises:
-        InputError: a skill that the watches need is not registered.
+    Raises InputError: a skill that the watches need is not registered.
     """
     below = builder.at("watch")
     watches = (

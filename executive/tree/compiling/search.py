@@ -100,10 +100,7 @@ def search_plan(builder: PlanBuilder, thing: Thing, place: str | None, key: str,
     """Look from here when it was seen before, else at each surface in turn; the first sighting ends the search.
 
     When it is nowhere in its place, look at some of its surfaces from aside, then, with `anywhere`, at surfaces
-    elsewhere.
-
-    Raises:
-        InputError: the place has no surfaces.
+    elsewhere. Raises InputError: the place has no surfaces.
     """
     surfaces = required_surfaces(builder, thing, place)
     name = builder.knowledge.thing(thing.name) or thing.name

@@ -29,8 +29,7 @@ from skills.robot import Pose2D
 def step_plan(builder: PlanBuilder) -> NodeSpec:
     """The subtree of the builder's command.
 
-    Raises:
-        InputError: an unknown place or object, or a command that cannot be carried out.
+    Raises InputError: an unknown place or object, or a command that cannot be carried out.
     """
     return _BY_TASK[builder.command.task](builder)
 

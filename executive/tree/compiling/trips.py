@@ -27,9 +27,8 @@ def are_trips(get: Command, bring: Command | None) -> bool:
 def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     """Get one and bring it there, as often as was said; `builder` is that of the command to get them.
 
-    Raises:
-        InputError: too many; to a person, who does not take them from the gripper; no place to take them from, or one
-            where those that were brought would be found again.
+    Raises InputError: too many; to a person, who does not take them from the gripper; no place to take them from, or
+    one where those that were brought would be found again.
     """
     get, goal = builder.command, bring.goal
     count, thing = get.object_count, get.object
@@ -54,8 +53,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
 def refuse_several(builder: PlanBuilder) -> None:
     """Refuse a count that no trips are made of; in a question any count will do.
 
-    Raises:
-        InputError: more than one object, or an open number of objects.
+    Raises InputError: more than one object, or an open number of objects.
     """
     command = builder.command
     asked = 1 if command.task is Task.FIND else command.object_count

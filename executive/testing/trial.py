@@ -40,7 +40,7 @@ class Trial:
         lines.append(f"it ended with {_end(run.outcome, run.cause)} after {run.time_s:g} s: {run.message}")
         lines += [f"fault: {words}" for words in self.test.faults]
         lines += ["what it said on the way:"]
-        lines += [f"  {at_s:7.2f} s  {message}" for at_s, message in run.story[-_LAST_MESSAGES:]]
+        lines += [f"  {at_s:7.2f} s  {message}" for at_s, message in run.messages[-_LAST_MESSAGES:]]
         return "\n".join(lines)
 
 

@@ -52,7 +52,7 @@ class _Stance:
 class RoutineSkill(Skill[InputsT]):
     """A skill whose attempt is one generator, `run`. Commands given through it are stopped by `end`.
 
-    After a short pause in which the robot stayed as it was, the routine goes on in its midst, and the motion that was
+    After a short pause in which the robot stayed as it was, the routine goes on where it was, and the motion that was
     stopped is taken up; else `run_again` looks what is done already.
     """
 

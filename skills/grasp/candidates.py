@@ -145,9 +145,9 @@ def _candidate(
         height = 0.5 * target.height_m
         down = -R_BH.matrix()[2, 0]
         least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
-        room = height - _tip_drop(R_BH, placement.width_m, gripper, beside_m)
-        above = _above_surface(target.height_m, room - least * down)
-        beyond = (room - above) / down
+        clearance = height - _tip_drop(R_BH, placement.width_m, gripper, beside_m)
+        above = _above_surface(target.height_m, clearance - least * down)
+        beyond = (clearance - above) / down
         if beyond < least or height + beyond * down < _LEAST_GRIP_M:
             return None
         depth = gripper.tip_x_m - beyond

@@ -216,10 +216,12 @@ def _latest(track: Track, detected: Detection3D) -> Detection3D:
 
 
 def _classes(before: Mapping[str, float], detected: Detection3D) -> Mapping[str, float]:
-    """Class beliefs after a detection: its scores for its class and for the rivals, the rest spread over the others."""
+    """Class beliefs after a detection: its scores for its class and the alternatives, the rest spread over others."""
     score = float(np.clip(detected.detection.score, 0.3, 0.97))
     others = (1.0 - score) / max(len(before) - 1, 1)
-    scores = {name: max(rival, others) for name, rival in detected.detection.rivals} | {detected.class_name: score}
+    scores = {name: max(alternative, others) for name, alternative in detected.detection.alternatives} | {
+        detected.class_name: score
+    }
     raw = {name: p * scores.get(name, others) for name, p in before.items()}
     total = sum(raw.values())
     return MappingProxyType({name: max(value / total, 1e-3) for name, value in raw.items()})

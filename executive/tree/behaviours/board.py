@@ -98,7 +98,7 @@ class BesideBoard(FromBoard):
 
 
 @dataclass(frozen=True)
-class SurfaceOfSighting(FromBoard):
+class SurfaceOfDetection(FromBoard):
     """A port bound to the surface on which the object under a blackboard key was seen; to all, when that is unknown."""
 
     gives: ClassVar[Any] = tuple[Surface, ...]

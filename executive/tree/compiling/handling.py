@@ -56,7 +56,7 @@ def pick_up_plan(
     builder: PlanBuilder, thing: Thing, search: NodeSpec, key: str, surfaces: tuple[Surface, ...] | FromBoard
 ) -> NodeSpec:
     """Find (`search`, which writes `key`), approach and grasp, with recoveries; a failure ends with the arm stowed."""
-    near, tried = f"{builder.path_id}/near-sighting", f"{builder.path_id}/tried-grasps"
+    near, tried = f"{builder.path_id}/near-detection", f"{builder.path_id}/tried-grasps"
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     grasp = _grasp_plan(builder, near, tried)
     attempt = builder.at("pick-up").sequence(f"pick up {thing}", search, approach, grasp)
@@ -113,7 +113,7 @@ def unless_dropped(builder: PlanBuilder, item: Thing, carry: NodeSpec, guards: t
 
 def _pick_up_again_plan(builder: PlanBuilder, item: Thing) -> NodeSpec:
     below = builder.at("again")
-    near, key = f"{below.path_id}/surfaces", f"{below.path_id}/sighting"
+    near, key = f"{below.path_id}/surfaces", f"{below.path_id}/detection"
     floor = f"the {item} lies on the floor by now, probably, where it cannot be looked for"
     nearby = below.node(
         "surfaces near",

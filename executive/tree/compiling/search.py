@@ -11,7 +11,7 @@ from executive.mission.errors import listing
 from executive.mission.geometry import inside
 from executive.mission.goal import surfaces_to_search
 from executive.mission.knowledge import Knowledge
-from executive.tree.behaviours.board import FromBoard, SurfaceOfSighting, beside
+from executive.tree.behaviours.board import FromBoard, SurfaceOfDetection, beside
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.node import NodeSpec
 from skills.api import Cause
@@ -47,7 +47,7 @@ def look_plans(
     *,
     tallied: bool = False,
 ) -> tuple[tuple[str, NodeSpec], ...]:
-    """For each surface and viewpoint: drive there and look. The sighting goes to `key`; `extra` are detect's.
+    """For each surface and viewpoint: drive there and look. The detection goes to `key`; `extra` are detect's.
 
     With `tallied`, all that a look saw goes to the key that `tally_key` gives for its leaf.
     """
@@ -91,13 +91,13 @@ def detect_plan(
 
 def find_again_plan(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodeSpec:
     """When it was seen before: look from here first, where it was seen. Else passed over."""
-    seen_on = SurfaceOfSighting(key, tuple(map(builder.surface, surfaces)))
+    seen_on = SurfaceOfDetection(key, tuple(map(builder.surface, surfaces)))
     look = detect_plan(builder, thing, seen_on, key)
     return builder.node("only if known", "look from here, if seen before", look, key=key)
 
 
 def search_plan(builder: PlanBuilder, thing: Thing, place: str | None, key: str, *, anywhere: bool = True) -> NodeSpec:
-    """Look from here when it was seen before, else at each surface in turn; the first sighting ends the search.
+    """Look from here when it was seen before, else at each surface in turn; the first detection ends the search.
 
     When it is nowhere in its place, look at some of its surfaces from aside, then, with `anywhere`, at surfaces
     elsewhere. Raises InputError: the place has no surfaces.

@@ -49,7 +49,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
         name = builder.knowledge.thing(thing.name) or thing.name
         surfaces |= set(surfaces_elsewhere(builder.knowledge, name, place, builder.avoided))
     around = tuple(builder.surface(name) for name in builder.knowledge.surfaces if name in surfaces)
-    key = f"{builder.path_id}/sighting"
+    key = f"{builder.path_id}/detection"
     search = search_plan(builder.at("find"), thing, place, key, anywhere=anywhere)
     return builder.sequence(
         f"get {thing} {where(place)}",
@@ -69,7 +69,7 @@ def find_plan(builder: PlanBuilder) -> NodeSpec:
     below, counting = builder.at("search"), count != 1
     whole_room = place is None or place in builder.knowledge.places
     extra = {"floor": whole_room, "count": 0 if counting else 1}
-    looks = look_plans(below, thing, surfaces, f"{builder.path_id}/sighting", extra, tallied=counting)
+    looks = look_plans(below, thing, surfaces, f"{builder.path_id}/detection", extra, tallied=counting)
     search = below.node("round" if counting else "selector", f"look for {thing}", *(look for _, look in looks))
     leaves = {s: tuple(f"{look.path_id}/detect" for name, look in looks if name == s) for s in surfaces}
     asked = _asked_for(str(thing), count)

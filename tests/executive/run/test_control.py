@@ -336,7 +336,7 @@ def test_wrong_answers_and_late_ones_are_refused(control, clock):
     assert nobody_to_ask(QUESTION).result() == "skip"
 
 
-def test_a_skill_asks_the_operator_in_the_midst_of_a_run(compiled, run_tree, make, control, script):
+def test_a_skill_asks_the_operator_while_running(compiled, run_tree, make, control, script):
     said = []
 
     def ask(skill):

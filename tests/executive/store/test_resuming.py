@@ -231,7 +231,7 @@ def test_a_step_whose_output_could_not_be_kept_is_done_again(live, store, script
     memory = store.memory(1)
     seen = {path for path, step in memory.steps.items() if path.endswith("/detect") and step.status is Status.SUCCESS}
     assert seen
-    bare = dataclasses.replace(memory, board={k: v for k, v in memory.board.items() if not k.endswith("/sighting")})
+    bare = dataclasses.replace(memory, board={k: v for k, v in memory.board.items() if not k.endswith("/detection")})
     store.memory = lambda number: bare
     result, _, _ = live(TIDY)
     assert result.outcome is Outcome.SUCCESS

@@ -1,4 +1,4 @@
-"""A routine that is paused: it goes on in its midst when all is as it was, and else looks anew what is done."""
+"""A routine that is paused: it goes on where it was when all is as it was, and else looks anew what is done."""
 
 from typing import ClassVar
 

@@ -167,9 +167,10 @@ class ScriptedRobot:
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Take a picture with depth now, whichever is asked for. Raises ValueError for an unknown source."""
         self.calls.append("image")
-        camera = next((each for each in self._capabilities.cameras if each.source == source), None)
+        cameras = {each.source: each for each in self._capabilities.cameras}
+        camera = cameras.get(source)
         if camera is None:
-            raise ValueError(f"{self._name} has no camera '{source}'; it has {self._capabilities.camera_sources}")
+            raise ValueError(f"{self._name} has no camera '{source}'; it has {', '.join(cameras)}")
         mount = mount_of(camera)
         X_BF = self.arm.X_BH(self.q_rad) if mount.frame == "hand" else RigidTransform()
         edges = {"body": ("odom", self._X_OB())}

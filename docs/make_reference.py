@@ -262,7 +262,7 @@ def faults_page() -> str:
     words = (
         "A fault is the words of its kind and, perhaps, when it is on: `at 3 s` or `from 3 s` (and ever after), "
         "`from 3 s to 5 s`, `after 4 calls`, or nothing (always). Verbs go by their names in `skills/robot.py` or as "
-        "camera, lidar, arm, jaw, base and body."
+        "camera, lidar, arm, gripper, base and body."
     )
     return f"{NOTE}# Faults by name\n\n{words}\n\n| for instance | what happens |\n|---|---|\n{rows}\n"
 

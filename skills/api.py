@@ -34,7 +34,7 @@ InputsT = TypeVar("InputsT")
 class Cause(enum.Enum):
     """Why something did not succeed. Recovery is chosen by it."""
 
-    PRECONDITION = "PRECONDITION"  # it could not begin as things stood
+    PRECONDITION = "PRECONDITION"  # it could not begin in the present state
     PLANNING = "PLANNING"  # no way was found
     EXECUTION = "EXECUTION"  # the motion did not go as planned
     POSTCONDITION = "POSTCONDITION"  # it was done, and the look afterwards says no
@@ -80,7 +80,7 @@ Step = Running | Succeeded | Failed
 
 @dataclass(frozen=True)
 class Thing:
-    """A kind of thing, perhaps with attributes: "red wrench" is Thing("wrench", ("red",))."""
+    """A kind of object, perhaps with attributes: "red wrench" is Thing("wrench", ("red",))."""
 
     name: str
     attributes: tuple[str, ...] = ()
@@ -91,7 +91,7 @@ class Thing:
 
 @dataclass(frozen=True)
 class Surface:
-    """A flat top where things lie: outline in the world frame as (x, y) corners, height above the floor."""
+    """A flat top where objects lie: outline in the world frame as (x, y) corners, height above the floor."""
 
     name: str
     polygon_W: tuple[tuple[float, float], ...]
@@ -100,7 +100,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class ObjectObservation:
-    """A thing seen: where, how large, how sure.
+    """An object seen: where, how large, how sure.
 
     `position_W` is the centre of what was seen, in the world frame (m); `size_m` the extents of its points along the
     axes of a box that is turned by `yaw_rad` about the vertical; `surface` the name of the surface that it rests on.
@@ -159,12 +159,12 @@ class Costmap(Protocol):
         """Take in the robot's newest sensor readings; called by the runner before each tick."""
 
     def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
-        """Take in (N, 3) points that a camera saw on things in the way, the floor left out."""
+        """Take in (N, 3) points that a camera saw on objects in the way, the floor left out."""
 
 
 @runtime_checkable
 class ForgettingCostmap(Protocol):
-    """A costmap whose layer of seen things can be cleared; what the survey knows stays."""
+    """A costmap whose layer of seen objects can be cleared; what the survey knows stays."""
 
     def forget_seen(self) -> int:
         """Forget all that was seen and not surveyed; the number of cells that were blocked by it."""
@@ -370,6 +370,6 @@ class Skill(ABC, Generic[InputsT]):
     def undone(self, inputs: InputsT) -> str | None:
         """After a restart: why what an earlier success brought about is no longer so; None when it is, or is not seen.
 
-        Looks at what the sensors tell at once; moves nothing. Half a sentence, such as "the jaw is empty".
+        Looks at what the sensors tell at once; moves nothing. Half a sentence, such as "the gripper is empty".
         """
         return None

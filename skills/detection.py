@@ -14,19 +14,19 @@ __all__ = ["NO_DETECTOR", "Detection", "Detector", "NoDetector", "NoDetectorErro
 
 @dataclass(frozen=True)
 class Detection:
-    """A thing of a class in a picture: how sure (0 to 1), and its box (u0, v0, u1, v1) in pixels of that picture.
+    """An object of a class in a picture: how sure (0 to 1), and its box (u0, v0, u1, v1) in pixels of that picture.
 
-    `rivals` are the other classes that it may be, with their scores, the likeliest first.
+    `alternatives` are the other classes that it may be, with their scores, the likeliest first.
     """
 
     class_name: str
     score: float
     box: tuple[float, float, float, float]
-    rivals: tuple[tuple[str, float], ...] = ()
+    alternatives: tuple[tuple[str, float], ...] = ()
 
 
 class Detector(Protocol):
-    """Finds things of known classes in pictures."""
+    """Finds objects of known classes in pictures."""
 
     @property
     def class_names(self) -> tuple[str, ...]:

@@ -37,6 +37,16 @@ def relative(X_WA: Pose2D, X_WB: Pose2D) -> Pose2D:
     return compose(inverse(X_WA), X_WB)
 
 
+def grid_inside(
+    polygon: tuple[tuple[float, float], ...], step_m: float, *, first_m: float = 0.0, margin_m: float = 0.0
+) -> FloatArray:
+    """Points (N, 2) of a grid within a convex polygon grown by margin_m, from first_m inside its lowest corner on."""
+    corners = np.asarray(polygon, dtype=float)
+    axes = (np.arange(a + first_m, b, step_m) for a, b in zip(corners.min(axis=0), corners.max(axis=0), strict=True))
+    grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+    return np.asarray(grid[inside_polygon(grid, polygon, margin_m)])
+
+
 def inside_polygon(
     xy: FloatArray, polygon: tuple[tuple[float, float], ...], margin_m: float = 0.0
 ) -> NDArray[np.bool_]:

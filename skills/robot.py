@@ -1,8 +1,7 @@
-"""The Robot protocol: all that a skill ever sees of a robot.
+"""The Robot protocol: all that a skill ever sees of a robot. Its verbs follow the Spot SDK.
 
-The verbs follow the Spot SDK, so that a real robot can stand behind them. Every motion command carries an
-expiry time on the robot's clock: a robot that hears nothing stops by itself. Sense verbs return the latest
-immutable stamped snapshot and never block, `image` excepted (ask for it through the `Worker`).
+Every motion command carries an expiry time on the robot's clock: a robot that hears nothing stops by itself. Sense
+verbs return the latest immutable stamped snapshot and never block, except `image` (ask for it through the `Worker`).
 
 Frames: `odom` (O) is fixed to the floor where the robot woke up and drifts against the world (W); `body` (B) is
 x forward, y left, z up at the centre of the hips; `hand` (H) is the last arm link; `<source>_camera` (C) is
@@ -13,8 +12,8 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NewType, Protocol
 
 import numpy as np
@@ -57,19 +56,16 @@ class BaseKind(enum.Enum):
     DIFFERENTIAL = "differential"  # goes only where it heads, ahead or back, and turns on the spot: two driven wheels
 
 
-class InverseKinematics(Protocol):
-    """An arm's own solver."""
-
-    def __call__(self, X_BH: RigidTransform) -> Sequence[FloatArray]:
-        """Joint angles (J,) that put the hand there, every branch; joint limits are checked by the caller."""
+InverseKinematics = Callable[["RigidTransform"], Sequence[FloatArray]]
+"""An arm's own solver: from X_BH, joint angles (J,) of every branch; the caller checks the joint limits."""
 
 
 @dataclass(frozen=True)
 class ArmCapabilities:
     """The arm: joint names from the shoulder on, the furthest reach from the first joint (m), what it lifts (kg).
 
-    `inverse` solves its inverse kinematics; None for an arm with shoulder yaw, two pitch joints and a spherical wrist,
-    whose closed form `skills.arm.kinematics` reads from the robot's description.
+    `inverse` solves its inverse kinematics; None for shoulder yaw, two pitch joints and a spherical wrist, whose closed
+    form `skills.arm.kinematics` reads from the robot's description.
     """
 
     joint_names: tuple[str, ...]
@@ -81,12 +77,11 @@ class ArmCapabilities:
 
 @dataclass(frozen=True)
 class GripperCapabilities:
-    """The gripper: 0 is closed, `open_rad` is fully open (a positive jaw angle).
+    """The gripper: 0 is closed, `open_rad` is fully open (a positive finger angle).
 
     Geometry in the hand frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, fingertips at
-    `tip_x_m`, the inner face of the fixed finger at `fixed_z_m`; the tips are 2 `half_breadth_m` wide along y and
-    `tip_thickness_m` thick. A thing in the grip has its middle about `grip_x_m` ahead of H, and things up to
-    `max_grasp_m` wide are taken. Hand, gripper and what it holds end `length_m` ahead of H.
+    `tip_x_m`, the inner face of the fixed finger at `fixed_z_m`; tips are 2 `half_breadth_m` wide and `tip_thickness_m`
+    thick. What it grips has its middle about `grip_x_m` ahead of H, is up to `max_grasp_m` wide, and ends by `length_m`.
     """
 
     joint_name: str
@@ -125,11 +120,10 @@ class CameraCapabilities:
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What a robot is and can do.
+    """What a robot is and can do; `arm` or `gripper` is None on a robot without one.
 
-    `footprint_m` is the standing outline in the body frame as (x, y) corners; `description` is the robot's URDF
-    text with collision shapes and a free base (link `body`), for kinematics. `arm` or `gripper` is None on a robot
-    without one. `height_range_m` is the range of the body origin above the floor while it walks.
+    `footprint_m` is the standing outline in the body frame as (x, y) corners; `description` the robot's URDF text with
+    collision shapes and a free base (link `body`); `height_range_m` that of the body origin while it walks.
     """
 
     footprint_m: tuple[tuple[float, float], ...]
@@ -143,11 +137,6 @@ class Capabilities:
     cameras: tuple[CameraCapabilities, ...]
     description: str
     base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL
-
-    @property
-    def camera_sources(self) -> tuple[str, ...]:
-        """The names of all cameras."""
-        return tuple(camera.source for camera in self.cameras)
 
     @property
     def body_cameras(self) -> tuple[CameraCapabilities, ...]:
@@ -175,9 +164,8 @@ class FrameTree:
 
         X = RigidTransform()
         while frame != "odom":
-            parent, X_PF = self.edges[frame]
+            frame, X_PF = self.edges[frame]
             X = X_PF @ X
-            frame = parent
         return X
 
 
@@ -218,13 +206,14 @@ class Scan:
     def points_B(self) -> FloatArray:
         """The valid returns as an (N, 3) array in the body frame."""
         ranges = self.ranges_m.astype(np.float64)
-        elevation, azimuth = self.elevations_rad[:, None], self.azimuths_rad[None, :]
-        unit = np.stack(
-            [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation) + 0 * azimuth],
-            axis=-1,
-        )
-        points_L = (unit * ranges[..., None])[np.isfinite(ranges)]
+        points_L = (unit_rays(self.elevations_rad, self.azimuths_rad) * ranges[..., None])[np.isfinite(ranges)]
         return np.asarray(points_L @ self.X_BL.rotation().matrix().T + self.X_BL.translation())
+
+
+def unit_rays(elevations_rad: FloatArray, azimuths_rad: FloatArray) -> FloatArray:
+    """Unit vectors (rings, azimuths, 3) of a LiDAR's rays in its frame."""
+    e, a = elevations_rad[:, None], azimuths_rad[None, :]
+    return np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e) + 0.0 * a], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -243,10 +232,9 @@ class Intrinsics:
 class Image:
     """A picture with depth, taken at `stamp_s` from frame `camera_frame`.
 
-    `colour` is (H, W, 3) uint8 RGB, or None where the camera is grey; `grey` is (H, W) uint8. `depth_m` is float32
-    metres along the optical axis, 0 where there is none; it is registered to the picture by `depth_intrinsics`
-    (same pose, perhaps fewer pixels). `frames` is the frame tree at capture time. Arrays that were not asked for are
-    empty, of shape (0, 0).
+    `colour` is (H, W, 3) RGB, or None where the camera is grey; `grey` is (H, W). `depth_m` is in metres along the
+    optical axis, 0 where there is none, registered to the picture by `depth_intrinsics` (same pose, perhaps fewer
+    pixels). `frames` is the frame tree at capture time. Arrays that were not asked for have the shape (0, 0).
     """
 
     stamp_s: float
@@ -272,7 +260,7 @@ class Joints:
 
 @dataclass(frozen=True)
 class Gripper:
-    """Jaw angle (0 closed), clamp force at the jaw tip (N), and whether the robot believes that it holds something."""
+    """Finger angle (0 closed), clamp force at the fingertip (N), whether the robot believes that it holds something."""
 
     stamp_s: float
     opening_rad: float
@@ -325,7 +313,7 @@ class Lease:
 
     robot_name: str
     holder: str
-    number: int = field(default=0)
+    number: int = 0
 
 
 class Clock(Protocol):
@@ -358,10 +346,7 @@ class Robot(Protocol):
         """Latest LiDAR revolution, None before the first."""
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Take a picture with depth now, or only one of the two; may block, so call it inside a Worker job.
-
-        What was not asked for may be empty, see `Image`. Raises ValueError for an unknown source.
-        """
+        """Take a picture with depth now, or only one of the two; may block. Raises ValueError: no such source."""
 
     def joints(self) -> Joints:
         """Latest joint state."""
@@ -388,10 +373,7 @@ class Robot(Protocol):
         """Follow a joint trajectory; done when its end is reached and the arm is still."""
 
     def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the jaw to an opening with at most force_n at its tip; done when there or when held by a thing.
-
-        The jaw keeps its clamp force after the command's end: what is held stays held.
-        """
+        """Move the gripper to an opening with at most force_n at its tip, which stays; done when there or blocked."""
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stop all motion, or only the given command if it still runs; the gripper keeps its clamp force."""

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("executive", "skills", "plant")
-WORDS = ("class_ids", "command", "errors", "geometry", "knowledge", "yaml_source")
+WORDS = ("command", "errors", "geometry", "knowledge", "yaml_source")
 HOMES = (
     (*(f"executive.mission.{name}" for name in WORDS), "executive.record.profile", "executive.record.work"),
     ("executive.language",),

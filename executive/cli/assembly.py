@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from executive.cli.goal_conditions import promises_of
+from executive.cli.goal_conditions import conditions_of
 from executive.mission.errors import InputError
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
@@ -86,5 +86,5 @@ def take_up_plant(simulation: Simulation, path: Path, *, label: str | None) -> N
 
 def judge(simulation: Simulation, tree: CompiledTree, result: RobotResult) -> Verdict:
     """What the referee says of the mission's goal conditions."""
-    verdict: Verdict = simulation.referee.judge(promises_of(tree, result))
+    verdict: Verdict = simulation.referee.judge(conditions_of(tree, result))
     return verdict

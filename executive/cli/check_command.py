@@ -11,14 +11,14 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from executive.cli.feasibility import abilities_of, itinerary_of
+from executive.cli.feasibility import abilities_of, route_planner_of
 from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.cli.requests import prepare
 from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.tree.check import check_tree
 from executive.tree.compiler import CompiledTree
-from executive.tree.estimate import Estimate, Itinerary, load_estimates
+from executive.tree.estimate import Estimate, RoutePlanner, load_estimates
 from executive.tree.node_view import node_view
 from executive.view.collapse import folded_to
 from executive.view.text import to_rich
@@ -51,7 +51,7 @@ class Checker:
 
     def __init__(self, world: str | None = None) -> None:
         self._world = world
-        self._ways: dict[Path, Itinerary] = {}
+        self._routes: dict[Path, RoutePlanner] = {}
 
     def check(self, file: Path) -> CheckedFile:
         """Check one file; raises nothing for what stands in it."""
@@ -59,14 +59,14 @@ class Checker:
         try:
             prepared = prepare(Request(file=file, world=self._world), ask=None)
             tree, world = prepared.tree, prepared.world
-            if world.folder not in self._ways:
-                self._ways[world.folder] = itinerary_of(world)
+            if world.folder not in self._routes:
+                self._routes[world.folder] = route_planner_of(world)
             checked = check_tree(
                 tree,
                 knowledge=prepared.knowledge,
                 start=world.start,
                 abilities=abilities_of(),
-                itinerary=self._ways[world.folder],
+                planner=self._routes[world.folder],
                 estimates=load_estimates(),
             )
         except InputError as error:

@@ -6,10 +6,10 @@ from functools import cache, cached_property
 from pathlib import Path
 from xml.etree import ElementTree
 
-from executive.cli.kept_ways import KeptWays, kept_ways_of
+from executive.cli.kept_ways import KeptRoutes, kept_routes_of
 from executive.mission.errors import InputError
-from executive.tree.check import Abilities, PlannedWays
-from executive.tree.estimate import Itinerary, Way
+from executive.tree.check import Abilities, PlannedRoutes
+from executive.tree.estimate import Route, RoutePlanner
 from plant.models.catalogue import load_catalogue
 from plant.models.spot.description import FACTS
 from plant.spot.capabilities import spot_capabilities
@@ -20,14 +20,14 @@ from skills.robot import Pose2D
 from skills.stack import default_component
 
 
-class _WaysOnMap(Itinerary):
+class _RoutesOnMap(RoutePlanner):
     """Ways on a world's surveyed map for the robot's footprint; the map is read when the first is asked for."""
 
     def __init__(self, world: World) -> None:
         self._world = world
 
     @cached_property
-    def _ways(self) -> PlannedWays:
+    def _routes(self) -> PlannedRoutes:
         from skills.estimate.grid_map import MapError, load_grid_map
         from skills.navigate.footprint import Footprint
 
@@ -35,16 +35,16 @@ class _WaysOnMap(Itinerary):
             keepout_map = load_grid_map(self._world.keepout_map_path)
         except (MapError, OSError) as error:
             raise InputError(str(error)) from error
-        return PlannedWays(default_component("costmap").build(keepout_map), Footprint.of(spot_capabilities()))
+        return PlannedRoutes(default_component("costmap").build(keepout_map), Footprint.of(spot_capabilities()))
 
-    def way(self, start: Pose2D, goal: Pose2D) -> Way:
-        """The way from start to goal. Raises ValueError with one sentence when there is none, InputError."""
-        return self._ways.way(start, goal)
+    def route(self, start: Pose2D, goal: Pose2D) -> Route:
+        """The route from start to goal. Raises ValueError with one sentence when there is none, InputError."""
+        return self._routes.route(start, goal)
 
 
-def itinerary_of(world: World) -> KeptWays:
+def route_planner_of(world: World) -> KeptRoutes:
     """Ways on a world's surveyed map. When there is no such map, the first way raises InputError."""
-    return kept_ways_of(world, _WaysOnMap(world), FACTS)
+    return kept_routes_of(world, _RoutesOnMap(world), FACTS)
 
 
 @cache

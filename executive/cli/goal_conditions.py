@@ -5,28 +5,28 @@ from __future__ import annotations
 from executive.mission.goal import Area, GoalCondition
 from executive.run.outcome import RobotResult
 from executive.tree.compiler import CompiledTree
-from plant.referee import Promise, PromiseKind, Region
+from plant import referee
 
 
-def promises_of(tree: CompiledTree, result: RobotResult) -> tuple[Promise, ...]:
+def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.GoalCondition, ...]:
     """The goal conditions of a tree that has run: of all its parts but those that its own result tells were skipped.
 
     A count is one condition, however many trips it takes; an answer belongs to the check that gave it.
     """
-    promised: list[Promise] = []
+    found: list[referee.GoalCondition] = []
     for part in tree.parts:
         if part.goal is None or part.was_skipped({path: state.status for path, state in result.states.items()}):
             continue
         below = f"{part.path_id}/"
         answers = (answer for path, answer in result.answers.items() if f"{path}/".startswith(below))
-        promised.append(promise_of(part.goal, robot=tree.robot_name, answer=next(answers, None)))
-    return tuple(promised)
+        found.append(condition_of(part.goal, robot=tree.robot_name, answer=next(answers, None)))
+    return tuple(found)
 
 
-def promise_of(condition: GoalCondition, *, robot: str, answer: bool | None) -> Promise:
+def condition_of(condition: GoalCondition, *, robot: str, answer: bool | None) -> referee.GoalCondition:
     """One condition in the referee's words."""
-    return Promise(
-        kind=PromiseKind[condition.kind.name],
+    return referee.GoalCondition(
+        kind=referee.GoalKind[condition.kind.name],
         classes=condition.classes,
         count=condition.count,
         source=tuple(map(_region, condition.source)),
@@ -37,5 +37,5 @@ def promise_of(condition: GoalCondition, *, robot: str, answer: bool | None) -> 
     )
 
 
-def _region(area: Area) -> Region:
-    return Region(area.name, area.polygon, *(area.heights_m or ()))
+def _region(area: Area) -> referee.Region:
+    return referee.Region(area.name, area.polygon, *(area.heights_m or ()))

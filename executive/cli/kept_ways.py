@@ -11,45 +11,45 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
-from executive.tree.estimate import Itinerary, Way
+from executive.tree.estimate import Route, RoutePlanner
 from plant.worlds.world import World
 from skills.robot import Pose2D
 from skills.stack import DEFAULT_FILE
 
-__all__ = ["KeptWays", "kept_ways_of"]
+__all__ = ["KeptRoutes", "kept_routes_of"]
 
 _SKILLS: Final = DEFAULT_FILE.parent
 
 
-class KeptWays(Itinerary):
+class KeptRoutes(RoutePlanner):
     """Ways kept in a file; those that it does not have are planned, and kept there for later processes."""
 
-    def __init__(self, file: Path, planned: Itinerary) -> None:
+    def __init__(self, file: Path, planned: RoutePlanner) -> None:
         self._file, self._planned = file, planned
 
     @cached_property
-    def _ways(self) -> dict[str, list[float] | str]:
+    def _routes(self) -> dict[str, list[float] | str]:
         """By start and goal: length and progress of a way, or why there is none."""
         with suppress(OSError, ValueError):
             ways: dict[str, list[float] | str] = json.loads(self._file.read_text(encoding="utf-8"))
             return ways
         return {}
 
-    def way(self, start: Pose2D, goal: Pose2D) -> Way:
-        """The way from start to goal. Raises ValueError with one sentence when there is none."""
+    def route(self, start: Pose2D, goal: Pose2D) -> Route:
+        """The route from start to goal. Raises ValueError with one sentence when there is none."""
         name = f"{start} {goal}"
-        if name not in self._ways:
-            self._ways[name] = self._new(start, goal)
+        if name not in self._routes:
+            self._routes[name] = self._new(start, goal)
             with suppress(OSError):
                 self._write()
-        known = self._ways[name]
+        known = self._routes[name]
         if isinstance(known, str):
             raise ValueError(known)
-        return Way(*known)
+        return Route(*known)
 
     def _new(self, start: Pose2D, goal: Pose2D) -> list[float] | str:
         try:
-            way = self._planned.way(start, goal)
+            way = self._planned.route(start, goal)
         except ValueError as error:
             return str(error)
         return [way.length_m, way.progress_m]
@@ -58,16 +58,16 @@ class KeptWays(Itinerary):
         """Write the file; another process sees the old one or the new one."""
         self._file.parent.mkdir(parents=True, exist_ok=True)
         draft = self._file.with_suffix(f".{os.getpid()}")
-        draft.write_text(json.dumps(self._ways), encoding="utf-8")
+        draft.write_text(json.dumps(self._routes), encoding="utf-8")
         draft.replace(self._file)
 
 
-def kept_ways_of(world: World, planned: Itinerary, *robot_files: Path) -> KeptWays:
+def kept_routes_of(world: World, planned: RoutePlanner, *robot_files: Path) -> KeptRoutes:
     """The ways kept for a world. They are planned anew once its maps, the planner or the robot's files change."""
     planner = (DEFAULT_FILE, *_SKILLS.glob("navigate/*.py"), *_SKILLS.glob("estimate/*.py"), *_SKILLS.glob("*.py"))
     digest = _digest((*world.keepout_map_path.parent.iterdir(), *planner, *robot_files))
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return KeptWays(home / "errand" / "ways" / f"{digest}.json", planned)
+    return KeptRoutes(home / "errand" / "ways" / f"{digest}.json", planned)
 
 
 def _digest(files: Iterable[Path]) -> str:

@@ -17,7 +17,7 @@ from executive.run.runner import Observer, Progress
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import node_view
 from executive.tree.snapshot import NodeState, Snapshot
-from executive.view.looks import Looks
+from executive.view.styles import Styles
 from executive.view.text import to_rich
 
 REFRESH_S = 0.2
@@ -74,7 +74,7 @@ def fitted(picture: Text, rows: int) -> Text:
     lines = picture.split("\n")
     if len(lines) <= rows:
         return picture
-    running = [number for number, line in enumerate(lines) if Looks.RUNNING.value.symbol in line.plain]
+    running = [number for number, line in enumerate(lines) if Styles.RUNNING.value.symbol in line.plain]
     middle = running[-1] if running else 0
     first = max(0, min(middle - 2 * rows // 3, len(lines) - rows))
     return Text("\n", no_wrap=True, overflow="ellipsis").join(lines[first : first + rows])

@@ -17,7 +17,7 @@ from executive.cli.output import refusals
 from executive.record.history import History, read_history
 from executive.record.ros2 import write_ros2
 from executive.record.timeline import Entry, timeline
-from executive.view.looks import look_of
+from executive.view.styles import style_of
 from executive.view.text import printable
 
 
@@ -60,7 +60,7 @@ def _common(path_ids: Sequence[str]) -> str:
 def _row(entry: Entry, prefix: str) -> tuple[str | Text, ...]:
     if entry.state is None:
         return f"{entry.t:.2f}", "·", Text(entry.about, style="cyan"), Text(printable(entry.text))
-    look = look_of(entry.state)
-    symbol = Text(f"{look.symbol} {look.word}", style=look.style)
+    style = style_of(entry.state)
+    symbol = Text(f"{style.symbol} {style.word}", style=style.rich)
     about = entry.about.removeprefix(prefix)
-    return f"{entry.t:.2f}", symbol, Text(printable(about)), Text(printable(entry.text), style=look.style)
+    return f"{entry.t:.2f}", symbol, Text(printable(about)), Text(printable(entry.text), style=style.rich)

@@ -55,14 +55,11 @@ def run_request(
 
     The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it;
     with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
-
-    Raises:
-        InputError: the world cannot be used.
+    Raises InputError when the world cannot be used.
     """
-    request, tree, out, clock = prepared.request, prepared.tree, prepared.request.out, backend.clock
+    tree, out, clock, work = prepared.tree, prepared.request.out, backend.clock, Work()
     entry = backend.entry(tree, durable)
     warm_up(entry)
-    work = Work()
     entry = replace(entry, detector=CountedDetector(entry.detector, work))
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     artifacts = Artifacts(log)
@@ -70,38 +67,49 @@ def run_request(
         if page is not None:
             page.begin(log, backend.show_live())
         log_map(log, prepared)
-        announce(log, clock, tree, prepared.knowledge, world=prepared.world.name, seed=request.seed)
-        with cancelled_by_signals(control or Control(pace=None)) as heeded, LockStepWorker(clock) as worker:
+        announce(log, clock, tree, prepared.knowledge, world=prepared.world.name, seed=prepared.request.seed)
+        with cancelled_by_signals(control or Control(pace=None)) as controlled, LockStepWorker(clock) as worker:
             begin = run if profile is None else profiled(profile, run, backend, entry, worker)
             result = begin(
                 [entry],
                 clock=clock,
                 worker=worker,
                 publish=artifacts if profile is None else profile.timed("log", artifacts),
-                settings=RunSettings(seed=request.seed),
-                control=heeded,
+                settings=RunSettings(seed=prepared.request.seed),
+                control=controlled,
                 observer=both(observer, page),
                 work=work,
                 profile=profile,
             )
         if durable is not None:
-            durable.journal.keep_world()  # the next mission begins where this one ended
-            for trouble in durable.journal.troubles:
-                log(ERROR_TOPIC, {"node": tree.robot_name, "what": "keep the mission's state", "traceback": trouble})
+            _keep(durable, log, tree.robot_name)
         counts = work.totals({**backend.work(), "bytes_logged": log.bytes})
         log(WORK, counts)
     finally:
         log.close()
-    tree = result.trees.get(tree.robot_name, tree)
-    view = node_view(tree.root, result.worst.states)
-    (out / "tree.svg").write_text(to_svg(folded_to(view, DRAWN_NODES), title=prepared.mission.name), encoding="utf-8")
-    referee = backend.judge(tree, result.worst)
+    finished = _judged(prepared, backend, result, log)
     draw_answer(artifacts, out)
     recording = backend.leave(artifacts, out)
     if page is not None:
         page.end(recording)
-    report = _report(prepared, tree, result, referee, log=str(log.path))
-    return Finished(replace(report, work=counts), view)
+    return replace(finished, report=replace(finished.report, work=counts))
+
+
+def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:
+    """Keep the world for the next mission, which begins where this one ended, and log what could not be kept."""
+    durable.journal.keep_world()
+    for trouble in durable.journal.troubles:
+        log(ERROR_TOPIC, {"node": robot_name, "what": "keep the mission's state", "traceback": trouble})
+
+
+def _judged(prepared: Prepared, backend: Backend, result: RunResult, log: EventLog) -> Finished:
+    """The report of a run with what the referee saw; the tree as it ended is drawn."""
+    tree = result.trees.get(prepared.tree.robot_name, prepared.tree)
+    view = node_view(tree.root, result.worst.states)
+    picture = to_svg(folded_to(view, DRAWN_NODES), title=prepared.mission.name)
+    (prepared.request.out / "tree.svg").write_text(picture, encoding="utf-8")
+    referee = backend.judge(tree, result.worst)
+    return Finished(_report(prepared, tree, result, referee, log=str(log.path)), view)
 
 
 def both(*observers: Observer | None) -> Observer | None:

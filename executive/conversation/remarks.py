@@ -66,7 +66,7 @@ class RemarkAnswers:
         return done("I give it up and stop")
 
     def _where(self) -> Reply:
-        glance = None if self.progress is None else self.progress.glances.get(self._speech.robot_name)
-        if glance is None:
+        status = None if self.progress is None else self.progress.robots.get(self._speech.robot_name)
+        if status is None:
             return answer("I do not know yet; the run has not begun")
-        return answer(place_in_words(glance.pose, self._speech.knowledge))
+        return answer(place_in_words(status.pose, self._speech.knowledge))

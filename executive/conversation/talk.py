@@ -327,9 +327,9 @@ class Conversation:
 
     def _held(self) -> Thing | None:
         """The thing in the gripper, as far as the last request tells."""
-        glance = None if self._progress is None else self._progress.glances.get(self._speech.robot_name)
+        status = None if self._progress is None else self._progress.robots.get(self._speech.robot_name)
         missions = self._hands.state.missions.get(self._speech.robot_name, ())
-        if glance is None or not glance.holding or self._last is None or self._last.mission not in missions[-1:]:
+        if status is None or not status.holding or self._last is None or self._last.mission not in missions[-1:]:
             return None
         return next((command.object for command in self._last.commands if command.task is Task.GRASP), None)
 

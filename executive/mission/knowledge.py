@@ -8,10 +8,10 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from executive.mission.class_ids import CLASS_IDS
 from executive.mission.command import Task
 from executive.mission.errors import InputError, suggestion
 from executive.mission.yaml_source import YamlSource, read_yaml, validate
+from skills.perception.class_forms import class_forms
 
 __all__ = [
     "BatteryFacts",
@@ -174,10 +174,6 @@ class Knowledge(_Facts):
         aliases = {name: facts.aliases for group in groups for name, facts in group.items()}
         return tuple(word for name in names for word in (name, *aliases.get(name, ())))
 
-    def class_ids(self, name: str) -> tuple[int, ...]:
-        """The numbers of the classes that `name` stands for."""
-        return tuple(CLASS_IDS[c] for c in self.classes(name))
-
 
 def _resolve(
     name: str, group: Mapping[str, Place] | Mapping[str, SurfaceFacts] | Mapping[str, ThingFacts] | Mapping[str, Person]
@@ -214,7 +210,7 @@ def _cross_errors(knowledge: Knowledge, source: YamlSource) -> Iterator[InputErr
     for name, person in knowledge.people.items():
         yield from _unless_known(source, ("people", name, "at"), person.at, knowledge.place_names())
     for name, facts in knowledge.things.items():
-        yield from _unless_known(source, ("things", name), name, CLASS_IDS)
+        yield from _unless_known(source, ("things", name), name, class_forms())
         for index, usual in enumerate(facts.usual):
             yield from _unless_known(source, ("things", name, "usual", index), usual, knowledge.place_names())
     for task, table in knowledge.defaults.items():

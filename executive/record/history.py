@@ -35,8 +35,7 @@ class History:
     def trees(self, until_s: float | None = None) -> tuple[NodeView, ...]:
         """The trees in the order of their beginning, in their state at a time (s) of the robot's clock, or the last.
 
-        Raises:
-            InputError: the log holds no tree, or a broken one.
+        Raises InputError: the log holds no tree, or a broken one.
         """
         found: list[tuple[dict[str, Any], dict[str, NodeState]]] = []
         for event in _before(self.events, until_s):

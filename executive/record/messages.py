@@ -1,4 +1,4 @@
-"""The messages that other nodes of a robot system get: tasks to do, and where the objects stand."""
+"""The messages on the tasks to do that other nodes of a robot system get."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from executive.mission.class_ids import CLASS_IDS, NOTHING_ID
 from executive.mission.command import Command, Task, Thing
+from skills.perception.class_forms import class_forms
 
-__all__ = ["ObjectDestination", "TaskMessage", "command_type", "task_messages"]
+__all__ = ["TaskMessage", "command_type", "task_messages"]
 
 TASK_TOPIC: Final = "taskChannel"
 DETECT_TOPIC: Final = "object_to_detect"
 DESTINATION_TOPIC: Final = "object_destination"
+NOTHING_ID: Final = 0
 
 
 @dataclass(frozen=True)
@@ -39,23 +40,6 @@ class TaskMessage:
     cmd_type: int
 
 
-@dataclass(frozen=True)
-class ObjectDestination:
-    """Where an object was seen: `goal_*` in the world frame, `distance_from_robot_*` in the camera's frame (m)."""
-
-    stamp: float
-    sequence: int
-    message_id: int
-    class_id: int
-    class_name: str
-    goal_x: float
-    goal_y: float
-    goal_z: float
-    distance_from_robot_x: float
-    distance_from_robot_y: float
-    distance_from_robot_z: float
-
-
 def command_type(task: Task | None) -> int:
     """The number of a task: 0 for Nothing, else its place among the tasks from 1."""
     return 0 if task is None else [*Task].index(task) + 1
@@ -70,22 +54,15 @@ def task_messages(
     classes: Callable[[str], Iterable[str]],
     position: Callable[[Command], tuple[float, float]],
 ) -> tuple[TaskMessage, ...]:
-    """The commands as messages.
+    """The commands as messages, numbered from `first_sequence` on; `stamp` is the robot's clock (s).
 
-    Args:
-        commands: what to tell, in order.
-        stamp: the robot's clock (s).
-        first_sequence: the number of the first message; the others follow.
-        robot_name: whose commands they are.
-        classes: the classes that a thing's name stands for, as `Knowledge.classes`.
-        position: where a command's goal is, (x, y) in the world frame (m).
-
-    Raises:
-        KeyError: a class without a number.
+    `classes` gives the classes that an object's name stands for, `position` where a command's goal is, (x, y) in the
+    world frame (m). Raises KeyError for a class without a number.
     """
 
     def types(thing: Thing | None) -> tuple[int, ...]:
-        return (NOTHING_ID,) if thing is None else tuple(CLASS_IDS[name] for name in classes(thing.name))
+        """The numbers of an object's classes."""
+        return (NOTHING_ID,) if thing is None else tuple(class_forms()[name].id for name in classes(thing.name))
 
     def message(index: int, command: Command) -> TaskMessage:
         """The message of one of the commands."""

@@ -31,8 +31,7 @@ class Event:
 def read_events(path: Path) -> tuple[Event, ...]:
     """All events in the order in which they were written; of a log that was cut off, those before the cut.
 
-    Raises:
-        InputError: there is no such file, or it is no event log.
+    Raises InputError: there is no such file, or it is no event log.
     """
     try:
         with path.open("rb") as file:

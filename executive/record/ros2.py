@@ -47,8 +47,7 @@ Data = Mapping[str, Any]
 def write_ros2(events: Iterable[Event], path: Path) -> int:
     """Write the events as a ROS 2 bag; gives how many messages it holds.
 
-    Raises:
-        InputError: the file cannot be written.
+    Raises InputError: the file cannot be written.
     """
     count = 0
     try:

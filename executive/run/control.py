@@ -1,38 +1,36 @@
-"""Control of a run from outside: pause, step, cancel, stop button, breakpoints, other missions first, questions.
+"""Control of a run from outside: pause, step, cancel, stop button, breakpoints, other missions, questions.
 
-From Python, with the run in one thread and the hands in another:
+From Python, with the run in one thread and its control in another:
 
     control = Control()
-    thread = threading.Thread(target=lambda: run([entry], control=control, ...))
-    thread.start()
-    control.pause("somebody walks by")       # the robot stands still at the next tick
-    control.step()                           # until the next node changes its status
+    threading.Thread(target=lambda: run([entry], control=control, ...)).start()
+    control.pause("somebody walks by")        # the robot stands still at the next tick
+    control.step()                            # until the next node changes its status
     control.resume()
-    control.set_breakpoint("alice/fetch-drink/1-kitchen/grasp")
-    for question in control.state.questions:
-        control.answer(question.id, question.options[0])
     control.preempt(tree_of_another_mission)  # the present one is taken up again afterwards
-    control.then(tree_of_another_mission)  # when the present one is done
-    control.replace(tree_of_another_mission)  # the present one is given up
     control.cancel("enough for today")
 
-All methods may be called from any thread and from signal handlers; they return at once, and the run heeds them
-before it lets more time pass: within one tick.
+All methods may be called from any thread and from signal handlers. They return at once; the run polls at each tick.
 """
 
 from __future__ import annotations
 
 import difflib
 import enum
+import functools
 import threading
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from executive.run.questions import OpenQuestion, QuestionDesk
+from executive.run.questions import OpenQuestion, QuestionManager
 from executive.tree.compiler import CompiledTree
 from skills.api import Asked, Question
 from skills.robot import Clock
+
+P = ParamSpec("P")
+ResultT = TypeVar("ResultT")
 
 
 class Mode(enum.Enum):
@@ -80,20 +78,32 @@ class Replacement:
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """What the runner is to heed now; `preempts` are missions to do first, `instead` and `later` as they say."""
+class ControlRequests:
+    """What is asked of the run now; `preempts` are missions to do first, `instead` and `later` as they say."""
 
-    cancel: str | None
-    hold: str | None
-    preempts: tuple[CompiledTree, ...]
-    breakpoints: frozenset[str]
-    events: tuple[Event, ...]
+    cancel: str | None = None
+    hold: str | None = None
+    breakpoints: frozenset[str] = frozenset()
+    events: tuple[Event, ...] = ()
+    preempts: tuple[CompiledTree, ...] = ()
     instead: tuple[Replacement, ...] = ()
     later: tuple[CompiledTree, ...] = ()
 
 
+def _locked(method: Callable[Concatenate[Control, P], ResultT]) -> Callable[Concatenate[Control, P], ResultT]:
+    """The method, called while no other thread changes the control."""
+
+    @functools.wraps(method)
+    def locked(self: Control, /, *arguments: P.args, **options: P.kwargs) -> ResultT:
+        """The method under the control's lock."""
+        with self._changed:
+            return method(self, *arguments, **options)
+
+    return locked
+
+
 class Control:
-    """The hands on one run. `attended` says that somebody is there to answer questions.
+    """The control of one run. `attended` says that somebody is there to answer questions.
 
     While a run is held, and while an attended one asks, simulated time passes `pace` times as fast as the wall's at
     most (None: as fast as can be).
@@ -103,10 +113,10 @@ class Control:
         self.attended = attended
         self.pace = pace
         self._changed = threading.Condition()
-        self._desk = QuestionDesk()
+        self._questions = QuestionManager()
         self._version = 0
         self._begun = self._ended = False
-        self._cancel: str | None = None
+        self._requests = ControlRequests()
         self._pressed: str | None = None
         self._paused: str | None = None
         self._stride: int | None = None  # ticks to go while paused; 0: until a node changes; None: none
@@ -114,245 +124,227 @@ class Control:
         self._lost: Mapping[str, str] = MappingProxyType({})
         self._missions: Mapping[str, tuple[str, ...]] = MappingProxyType({})
         self._known: frozenset[str] = frozenset()
-        self._breakpoints: frozenset[str] = frozenset()
-        self._preempts: tuple[CompiledTree, ...] = ()
-        self._instead: tuple[Replacement, ...] = ()
-        self._later: tuple[CompiledTree, ...] = ()
-        self._events: tuple[Event, ...] = ()
-
-    # -- for people and programs ------------------------------------------------------------------------------------
 
     @property
+    @_locked
     def state(self) -> ControlState:
         """What can be seen now."""
-        with self._changed:
-            mode, reason = self._mode()
-            return ControlState(
-                self._version, mode, reason, self._at, self._desk.open, self._breakpoints, self._missions
-            )
+        (mode, reason), asked = self._mode(), self._requests
+        return ControlState(
+            self._version, mode, reason, self._at, self._questions.open, asked.breakpoints, self._missions
+        )
 
+    @_locked
     def wait(self, version: int, timeout_s: float | None = None) -> ControlState:
         """Block (on the wall's clock) until the state is newer than `version`, or time is over; the state then."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._version > version, timeout_s)
-            return self.state
+        self._changed.wait_for(lambda: self._version > version, timeout_s)
+        return self.state
 
+    @_locked
     def pause(self, reason: str = "paused by the operator") -> None:
         """Hold the robot still and keep the place of everything. Pausing twice is pausing once."""
-        with self._changed:
-            self._stride = None
-            if self._paused is None:
-                self._paused = reason
-                self._note("pause", reason)
+        self._stride = None
+        if self._paused is None:
+            self._paused = reason
+            self._note("pause", reason)
 
+    @_locked
     def resume(self) -> None:
         """Go on after a pause, a breakpoint or steps; a pressed stop button stays pressed."""
-        with self._changed:
-            if self._paused is not None:
-                self._paused = self._at = self._stride = None
-                self._note("resume", "the mission goes on")
+        if self._paused is not None:
+            self._paused = self._at = self._stride = None
+            self._note("resume", "the mission goes on")
 
+    @_locked
     def toggle_pause(self) -> None:
         """Pause, or resume when paused."""
-        with self._changed:
-            if self._paused is None:
-                self.pause()
-            else:
-                self.resume()
+        if self._paused is None:
+            self.pause()
+        else:
+            self.resume()
 
+    @_locked
     def step(self, ticks: int | None = None) -> None:
         """Go on until a node changes its status, or for some ticks, and pause again.
 
         Skills in motion are suspended between steps, so that few ticks may not suffice for a motion to get anywhere.
-
-        Raises:
-            ValueError: ticks below 1.
+        Raises ValueError: ticks below 1.
         """
         if ticks is not None and ticks < 1:
             raise ValueError(f"a step of {ticks} ticks: at least 1 is needed")
-        with self._changed:
-            self._paused = self._paused or "stepping"
-            self._stride, self._at = ticks or 0, None
-            self._note("step", "until a node changes" if ticks is None else f"for {ticks} ticks")
+        self._paused = self._paused or "stepping"
+        self._stride, self._at = ticks or 0, None
+        self._note("step", "until a node changes" if ticks is None else f"for {ticks} ticks")
 
+    @_locked
     def cancel(self, reason: str = "cancelled by the operator") -> None:
         """End the run; the first reason stays."""
-        with self._changed:
-            if self._cancel is None and not self._ended:
-                self._cancel = reason
-                self._note("cancel", reason)
+        if self._requests.cancel is None and not self._ended:
+            self._ask_for(cancel=reason)
+            self._note("cancel", reason)
 
+    @_locked
     def stop_button(self, reason: str = "the stop button is pressed") -> None:
-        """Stop all robots until `release_stop_button`, whatever else is wished."""
-        with self._changed:
-            if self._pressed is None:
-                self._pressed = reason
-                self._note("stop button", reason)
+        """Stop all robots until `release_stop_button`, whatever else is asked for."""
+        if self._pressed is None:
+            self._pressed = reason
+            self._note("stop button", reason)
 
+    @_locked
     def release_stop_button(self) -> None:
         """Let the run go on as it was when the button was pressed."""
-        with self._changed:
-            if self._pressed is not None:
-                self._pressed = None
-                self._note("stop button released", "the stop button is released")
+        if self._pressed is not None:
+            self._pressed = None
+            self._note("stop button released", "the stop button is released")
 
     @property
+    @_locked
     def stop_pressed(self) -> str | None:
         """Why nothing may move while the stop button is pressed; None when it is not."""
-        with self._changed:
-            return self._pressed
+        return self._pressed
 
+    @_locked
     def set_breakpoint(self, path_id: str) -> None:
         """Pause before the node begins, each time. Raises ValueError for a node that the run does not have."""
-        with self._changed:
-            self._refuse_unknown(path_id)
-            self._breakpoints |= {path_id}
-            self._note("breakpoint set", path_id)
+        self._refuse_unknown(path_id)
+        self._ask_for(breakpoints=self._requests.breakpoints | {path_id})
+        self._note("breakpoint set", path_id)
 
+    @_locked
     def clear_breakpoint(self, path_id: str) -> None:
         """Pause there no more; does nothing when there is none."""
-        with self._changed:
-            if path_id in self._breakpoints:
-                self._breakpoints -= {path_id}
-                self._note("breakpoint cleared", path_id)
+        if path_id in self._requests.breakpoints:
+            self._ask_for(breakpoints=self._requests.breakpoints - {path_id})
+            self._note("breakpoint cleared", path_id)
 
+    @_locked
     def preempt(self, tree: CompiledTree) -> None:
         """Do another mission first; the one under way is suspended and taken up again afterwards.
 
-        Raises:
-            ValueError: no such robot in the run, or the mission is under way already.
+        Raises ValueError: no such robot in the run, or the mission is under way already.
         """
-        with self._changed:
-            self._refuse_mission(tree)
-            self._preempts += (tree,)
-            self._note("preempt", f"first '{tree.mission_name}'")
+        self._refuse_mission(tree)
+        self._ask_for(preempts=(*self._requests.preempts, tree))
+        self._note("preempt", f"first '{tree.mission_name}'")
 
+    @_locked
     def then(self, tree: CompiledTree) -> None:
         """Do another mission when the one that the robot began with is done. Raises ValueError as `preempt`."""
-        with self._changed:
-            self._refuse_mission(tree)
-            self._later += (tree,)
-            self._note("then", f"afterwards '{tree.mission_name}'")
+        self._refuse_mission(tree)
+        self._ask_for(later=(*self._requests.later, tree))
+        self._note("then", f"afterwards '{tree.mission_name}'")
 
+    @_locked
     def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
         """Do another mission instead of the one under way, which is given up.
 
         With `instead_of` it takes the place of the mission of that name: one that waits is not begun, and one that is
-        not under way just now is left alone, as by `preempt`.
-
-        Raises:
-            ValueError: no such robot in the run.
+        not under way just now is left alone, as by `preempt`. Raises ValueError: no such robot in the run.
         """
-        with self._changed:
-            self._refuse_robot(tree)
-            self._instead += (Replacement(tree, instead_of),)
-            self._note("replace", f"instead '{tree.mission_name}'")
+        self._refuse_robot(tree)
+        self._ask_for(instead=(*self._requests.instead, Replacement(tree, instead_of)))
+        self._note("replace", f"instead '{tree.mission_name}'")
 
+    @_locked
     def answer(self, question_id: str, text: str) -> None:
         """Answer an open question. Raises ValueError when it is not open or `text` is none of its options."""
-        with self._changed:
-            self._desk.answer(question_id, text)
-            self._note("answer", f"{question_id}: {text}")
+        self._questions.answer(question_id, text)
+        self._note("answer", f"{question_id}: {text}")
 
-    # -- for the runner -----------------------------------------------------------------------------------------------
-
+    @_locked
     def begin(self, missions: Mapping[str, CompiledTree]) -> None:
         """The run begins. Raises ValueError for a breakpoint at a node that it does not have, or at a second run."""
-        with self._changed:
-            if self._begun:
-                raise ValueError("a Control has its hands on one run only; make another")
-            self._begun = True
-            for robot_name, tree in missions.items():
-                self.mission_begun(robot_name, tree)
-            for path_id in self._breakpoints:
-                self._refuse_unknown(path_id)
+        if self._begun:
+            raise ValueError("a Control controls one run only; make another")
+        self._begun = True
+        for robot_name, tree in missions.items():
+            self.mission_begun(robot_name, tree)
+        for path_id in self._requests.breakpoints:
+            self._refuse_unknown(path_id)
 
+    @_locked
     def mission_begun(self, robot_name: str, tree: CompiledTree) -> None:
         """A mission begins, on top of those that a robot has begun."""
-        with self._changed:
-            self._known |= frozenset(tree.path_ids)
-            stack = (*self._missions.get(robot_name, ()), tree.mission_name)
-            self._missions = MappingProxyType({**self._missions, robot_name: stack})
-            self._bump()
+        self._known |= frozenset(tree.path_ids)
+        stack = (*self._missions.get(robot_name, ()), tree.mission_name)
+        self._missions = MappingProxyType({**self._missions, robot_name: stack})
+        self._bump()
 
+    @_locked
     def mission_ended(self, robot_name: str) -> None:
         """A robot's topmost mission is over."""
-        with self._changed:
-            self._missions = MappingProxyType({**self._missions, robot_name: self._missions[robot_name][:-1]})
-            self._bump()
+        self._missions = MappingProxyType({**self._missions, robot_name: self._missions[robot_name][:-1]})
+        self._bump()
 
-    def heed(self) -> Wishes:
-        """What is wished now; new missions and events are handed out once."""
-        with self._changed:
-            mode, reason = self._mode()
-            held = reason if mode is Mode.STOPPED or (mode is Mode.PAUSED and self._stride is None) else None
-            wishes = Wishes(
-                self._cancel, held, self._preempts, self._breakpoints, self._events, self._instead, self._later
-            )
-            self._preempts, self._instead, self._later, self._events = (), (), (), ()
-            return wishes
+    @_locked
+    def poll(self) -> ControlRequests:
+        """What is asked for now; new missions and events are handed out once."""
+        mode, reason = self._mode()
+        held = mode is Mode.STOPPED or (mode is Mode.PAUSED and self._stride is None)
+        requests = replace(self._requests, hold=reason if held else None)
+        self._requests = ControlRequests(requests.cancel, breakpoints=requests.breakpoints)
+        return requests
 
+    @_locked
     def ticked(self, *, changed: bool) -> None:
         """The trees were ticked; `changed` says whether a node changed its status. Ends a step that is done."""
-        with self._changed:
-            if self._stride is None or (self._stride == 0 and not changed):
-                return
-            self._stride = self._stride - 1 if self._stride > 1 else None
-            if self._stride is None:
-                self._bump()
+        if self._stride is None or (self._stride == 0 and not changed):
+            return
+        self._stride = self._stride - 1 if self._stride > 1 else None
+        if self._stride is None:
+            self._bump()
 
+    @_locked
     def arrived_at(self, path_id: str) -> None:
         """The run stands at a breakpoint."""
-        with self._changed:
-            self._paused, self._at, self._stride = f"at the breakpoint {path_id}", path_id, None
-            self._note("breakpoint", self._paused)
+        self._paused, self._at, self._stride = f"at the breakpoint {path_id}", path_id, None
+        self._note("breakpoint", self._paused)
 
+    @_locked
     def lease_lost(self, robot_name: str, why: str | None) -> None:
         """A robot's lease was lost (why), or is there again (None)."""
-        with self._changed:
-            others = {name: reason for name, reason in self._lost.items() if name != robot_name}
-            self._lost = MappingProxyType(others if why is None else {**others, robot_name: why})
-            self._note("lease lost" if why else "lease back", why or f"{robot_name} has its lease again")
+        others = {name: reason for name, reason in self._lost.items() if name != robot_name}
+        self._lost = MappingProxyType(others if why is None else {**others, robot_name: why})
+        self._note("lease lost" if why else "lease back", why or f"{robot_name} has its lease again")
 
+    @_locked
     def ask(self, question: Question, clock: Clock) -> Asked:
         """Put a question to the operator. Raises ValueError when one of that id is open already."""
-        with self._changed:
-            asked = self._desk.ask(question, clock, self._changed, lambda said: self._note("question over", said))
-            self._note("question", f"{question.id}: {question.text}")
-            return asked
+        asked = self._questions.ask(question, clock, self._changed, lambda said: self._note("question over", said))
+        self._note("question", f"{question.id}: {question.text}")
+        return asked
 
+    @_locked
     def held(self, duration_s: float) -> None:
         """The run was held so long (robot's clock); that does not count against the time of questions."""
-        with self._changed:
-            self._desk.postpone(duration_s)
+        self._questions.postpone(duration_s)
 
+    @_locked
     def rest(self, duration_s: float) -> None:
-        """Let the wall's clock run on, less long when something is wished meanwhile."""
-        with self._changed:
-            seen = self._version
-            self._changed.wait_for(lambda: self._version > seen, duration_s)
+        """Let the wall's clock run on, less long when something is asked for meanwhile."""
+        seen = self._version
+        self._changed.wait_for(lambda: self._version > seen, duration_s)
 
     @property
+    @_locked
     def slow(self) -> bool:
         """True while simulated time should not run ahead of the people who watch."""
-        with self._changed:
-            return self._mode()[0] is not Mode.RUNNING or (self.attended and bool(self._desk.open))
+        return self._mode()[0] is not Mode.RUNNING or (self.attended and bool(self._questions.open))
 
+    @_locked
     def end(self) -> tuple[Event, ...]:
         """The run is over; the events that were not handed out yet."""
-        with self._changed:
-            self._ended = True
-            self._desk.close()
-            events, self._events = self._events, ()
-            self._bump()
-            return events
-
-    # -- inside -------------------------------------------------------------------------------------------------------
+        self._ended = True
+        self._questions.close()
+        events = self._requests.events
+        self._ask_for(events=())
+        self._bump()
+        return events
 
     def _mode(self) -> tuple[Mode, str]:
         lost = next(iter(self._lost.values()), None)
         order: Collection[tuple[bool, Mode, str | None]] = (
-            (self._ended, Mode.ENDED, self._cancel),
+            (self._ended, Mode.ENDED, self._requests.cancel),
             (self._pressed is not None, Mode.STOPPED, self._pressed),
             (lost is not None, Mode.LEASE_LOST, lost),
             (self._paused is not None, Mode.PAUSED, self._paused),
@@ -366,12 +358,15 @@ class Control:
 
     def _refuse_mission(self, tree: CompiledTree) -> None:
         self._refuse_robot(tree)
-        waiting = [other.mission_name for other in (*self._preempts, *self._later)]
+        waiting = [other.mission_name for other in (*self._requests.preempts, *self._requests.later)]
         if tree.mission_name in (*self._missions.get(tree.robot_name, ()), *waiting):
             raise ValueError(f"the mission '{tree.mission_name}' is under way already")
 
+    def _ask_for(self, **requests: Any) -> None:
+        self._requests = replace(self._requests, **requests)
+
     def _note(self, what: str, message: str) -> None:
-        self._events += (Event(what, message),)
+        self._ask_for(events=(*self._requests.events, Event(what, message)))
         self._bump()
 
     def _bump(self) -> None:

@@ -90,6 +90,7 @@ class GuardedRobot:
 
         @functools.wraps(call)
         def guarded_call(*arguments: Any, **options: Any) -> Any:
+            """The verb under the watchdog and the lease that counts, its answer checked."""
             nonlocal good
             if "lease" in options and options["lease"] == self.token:
                 options["lease"] = self._lease

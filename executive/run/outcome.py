@@ -39,7 +39,7 @@ class RobotResult:
 
 
 @dataclass(frozen=True)
-class Glance:
+class RobotStatus:
     """A robot at one moment: where it believes to be (world frame; None when lost), and whether it holds something."""
 
     pose: Pose2D | None

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from threading import Condition
-from types import MappingProxyType
 
 from skills.api import Question
 from skills.robot import Clock
@@ -29,11 +28,11 @@ class OpenQuestion:
         return self.question.options
 
 
-class QuestionDesk:
+class QuestionManager:
     """The open questions. Its owner holds the lock whenever it calls."""
 
     def __init__(self) -> None:
-        self._open: MappingProxyType[str, PendingAnswer] = MappingProxyType({})
+        self._open: dict[str, PendingAnswer] = {}
 
     @property
     def open(self) -> tuple[OpenQuestion, ...]:
@@ -45,7 +44,7 @@ class QuestionDesk:
         if question.id in self._open:
             raise ValueError(f"the question '{question.id}' is open already")
         pending = PendingAnswer(OpenQuestion(question, clock.now() + question.limit_s), clock, lock, self._leave, over)
-        self._open = MappingProxyType({**self._open, question.id: pending})
+        self._open[question.id] = pending
         return pending
 
     def answer(self, question_id: str, text: str) -> None:
@@ -66,10 +65,10 @@ class QuestionDesk:
 
     def close(self) -> None:
         """Nobody waits for answers any more."""
-        self._open = MappingProxyType({})
+        self._open.clear()
 
     def _leave(self, question_id: str) -> None:
-        self._open = MappingProxyType({key: value for key, value in self._open.items() if key != question_id})
+        self._open.pop(question_id, None)
 
 
 class PendingAnswer:
@@ -94,10 +93,8 @@ class PendingAnswer:
     def done(self) -> bool:
         """True when answered; the default is taken when the time is over."""
         with self._lock:
-            if self._answer is None and self._clock.now() >= self.open.until_s - 1e-9:
-                self._answer = self.open.question.default
-                self._leave(self.open.id)
-                self._over(f"{self.open.id}: nobody answered in time, so '{self._answer}'")
+            if self._clock.now() >= self.open.until_s - 1e-9:
+                self._take_default(f"nobody answered in time, so '{self.open.question.default}'")
             return self._answer is not None
 
     def result(self) -> str:
@@ -109,7 +106,10 @@ class PendingAnswer:
     def withdraw(self) -> None:
         """Take the question back."""
         with self._lock:
-            if self._answer is None:
-                self._answer = self.open.question.default
-                self._leave(self.open.id)
-                self._over(f"{self.open.id}: taken back")
+            self._take_default("taken back")
+
+    def _take_default(self, why: str) -> None:
+        if self._answer is None:
+            self._answer = self.open.question.default
+            self._leave(self.open.id)
+            self._over(f"{self.open.id}: {why}")

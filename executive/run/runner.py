@@ -12,10 +12,10 @@ from executive.record.profile import Profile
 from executive.record.schemas import CONTROL
 from executive.record.ticks import TickMeter
 from executive.record.work import Work
-from executive.run.control import Control, Event, Wishes
+from executive.run.control import Control, ControlRequests, Event
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
-from executive.run.outcome import Glance, Outcome, RobotResult, RunResult
+from executive.run.outcome import Outcome, RobotResult, RobotStatus, RunResult
 from executive.run.session import Session
 from executive.run.tree_run import Ending
 from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog
@@ -64,14 +64,14 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class Progress:
-    """What an observer is told after each tick: by robot, the states of all nodes, the mission, and a glance at it."""
+    """What an observer is told after each tick: by robot, the states of all nodes, the mission, and its status."""
 
     now_s: float
     ticks: int
     overruns: int
     states: Mapping[str, Snapshot]
     trees: Mapping[str, CompiledTree] = field(default_factory=dict)
-    glances: Mapping[str, Glance] = field(default_factory=dict)
+    robots: Mapping[str, RobotStatus] = field(default_factory=dict)
 
 
 Observer = Callable[[Progress], None]
@@ -99,21 +99,20 @@ def run(
 ) -> RunResult:
     """Run trees to their end, robots in the order of their names.
 
-    Each tick: heed `control`, advance the clock by the tick period, update each robot's estimators, tick each tree, log
+    Each tick: poll `control`, advance the clock by the tick period, update each robot's estimators, tick each tree, log
     what changed. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree is not
-    ticked, and what passes does not count against any limit. Whatever happens, all trees and robots are stopped and
-    all leases returned before this returns. Without control, equal seeds give equal logs. `work` counts what is
-    computed, `profile` times the skills.
-
-    Raises:
-        ValueError: no entries, two robots of one name, or a breakpoint at a node that there is not.
+    ticked, and what passes does not count against any limit. Whatever happens, all trees and robots are stopped and all
+    leases returned before this returns. Without control, equal seeds give equal logs. `work` counts what is computed,
+    `profile` times the skills. Raises ValueError: no entries, two robots of one name, or a breakpoint at a node that
+    there is not.
     """
     names = [entry.robot.name for entry in entries]
     if not entries or len(set(names)) != len(names):
         raise ValueError(f"a run needs robots of different names, not {names}")
     control = control or Control(pace=None)
     control.begin({entry.tree.robot_name: entry.tree for entry in entries})
-    made = _Run(clock, worker, publish, settings, control, observer, work or Work(), profile)
+    made = _Run(clock, worker, publish, settings, control)
+    made.observer, made.work, made.profile = observer, work or Work(), profile
     return made.run(entries)
 
 
@@ -136,20 +135,12 @@ class _LastingLog:
 class _Run:
     """The state of one run."""
 
-    def __init__(
-        self,
-        clock: Clock,
-        worker: Worker,
-        publish: Publish,
-        settings: RunSettings,
-        control: Control,
-        observer: Observer | None,
-        work: Work,
-        profile: Profile | None,
-    ) -> None:
+    def __init__(self, clock: Clock, worker: Worker, publish: Publish, settings: RunSettings, control: Control) -> None:
         self._clock, self._worker, self._publish = clock, worker, _LastingLog(publish)
-        self._settings, self._control, self._observer = settings, control, observer
-        self._work, self._profile = work, profile
+        self._settings, self._control = settings, control
+        self.observer: Observer | None = None
+        self.work = Work()
+        self.profile: Profile | None = None
         self._watchdog = Watchdog(min(settings.verb_limit_s, settings.image_limit_s, settings.tick_limit_s))
         self._sessions: list[Session] = []
         self._ticks = 0
@@ -197,46 +188,46 @@ class _Run:
             ask=lambda question: self._control.ask(question, self._clock),
             stop_pressed=lambda: self._control.stop_pressed,
             detector=entry.detector,
-            work=self._work,
+            work=self.work,
             stack=entry.stack,
         )
         try:
-            return Session(entry.tree, context, robot, self._control, entry.journal, self._profile)
+            return Session(entry.tree, context, robot, self._control, entry.journal, self.profile)
         except BaseException:
             robot.give_lease_back()
             raise
 
     def _cycle(self) -> None:
-        """One period: wishes are heeded, time passes, estimators see, trees tick."""
+        """One period: requests are polled, time passes, estimators see, trees tick."""
         begun_wall_s = time.perf_counter()
         live = [session for session in self._sessions if session.result is None]
-        wishes = self._heed(live)
+        requests = self._poll(live)
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
             session.sense()
-        self._tick([session for session in live if session.may_move() and wishes.hold is None], wishes.breakpoints)
+        self._tick([session for session in live if session.may_move() and requests.hold is None], requests.breakpoints)
         for session in live:
             if session.finished:
                 session.close()
-        if self._observer is not None:
-            self._observer(self._progress())
+        if self.observer is not None:
+            self.observer(self._progress())
         self._keep_pace(begun_wall_s)
 
-    def _heed(self, live: Sequence[Session]) -> Wishes:
-        """Do what is wished before time passes. Raises _CancelledError or _TimeOverError."""
-        wishes = self._control.heed()
-        self._tell(wishes.events)
-        if wishes.cancel is not None:
-            raise _CancelledError(wishes.cancel)
+    def _poll(self, live: Sequence[Session]) -> ControlRequests:
+        """Do what is asked for before time passes. Raises _CancelledError or _TimeOverError."""
+        requests = self._control.poll()
+        self._tell(requests.events)
+        if requests.cancel is not None:
+            raise _CancelledError(requests.cancel)
         for session in live:
-            for wish in wishes.instead:
-                if wish.tree.robot_name == session.name:
-                    session.replace(wish.tree, wish.instead_of)
-            for tree in _for_robot(session, wishes.preempts):
+            for request in requests.instead:
+                if request.tree.robot_name == session.name:
+                    session.replace(request.tree, request.instead_of)
+            for tree in _for_robot(session, requests.preempts):
                 session.preempt(tree)
-            for tree in _for_robot(session, wishes.later):
+            for tree in _for_robot(session, requests.later):
                 session.later(tree)
-        if wishes.hold is None:
+        if requests.hold is None:
             self._time.go_on()
         else:
             self._time.stop()
@@ -245,7 +236,7 @@ class _Run:
                 session.hold()
         if self._time.elapsed_s() >= self._settings.time_limit_s:
             raise _TimeOverError(f"the mission was not done within {self._settings.time_limit_s:g} s")
-        return wishes
+        return requests
 
     def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> None:
         """Tick the trees of robots that may move."""
@@ -264,8 +255,8 @@ class _Run:
     def _progress(self) -> Progress:
         states = {session.name: session.states for session in self._sessions}
         trees = {session.name: session.tree for session in self._sessions}
-        glances = {session.name: session.glance for session in self._sessions}
-        return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees, glances)
+        robots = {session.name: session.status for session in self._sessions}
+        return Progress(self._clock.now(), self._ticks, self._meter.overruns, states, trees, robots)
 
     def _keep_pace(self, begun_wall_s: float) -> None:
         """Do not let simulated time run ahead of people who have something to decide."""
@@ -298,7 +289,7 @@ class _Run:
         absent = tuple(_never_began(e, ending) for e in entries if ending is not None and e.robot.name not in began)
         sim_time_s = self._clock.now() - self._begun_s
         trees = {session.name: session.main_tree for session in self._sessions}
-        overruns, work = self._meter.overruns, self._work.totals()
+        overruns, work = self._meter.overruns, self.work.totals()
         return RunResult(robots + absent, self._ticks, overruns, sim_time_s, wall_time_s, trees, work)
 
 

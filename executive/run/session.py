@@ -13,7 +13,7 @@ from executive.record.schemas import OUTCOME, POSE
 from executive.run.control import Control
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
-from executive.run.outcome import Glance, Outcome, RobotResult
+from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.tree_run import Ending, TreeRun
 from executive.run.watchdog import VerbHung
 from executive.tree.behaviours.board import Board
@@ -85,9 +85,9 @@ class Session:
         return self._stack[0].tree
 
     @property
-    def glance(self) -> Glance:
+    def status(self) -> RobotStatus:
         """Where the robot is and whether it holds something."""
-        return Glance(self.context.pose(), self.context.robot.gripper().holding)
+        return RobotStatus(self.context.known_pose(), self.context.robot.gripper().holding)
 
     @property
     def waiting_at(self) -> str | None:
@@ -103,7 +103,7 @@ class Session:
         if estimate.stamp_s != self._matched_s:
             self._matched_s = estimate.stamp_s
             context.work.count("scan_matches")
-        self._asked_at = self._asked_at or context.pose()
+        self._asked_at = self._asked_at or context.known_pose()
         if context.clock.now() >= self._pose_due_s - _EPSILON_S:
             self._pose_due_s += POSE_PERIOD_S
             self._publish_pose()

@@ -148,7 +148,7 @@ class TreeRun:
         checkpoints = {leaf.path_id: leaf.checkpoint for leaf in running if leaf.checkpoint}
         now_s, pose = context.clock.now(), None
         if changes or now_s >= self._pose_due_s:
-            self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.pose()
+            self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.known_pose()
         return TickNote(now_s, changes, context.board.values(), pose, checkpoints)
 
     def _transition(self, change: Change) -> dict[str, object]:

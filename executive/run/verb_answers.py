@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from skills.robot import (
     Battery,
@@ -52,36 +52,45 @@ def _or_none(check: Check) -> Check:
     return lambda answer: None if answer is None else check(answer)
 
 
-def _numbers(what: str, values: Iterable[float]) -> str | None:
-    return None if all(map(math.isfinite, values)) else f"{what} is not finite"
+def _nothing_more(reading: Any) -> str | None:
+    return None
 
 
-def _stamp(stamp_s: float) -> str | None:
-    return None if math.isfinite(stamp_s) and stamp_s >= 0.0 else f"a stamp of {stamp_s} s"
+def _reading(kind: type[Any], more: Check = _nothing_more) -> Check:
+    """The type, a stamp, finite numbers in all fields whose annotation tells of numbers, and what `more` looks at."""
+    fields = [(each.name, _GOOD[str(each.type)]) for each in dataclasses.fields(kind) if str(each.type) in _GOOD]
+
+    def check(reading: Any) -> str | None:
+        """What is wrong with a reading."""
+        if not reading.stamp_s >= 0.0:
+            return f"a stamp of {reading.stamp_s} s"
+        bad = next((name for name, good in fields if not good(getattr(reading, name))), None)
+        return more(reading) if bad is None else f"{bad} is not finite: {getattr(reading, bad)!r:.60}"
+
+    return _of(kind, check)
 
 
-def _pose(what: str, X: RigidTransform) -> str | None:
-    return None if np.isfinite(X.GetAsMatrix34()).all() else f"{what} is not finite"
+def _finite(values: Iterable[float]) -> bool:
+    return all(map(math.isfinite, values))
 
 
-def _three(what: str, values: tuple[float, float, float]) -> str | None:
-    return _numbers(what, values) if len(values) == 3 else f"{what} has {len(values)} numbers, not 3"
-
-
-def _odometry(it: Odometry) -> str | None:
-    return _stamp(it.stamp_s) or _three("velocity", it.velocity) or _pose("X_OB", it.X_OB)
-
-
-def _imu(it: Imu) -> str | None:
-    turn, force = it.angular_velocity_B, it.linear_acceleration_B
-    return _stamp(it.stamp_s) or _three("angular velocity", turn) or _three("acceleration", force)
+_GOOD: Final[Mapping[str, Callable[[Any], bool]]] = MappingProxyType(
+    {
+        "float": math.isfinite,
+        "bool": lambda value: isinstance(value, bool | np.bool_),
+        "tuple[float, float, float]": lambda values: len(values) == 3 and _finite(values),
+        "Mapping[str, float]": lambda values: _finite(values.values()),
+        "RigidTransform": lambda X: bool(np.isfinite(X.GetAsMatrix34()).all()),
+    }
+)
+"""Whether a value is as it should be, by the annotation of its field."""
 
 
 def _scan(it: Scan) -> str | None:
     shape = (len(it.elevations_rad), len(it.azimuths_rad))
     if it.ranges_m.shape != shape:
         return f"ranges of shape {it.ranges_m.shape}, not {shape}"
-    return _stamp(it.stamp_s) or _pose("X_BL", it.X_BL) or _pose("X_OB", it.X_OB)
+    return None
 
 
 def _image(it: Image) -> str | None:
@@ -90,24 +99,11 @@ def _image(it: Image) -> str | None:
         return f"a picture of shape {it.grey.shape}, not {(lens.height, lens.width)}"
     if it.depth_m.shape not in ((depth.height, depth.width), _EMPTY):
         return f"depth of shape {it.depth_m.shape}, not {(depth.height, depth.width)}"
-    return _stamp(it.stamp_s)
-
-
-def _joints(it: Joints) -> str | None:
-    parts = {"position": it.position_rad, "velocity": it.velocity_rad_s, "effort": it.effort_nm}
-    wrong = (_numbers(f"joint {what}", values.values()) for what, values in parts.items())
-    return _stamp(it.stamp_s) or next(filter(None, wrong), None)
-
-
-def _gripper(it: Gripper) -> str | None:
-    if not isinstance(it.holding, bool | np.bool_):
-        return f"holding is {it.holding!r:.40}"
-    return _stamp(it.stamp_s) or _numbers("opening or force", (it.opening_rad, it.force_n))
+    return None
 
 
 def _battery(it: Battery) -> str | None:
-    charge = None if 0.0 <= it.charge <= 1.0 else f"a charge of {it.charge}"
-    return _stamp(it.stamp_s) or charge
+    return None if 0.0 <= it.charge <= 1.0 else f"a charge of {it.charge}"
 
 
 def _faults(it: tuple[Any, ...]) -> str | None:
@@ -123,13 +119,13 @@ _LEASE: Final = _of(Lease)
 _CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
     {
         "capabilities": _of(Capabilities),
-        "odometry": _of(Odometry, _odometry),
-        "imu": _of(Imu, _imu),
-        "scan": _or_none(_of(Scan, _scan)),
-        "image": _of(Image, _image),
-        "joints": _of(Joints, _joints),
-        "gripper": _of(Gripper, _gripper),
-        "battery": _of(Battery, _battery),
+        "odometry": _reading(Odometry),
+        "imu": _reading(Imu),
+        "scan": _or_none(_reading(Scan, _scan)),
+        "image": _reading(Image, _image),
+        "joints": _reading(Joints),
+        "gripper": _reading(Gripper),
+        "battery": _reading(Battery, _battery),
         "faults": _of(tuple, _faults),
         **dict.fromkeys(("drive", "stand", "sit", "move_arm", "set_gripper", "stop"), _COMMAND),
         "command_status": _of(CommandStatus, _status),

@@ -99,10 +99,8 @@ def hung(verb: str, limit_s: float) -> str:
 def done_aside(call: Callable[[], ResultT], verb: str, limit_s: float) -> ResultT:
     """The call's result, for callers outside the main thread: a thread does it, which is left alone when it hangs.
 
-    It may still act when it comes back; by then the run has returned the lease, under which that is refused.
-
-    Raises:
-        VerbHung: it took longer than the limit.
+    It may still act when it comes back; by then the run has returned the lease, under which that is refused. Raises
+    VerbHung: it took longer than the limit.
     """
     future: Future[ResultT] = Future()
     threading.Thread(target=_do, args=(call, future), name=f"errand-{verb}", daemon=True).start()

@@ -88,8 +88,7 @@ class _LockStepJob(Generic[ResultT]):
     def result(self) -> ResultT:
         """The result, or what the work raised; waits for work that takes longer than its latency.
 
-        Raises:
-            RuntimeError: it is not due yet.
+        Raises RuntimeError: it is not due yet.
         """
         if not self.done():
             raise RuntimeError(f"the result is due at {self.ready_s:.3f} s")

@@ -59,10 +59,8 @@ CREATE TABLE value (
 def connect(path: Path, *, create: bool) -> sqlite3.Connection:
     """Open the store, made new where `create` allows it.
 
-    A killed process loses nothing that was committed: the file is in write-ahead mode.
-
-    Raises:
-        InputError: there is none, it cannot be opened, it is damaged, or another version wrote it.
+    A killed process loses nothing that was committed: the file is in write-ahead mode. Raises InputError: there is
+    none, it cannot be opened, it is damaged, or another version wrote it.
     """
     if not create and not path.is_file():
         raise InputError("there is no store", mend="run or queue a mission first, or name one by --store", file=path)

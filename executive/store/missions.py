@@ -118,8 +118,7 @@ class MissionStore:
     def memory(self, number: int) -> Memory:
         """All that is known of how far a mission has come, once the skills are loaded that it was done with.
 
-        Raises:
-            InputError: it cannot be read.
+        Raises InputError: it cannot be read.
         """
         steps = self._rows("SELECT * FROM step WHERE mission = ?", number)
         values = self._rows("SELECT key, text FROM value WHERE mission = ?", number)
@@ -138,8 +137,7 @@ class MissionStore:
     def claimed(self) -> Iterator[None]:
         """Only one process at a time runs missions of a store; the claim ends with the process, however that ends.
 
-        Raises:
-            InputError: another process runs one.
+        Raises InputError: another process runs one.
         """
         with told(self.path), self.path.with_name(f"{self.path.name}-claim").open("a+") as file:
             try:

@@ -246,7 +246,7 @@ class _Resumed(Skill[Any]):
         result, context = self._recollection.result(self._path), self.context
         trusted = result is not None and not self._recollection.is_last(self._path)
         if not trusted and not self._recollection.awake(context.clock.now(), context.localiser.estimate().localised):
-            return Running("looks how things stand after the restart")
+            return Running("looks at the state of the world after the restart")
         if result is None:
             self._work("goes on here")
             return None

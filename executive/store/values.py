@@ -21,19 +21,14 @@ _KIND: Final = "$kind"
 
 
 def to_text(value: Any) -> str:
-    """The value as JSON text.
-
-    Raises:
-        TypeError: it, or a part of it, is of no kind that can be kept.
-    """
+    """The value as JSON text. Raises TypeError: it, or a part of it, is of no kind that can be kept."""
     return json.dumps(_packed(value), separators=(",", ":"))
 
 
 def from_text(text: str) -> Any:
     """The value that `to_text` wrote.
 
-    Raises:
-        ValueError: the text is damaged, or names a class that there is no more.
+    Raises ValueError: the text is damaged, or names a class that there is no more.
     """
     try:
         return _unpacked(json.loads(text))

@@ -31,7 +31,7 @@ _OUTCOMES = {Status.SUCCESS: "success", Status.FAILURE: "failure"}
 class SkillRun:
     """How a skill ended on the bench.
 
-    `outcome` is "success", "failure" or "cancelled"; `story` tells when (s) which message came up.
+    `outcome` is "success", "failure" or "cancelled"; `messages` tells when (s) which message came up.
     """
 
     outcome: str
@@ -40,7 +40,7 @@ class SkillRun:
     time_s: float
     ticks: int
     outputs: Mapping[str, Any]
-    story: tuple[tuple[float, str], ...]
+    messages: tuple[tuple[float, str], ...]
 
 
 class SkillBench:
@@ -112,18 +112,18 @@ class SkillBench:
         """The skill from its beginning to its end, to the time limit (s), or until it is cancelled at a time (s)."""
         leaf = self.leaf(skill, inputs, limit_s=limit_s)
         begun_s, ticks = self.clock.now(), 0
-        story: list[tuple[float, str]] = []
+        messages: list[tuple[float, str]] = []
         while leaf.status in _GOES_ON and self.clock.now() - begun_s < cancel_at_s - TICK_S / 2:
             self.tick(leaf)
             ticks += 1
-            if not story or story[-1][1] != leaf.message:
-                story.append((round(self.clock.now() - begun_s, 3), leaf.message))
+            if not messages or messages[-1][1] != leaf.message:
+                messages.append((round(self.clock.now() - begun_s, 3), leaf.message))
         outcome = _OUTCOMES.get(leaf.status, "cancelled")
         if leaf.status in _GOES_ON:
             leaf.stop(Status.INVALID)
         outputs = {port: self._context.board.get(f"{_PREFIX}/{port}") for port in skill.outputs if outcome == "success"}
         time_s = round(self.clock.now() - begun_s, 3)
-        return SkillRun(outcome, leaf.cause, leaf.message, time_s, ticks, outputs, tuple(story))
+        return SkillRun(outcome, leaf.cause, leaf.message, time_s, ticks, outputs, tuple(messages))
 
     def close(self) -> None:
         """Stop the robot and give the lease back, as the runner does at the end; defects of the robot are let pass."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from executive.mission.errors import InputError
-from executive.testing.skill_test import RobotSetup, SkillTestFile, WorldSetup, load_skill_tests
+from executive.testing.skill_test import SkillTestFile, load_skill_tests
 from executive.testing.suite import PARTS, SuiteCase
 from executive.testing.trial import BenchMakers, carry_out, scripted
 from skills.api import Skill
@@ -46,9 +47,14 @@ class SkillTestModule(pytest.File):
                 yield from self._suite(tests, index)
 
     def _suite(self, tests: SkillTestFile, index: int) -> Iterator[pytest.Item]:
-        for part in PARTS:
-            name = f"{tests.tests[index].name}: {part}"
-            yield SuiteItem.from_parent(self, name=name, tests=tests, index=index, part=part)
+        """One item for each part; they share the run in which nothing goes wrong."""
+        test, skill = tests.tests[index], self.settings.skills[tests.skill]
+        make = partial(scripted, self.settings.capabilities, test.robot or tests.robot, test.world or tests.world)
+        case = SuiteCase(skill, tests.inputs(index, skill), make)
+        for name, part in PARTS.items():
+            yield SuiteItem.from_parent(
+                self, name=f"{test.name}: {name}", tests=tests, index=index, findings=partial(part, case)
+            )
 
 
 class _Item(pytest.Item):
@@ -94,17 +100,12 @@ class SkillTestItem(_Item):
 class SuiteItem(_Item):
     """One part of the suite for every skill, with a test's ports, robot and world; the robot is a scripted one."""
 
-    def __init__(self, *, part: str, **options: Any) -> None:
+    def __init__(self, *, findings: Callable[[], Iterable[str]], **options: Any) -> None:
         super().__init__(**options)
-        self.part = part
+        self.findings = findings
 
     def runtest(self) -> None:
         """Run that part. Raises SkillTestError."""
-        test = self.tests.tests[self.index]
-        robot: RobotSetup = test.robot or self.tests.robot
-        world: WorldSetup = test.world or self.tests.world
-        inputs = self.tests.inputs(self.index, self.skill)
-        case = SuiteCase(self.skill, inputs, lambda: scripted(self.settings.capabilities, robot, world))
-        found = list(PARTS[self.part](case))
+        found = list(self.findings())
         if found:
             raise SkillTestError("\n".join(found))

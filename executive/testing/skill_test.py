@@ -50,9 +50,9 @@ class RobotSetup(_Strict):
     arm: tuple[float, ...] | None = Field(
         default=None, description="arm angles, rad; stowed unless said (scripted only)"
     )
-    holding: bool = Field(default=False, description="it begins with a can in its jaw (scripted only)")
-    in_jaw: float | None = Field(
-        default=None, description="opening (rad) at which a closing jaw holds something (scripted only)"
+    holding: bool = Field(default=False, description="it begins with a can in its gripper (scripted only)")
+    in_gripper: float | None = Field(
+        default=None, description="opening (rad) at which a closing gripper holds something (scripted only)"
     )
     docked: bool = Field(default=False, description="it stands on a dock and charges (scripted only)")
     charge: float = Field(default=0.9, ge=0.0, le=1.0, description="battery, 0 to 1 (scripted only)")
@@ -172,8 +172,7 @@ def load_skill_tests(
 ) -> SkillTestFile:
     """Read a file of skill tests and check it against the registered skills.
 
-    Raises:
-        InputError: with file, line and mend: broken YAML, unknown keys, no such skill, port or fault, wrong values.
+    Raises InputError: with file, line and mend: broken YAML, unknown keys, no such skill, port or fault, wrong values.
     """
     source = read_yaml(path)
     file = validate(SkillTestFile, source)

@@ -24,7 +24,7 @@ _RESOLUTION_M = 0.025
 
 
 def write_small_room(folder: Path, *, can: bool = True) -> Path:
-    """Write the world into `folder`; that folder. Its only thing is a can on the table, whose place the seed sets."""
+    """Write the world into `folder`; that folder. Its only object is a can on the table, whose place the seed sets."""
     (folder / "map").mkdir(parents=True, exist_ok=True)
     (folder / "room.sdf").write_text(_sdf([_FLOOR, *ROOM]), encoding="utf-8")
     _write_yaml(folder / "world.dmd.yaml", _directives(folder / "room.sdf"))

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 from py_trees.common import Status
@@ -41,6 +42,12 @@ class SuiteCase:
     bench: Callable[[], tuple[SkillBench, ScriptedRobot]]
     samples: int = 8
 
+    @property
+    def limit_s(self) -> float:
+        """How long a run in which something goes wrong is followed: half as long again as one that goes well."""
+        return 1.5 * self.nominal[0].time_s + 5.0
+
+    @cached_property
     def nominal(self) -> tuple[SkillRun, Counter[str]]:
         """The run in which nothing goes wrong, and how often the skill calls each verb in it."""
         bench, _ = self.bench()
@@ -83,7 +90,7 @@ def findings(case: SuiteCase) -> Iterator[str]:
 
 def cancelled_at_every_tick(case: SuiteCase) -> Iterator[str]:
     """Cancel it at sampled ticks: cause CANCELLED, the robot still within 0.2 s, `end` a second time does nothing."""
-    run, _ = case.nominal()
+    run, _ = case.nominal
     if run.outcome != "success":
         yield f"the case does not succeed when nothing goes wrong: {run.cause} {run.message}"
         return
@@ -116,13 +123,13 @@ def _cancelled(case: SuiteCase, tick: int) -> Iterator[str]:
 
 def exception_in_every_verb(case: SuiteCase) -> Iterator[str]:
     """Let each verb that it uses raise, at its first call and halfway: FAILURE with cause ERROR, robot still."""
-    run, called = case.nominal()
+    _, called = case.nominal
     for verb in (verb for verb in VERBS if called[verb] and verb not in _OWN_VERBS):
         for calls in sorted({0, called[verb] // 2}):
-            yield from (f"{verb} raises after {calls} calls: {what}" for what in _raising(case, verb, calls, run))
+            yield from (f"{verb} raises after {calls} calls: {what}" for what in _raising(case, verb, calls))
 
 
-def _raising(case: SuiteCase, verb: str, calls: int, nominal: SkillRun) -> Iterator[str]:
+def _raising(case: SuiteCase, verb: str, calls: int) -> Iterator[str]:
     bench, robot = case.bench()
     met: list[str] = []
 
@@ -137,7 +144,7 @@ def _raising(case: SuiteCase, verb: str, calls: int, nominal: SkillRun) -> Itera
         raise InjectedFault(f"{call.verb} does not answer")
 
     bench.add_faults(Fault(f"{verb} raises", Effect(frozenset((verb,)), act)))
-    run = bench.run(case.skill, case.inputs, limit_s=3.0 * nominal.time_s + 10.0)
+    run = bench.run(case.skill, case.inputs, limit_s=case.limit_s)
     if met and (run.outcome, run.cause) != ("failure", Cause.ERROR):
         yield f"it ends with {run.outcome} {run.cause}: {run.message}"
     bench.close()
@@ -148,7 +155,7 @@ def _raising(case: SuiteCase, verb: str, calls: int, nominal: SkillRun) -> Itera
 
 def stale_sensors(case: SuiteCase) -> Iterator[str]:
     """Freeze all sensors at sampled ticks: it must not succeed on data that is older than it declares."""
-    run, called = case.nominal()
+    run, called = case.nominal
     sensed = [verb for verb in SENSE_VERBS if called[verb]]
     declared = case.skill.max_data_age_s
     if sensed and not declared:
@@ -158,7 +165,7 @@ def stale_sensors(case: SuiteCase) -> Iterator[str]:
         frozen_s = tick * run.time_s / run.ticks
         bench, _ = case.bench()
         bench.inject(f"sensors freezes at {frozen_s:.3f} s")
-        ended = bench.run(case.skill, case.inputs, limit_s=3.0 * run.time_s + 10.0)
+        ended = bench.run(case.skill, case.inputs, limit_s=case.limit_s)
         age_s = ended.time_s - frozen_s
         if ended.outcome == "success" and age_s > min(declared.values(), default=age_s) + 0.1:
             yield f"sensors frozen at {frozen_s:.2f} s, and it claims success {age_s:.2f} s later: {ended.message}"

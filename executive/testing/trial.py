@@ -40,7 +40,7 @@ class Trial:
         lines.append(f"it ended with {_end(run.outcome, run.cause)} after {run.time_s:g} s: {run.message}")
         lines += [f"fault: {words}" for words in self.test.faults]
         lines += ["what it said on the way:"]
-        lines += [f"  {at_s:7.2f} s  {message}" for at_s, message in run.story[-_LAST_MESSAGES:]]
+        lines += [f"  {at_s:7.2f} s  {message}" for at_s, message in run.messages[-_LAST_MESSAGES:]]
         return "\n".join(lines)
 
 
@@ -58,7 +58,7 @@ def scripted(capabilities: Capabilities, setup: RobotSetup, world: WorldSetup) -
     """A bench with a scripted robot, and that robot."""
     clock, blocks = VirtualClock(), blocks_of(world)
     pose = Pose2D(setup.pose.x, setup.pose.y, setup.pose.yaw)
-    start = Start(pose, setup.arm, setup.in_jaw, setup.holding, setup.charge, setup.docked)
+    start = Start(pose, setup.arm, setup.in_gripper, setup.holding, setup.charge, setup.docked)
     robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
     place = KnownPlace(pose)
     place.localised = not setup.lost

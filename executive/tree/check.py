@@ -9,22 +9,22 @@ from executive.mission.command import Task
 from executive.mission.errors import InputError, listing
 from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree, StepPart
-from executive.tree.estimate import Estimate, Estimates, Itinerary, Way, estimate_tree
+from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
 from skills.api import Costmap, PlanningError
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import path_length
 from skills.navigate.planner import plan_path
 from skills.robot import Pose2D
 
-__all__ = ["Abilities", "Checked", "PlannedWays", "check_tree"]
+__all__ = ["Abilities", "Checked", "PlannedRoutes", "check_tree"]
 
 
 @dataclass(frozen=True)
 class Abilities:
-    """What is known of robot and things: masses (kg) of the classes that can be handled, and what the arm lifts (kg).
+    """What is known of robot and objects: masses (kg) of the classes that can be handled, and what the arm lifts (kg).
 
-    A class that is not in `masses_kg` has no model: there is no such thing in any world. `classes` and `attributes` are
-    those that the robot knows by sight; one that it does not know spoils a search for several.
+    A class that is not in `masses_kg` has no model: no world has such an object. `classes` and `attributes` are those
+    that the robot knows by sight; one that it does not know spoils a search for several.
     """
 
     masses_kg: Mapping[str, float]
@@ -41,28 +41,28 @@ class Checked:
     estimate: Estimate
 
 
-class PlannedWays(Itinerary):
-    """Ways by the planner of `navigate` on the surveyed map; each is planned once."""
+class PlannedRoutes(RoutePlanner):
+    """Routes by the planner of `navigate` on the surveyed map; each is planned once."""
 
     def __init__(self, costmap: Costmap, footprint: Footprint) -> None:
         self._costmap, self._footprint = costmap, footprint
-        self._ways: dict[tuple[Pose2D, Pose2D], Way | PlanningError] = {}
+        self._routes: dict[tuple[Pose2D, Pose2D], Route | PlanningError] = {}
 
-    def way(self, start: Pose2D, goal: Pose2D) -> Way:
-        """The way from start to goal. Raises ValueError with one sentence when there is none."""
-        if (start, goal) not in self._ways:
-            self._ways[start, goal] = self._planned(start, goal)
-        way = self._ways[start, goal]
-        if isinstance(way, PlanningError):
-            raise ValueError(str(way)) from way
-        return way
+    def route(self, start: Pose2D, goal: Pose2D) -> Route:
+        """The route from start to goal. Raises ValueError with one sentence when there is none."""
+        if (start, goal) not in self._routes:
+            self._routes[start, goal] = self._planned(start, goal)
+        route = self._routes[start, goal]
+        if isinstance(route, PlanningError):
+            raise ValueError(str(route)) from route
+        return route
 
-    def _planned(self, start: Pose2D, goal: Pose2D) -> Way | PlanningError:
+    def _planned(self, start: Pose2D, goal: Pose2D) -> Route | PlanningError:
         try:
             path = plan_path(self._costmap, self._footprint, start, goal)
         except PlanningError as error:
             return error
-        return Way(path_length(path), float(path.progress_m()[-1]))
+        return Route(path_length(path), float(path.progress_m()[-1]))
 
 
 def check_tree(
@@ -71,17 +71,17 @@ def check_tree(
     knowledge: Knowledge,
     start: Pose2D,
     abilities: Abilities,
-    itinerary: Itinerary,
+    planner: RoutePlanner,
     estimates: Estimates,
 ) -> Checked:
-    """Check a compiled mission that begins at `start`: are its things there and light enough, its places in reach?"""
+    """Check a compiled mission that begins at `start`: are its objects there and light enough, its places in reach?"""
     impossible = tuple(error for part in tree.parts for error in _impossible(part, tree, knowledge, abilities))
-    estimate, unreachable = estimate_tree(tree.root, start=start, itinerary=itinerary, estimates=estimates)
+    estimate, unreachable = estimate_tree(tree.root, start=start, planner=planner, estimates=estimates)
     return Checked((*impossible, *unreachable), estimate)
 
 
 def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[InputError]:
-    """What makes a command impossible: its thing is not known by sight, or nothing that it means can be lifted."""
+    """What makes a command impossible: its object is not known by sight, or nothing that it means can be lifted."""
     command = part.command
     if command is None or command.task not in (Task.GRASP, Task.FIND) or command.object is None:
         return

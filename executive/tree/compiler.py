@@ -63,12 +63,11 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
 
     Args:
         mission: what to do; its robot and name become the first parts of the path ids.
-        knowledge: the world's places, surfaces, things and people.
+        knowledge: the world's places, surfaces, objects and people.
         registry: the skills by name.
 
-    Raises:
-        InputError: no steps, an unknown place, thing or skill, ports wired wrongly, or a command that cannot be
-            carried out; with the file and line where known, and all that was found in `others`.
+    Raises InputError: no steps, an unknown place, object or skill, ports wired wrongly, or a command that cannot be
+    carried out; with the file and line where known, and all that was found in `others`.
     """
     if not mission.steps:
         raise InputError(f"the mission '{mission.name}' has no commands", mend="add at least one step")

@@ -1,4 +1,4 @@
-"""What a mission will take when all goes well: time, way and charge, and what of it cannot be done at all.
+"""What a mission will take when all goes well: time, route and charge, and what of it cannot be done at all.
 
 A tree's nodes are followed in the order in which they run without failures: of several ways the first that can be gone.
 """
@@ -20,7 +20,7 @@ from executive.tree.behaviours.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
 from skills.robot import Pose2D
 
-__all__ = ["Estimate", "Estimates", "Itinerary", "Way", "estimate_tree", "expected", "load_estimates"]
+__all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "expected", "load_estimates"]
 
 Positive = Annotated[float, Field(gt=0.0)]
 NAVIGATE: Final = "navigate"
@@ -54,18 +54,18 @@ class Estimates(_Data):
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way between two poses: its length (m), and its progress (m), in which turns count as well."""
+class Route:
+    """A route between two poses: its length (m), and its progress (m), in which turns count as well."""
 
     length_m: float
     progress_m: float
 
 
-class Itinerary(Protocol):
-    """Plans ways on the surveyed map."""
+class RoutePlanner(Protocol):
+    """Plans routes on the surveyed map."""
 
-    def way(self, start: Pose2D, goal: Pose2D) -> Way:
-        """The way from start to goal. Raises ValueError with one sentence when there is none."""
+    def route(self, start: Pose2D, goal: Pose2D) -> Route:
+        """The route from start to goal. Raises ValueError with one sentence when there is none."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class _CannotError(Exception):
 class _Walk:
     """Where the robot would be by now, and which poses it would have noted."""
 
-    itinerary: Itinerary
+    planner: RoutePlanner
     estimates: Estimates
     pose: Pose2D
     noted: dict[str, Pose2D] = field(default_factory=dict)
@@ -103,10 +103,10 @@ class _Walk:
 
 
 def estimate_tree(
-    root: NodeSpec, *, start: Pose2D, itinerary: Itinerary, estimates: Estimates
+    root: NodeSpec, *, start: Pose2D, planner: RoutePlanner, estimates: Estimates
 ) -> tuple[Estimate, tuple[InputError, ...]]:
     """What a tree will take from `start` on, and the places in it that cannot be reached, with their lines."""
-    walk = _Walk(itinerary, estimates, start)
+    walk = _Walk(planner, estimates, start)
     return _followed(root, walk, first=False), tuple(walk.errors)
 
 
@@ -188,14 +188,14 @@ def _skill(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
         duration_s = walk.estimates.skills.get(node.name, walk.estimates.other_skill_s)
         return Estimate(duration_s, 0.0, duration_s * walk.estimates.battery.standing_per_s)
     try:
-        way = walk.itinerary.way(walk.pose, goal)
+        route = walk.planner.route(walk.pose, goal)
     except ValueError as error:
         mend = "name another place or pose, or mend the world's map"
         raise _CannotError(InputError.at(node.source, str(error).rstrip("."), mend=mend)) from error
     walk.pose = goal
     drive = walk.estimates.drive
-    duration_s = drive.overhead_s + drive.per_metre_s * way.progress_m
-    return Estimate(duration_s, way.length_m, duration_s * walk.estimates.battery.driving_per_s)
+    duration_s = drive.overhead_s + drive.per_metre_s * route.progress_m
+    return Estimate(duration_s, route.length_m, duration_s * walk.estimates.battery.driving_per_s)
 
 
 def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:

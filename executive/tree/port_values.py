@@ -43,10 +43,8 @@ def gathered(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, A
     """The value for each input port of the dataclass `inputs`, with its path in `values`.
 
     A unit may be left out of a port's name. What names no port, but fields of the one port that is a dataclass with
-    such fields, goes there: `{x: 1, y: 2, yaw: 0}` is the `goal` of navigate.
-
-    Raises:
-        PortValueError: a key names neither a port nor such a field.
+    such fields, goes there: `{x: 1, y: 2, yaw: 0}` is the `goal` of navigate. Raises PortValueError: a key names
+    neither a port nor such a field.
     """
     hints = field_types(inputs)
     found: dict[str, tuple[Path, Any]] = {}
@@ -225,8 +223,8 @@ def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...
 
 
 def _thing(value: Any, knowledge: Knowledge, path: Path) -> Thing:
-    """A thing in words, by its own name."""
-    said = thing(_name(value, "a thing in words", path))
+    """An object in words, by its own name."""
+    said = thing(_name(value, "an object in words", path))
     known = knowledge.thing(said.name)
     if known is None:
         raise _unknown("thing", said.name, knowledge.thing_names(), knowledge, path)

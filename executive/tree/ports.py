@@ -51,7 +51,7 @@ def _default(field: dataclasses.Field[Any]) -> str:
 
 
 def plain(value: Any) -> str:
-    """A value in few words: numbers short, enum members by name, things and surfaces by their own text or name."""
+    """A value in few words: numbers short, enum members by name, objects and surfaces by their own text or name."""
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, enum.Enum):
@@ -68,7 +68,7 @@ def plain(value: Any) -> str:
 
 
 def _record(value: Any) -> str:
-    fields = [field.name for field in dataclasses.fields(value)]
+    fields = [field.name for field in dataclasses.fields(value) if field.repr]
     if any("__str__" in vars(kind) for kind in type(value).__mro__[:-1]):
         return str(value)
     if "name" in fields:

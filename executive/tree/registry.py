@@ -27,9 +27,8 @@ SkillClass = type[Skill[Any]]
 def installed_skills() -> dict[str, SkillClass]:
     """All registered skills by name, ours and others', in the order of their names.
 
-    Raises:
-        InputError: a registered skill cannot be loaded, does not keep the rules for skills, or has the name of
-            another; the message names the distribution that registers it. Or none of ours are registered.
+    Raises InputError: a registered skill cannot be loaded, does not keep the rules for skills, or has the name of
+    another; the message names the distribution that registers it. Or none of ours are registered.
     """
     found = tuple(entry_points(group=GROUP))
     if not any(_distribution(entry) == DISTRIBUTION for entry in found):

@@ -16,7 +16,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from executive.tree.node_view import NodeView
 from executive.tree.ports import Port
-from executive.view.looks import look_of
+from executive.view.styles import style_of
 from executive.view.text import note_of, printable
 
 FORMAT: Final = "4"
@@ -64,10 +64,10 @@ def _parts(root: NodeView) -> list[tuple[NodeView, str]]:
     return parts
 
 
-def _free(wish: str, taken: Collection[str]) -> str:
-    """The wish, with a number where that name is taken."""
-    names = (wish if number == 1 else f"{wish}{number}" for number in range(1, len(taken) + 2))
-    return next(name for name in names if name not in taken)
+def _free(name: str, taken: Collection[str]) -> str:
+    """The name, with a number where it is taken."""
+    names = (name if number == 1 else f"{name}{number}" for number in range(1, len(taken) + 2))
+    return next(free for free in names if free not in taken)
 
 
 def _tree(document: Element, tree_id: str, node: NodeView, steps: Mapping[int, str]) -> None:
@@ -131,7 +131,7 @@ def _value(port: Port) -> str:
 
 def _description(node: NodeView) -> str:
     place = "" if node.source is None else f"{node.source.file}:{node.source.line}"
-    state = ": ".join(filter(None, (look_of(node.state).word, note_of(node))))
+    state = ": ".join(filter(None, (style_of(node.state).word, note_of(node))))
     folded = f"{node.hidden} nodes below are left out" if node.hidden else ""
     return printable(" | ".join(filter(None, (state, node.path_id, place, folded))))
 

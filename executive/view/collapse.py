@@ -17,8 +17,7 @@ DRAWN_NODES = 40
 def folded_below(root: NodeView, depth: int) -> NodeView:
     """The tree down to `depth` levels below the root; what lies deeper is counted in `hidden`.
 
-    Raises:
-        ValueError: a negative depth.
+    Raises ValueError: a negative depth.
     """
     if depth < 0:
         raise ValueError(f"a depth is at least 0, not {depth}")

@@ -1,4 +1,4 @@
-"""What the page is told: every logged message in order, and the newest word on things that are not logged."""
+"""What the page is told: every logged message in order, and the newest word on what is not logged."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from executive.tree.node_view import NodeView
-from executive.view.looks import Look, Looks, look_of
+from executive.view.styles import NodeStyle, Styles, style_of
 from executive.view.text import note_of, printable
 
 _SAFE: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 .,:()-_/+'")
@@ -21,7 +21,7 @@ def _nodes(root: NodeView) -> Iterator[str]:
     numbers = {id(node): number for number, (_, node) in enumerate(root.walk())}
     for _, node in root.walk():
         number = numbers[id(node)]
-        yield f'  n{number}["{_label(node)}"]:::{_class(look_of(node.state))}'
+        yield f'  n{number}["{_label(node)}"]:::{_class(style_of(node.state))}'
         for child in node.children:
             yield f"  n{number} --> n{numbers[id(child)]}"
 
@@ -29,7 +29,7 @@ def _nodes(root: NodeView) -> Iterator[str]:
 def _label(node: NodeView) -> str:
     title = node.name if node.kind == "skill" else f"{node.kind} {node.name}"
     folded = f"({node.hidden} nodes below)" if node.hidden else ""
-    rows = filter(None, (f"{look_of(node.state).symbol} {title}", note_of(node), folded))
+    rows = filter(None, (f"{style_of(node.state).symbol} {title}", note_of(node), folded))
     return "<br/>".join(map(escaped, rows))
 
 
@@ -39,13 +39,13 @@ def escaped(text: str) -> str:
 
 
 def _classes() -> Iterator[str]:
-    for member in Looks:
-        look: Look = member.value
-        dashes = f",stroke-dasharray:{look.dashes}" if look.dashes else ""
-        width = 3 if member is Looks.FAILURE else 2
-        colours = f"fill:{look.fill},stroke:{look.line},color:{look.ink}"
-        yield f"  classDef {_class(look)} {colours},stroke-width:{width}px{dashes}"
+    for member in Styles:
+        style: NodeStyle = member.value
+        dashes = f",stroke-dasharray:{style.dashes}" if style.dashes else ""
+        width = 3 if member is Styles.FAILURE else 2
+        colours = f"fill:{style.fill},stroke:{style.line},color:{style.ink}"
+        yield f"  classDef {_class(style)} {colours},stroke-width:{width}px{dashes}"
 
 
-def _class(look: Look) -> str:
-    return look.word.replace(" ", "")
+def _class(style: NodeStyle) -> str:
+    return style.word.replace(" ", "")

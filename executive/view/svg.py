@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from executive.tree.node_view import NodeView
-from executive.view.looks import Look, Looks, look_of
+from executive.view.styles import NodeStyle, Styles, style_of
 from executive.view.text import note_of, printable
 
 BOX_W: Final = 232
@@ -103,17 +103,17 @@ def _edges(box: _Box) -> Iterator[str]:
 
 
 def _drawn(box: _Box) -> str:
-    node, look = box.node, look_of(box.node.state)
-    tooltip = "\n".join(map(printable, filter(None, (node.path_id, look.word, note_of(node)))))
+    node, style = box.node, style_of(box.node.state)
+    tooltip = "\n".join(map(printable, filter(None, (node.path_id, style.word, note_of(node)))))
     name = textwrap.shorten(printable(node.name), NAME_CHARS, placeholder="…")
     rows = "".join(
-        f'<text x="12" y="{BOX_H + 8 + n * NOTE_LINE_H}" font-size="10.5" fill="{look.ink}">{escape(row)}</text>'
+        f'<text x="12" y="{BOX_H + 8 + n * NOTE_LINE_H}" font-size="10.5" fill="{style.ink}">{escape(row)}</text>'
         for n, row in enumerate(box.note)
     )
     below = f"+ {node.hidden} nodes" if node.hidden else ""
     return (
         f'<g transform="translate({box.x:g},{box.y:g})" data-id="{_safe(node.path_id)}">'
-        f"<title>{escape(tooltip)}</title>{_frame(look, box.height)}{_symbol(look, 20, 20)}"
+        f"<title>{escape(tooltip)}</title>{_frame(style, box.height)}{_symbol(style, 20, 20)}"
         f'<text x="38" y="15" font-size="9" letter-spacing="0.8" fill="#57606a">{_safe(node.kind.upper())}</text>'
         f'<text x="38" y="31" font-size="12.5" fill="#1f2328">{escape(name)}</text>'
         f'<text x="{BOX_W - 10}" y="15" font-size="9" text-anchor="end" fill="#57606a">{below}</text>{rows}</g>'
@@ -124,26 +124,26 @@ def _safe(text: str) -> str:
     return escape(printable(text))
 
 
-def _frame(look: Look, height: float) -> str:
-    dash = f' stroke-dasharray="{look.dashes}"' if look.dashes else ""
-    thickness = 2.4 if look.word == "failure" else 1.4
+def _frame(style: NodeStyle, height: float) -> str:
+    dash = f' stroke-dasharray="{style.dashes}"' if style.dashes else ""
+    thickness = 2.4 if style.word == "failure" else 1.4
     return (
-        f'<rect width="{BOX_W}" height="{height:g}" rx="6" fill="{look.fill}" stroke="{look.line}" '
+        f'<rect width="{BOX_W}" height="{height:g}" rx="6" fill="{style.fill}" stroke="{style.line}" '
         f'stroke-width="{thickness}"{dash}/>'
     )
 
 
-def _symbol(look: Look, x: float, y: float) -> str:
+def _symbol(style: NodeStyle, x: float, y: float) -> str:
     return (
-        f'<g transform="translate({x:g},{y:g})" stroke="{look.ink}" color="{look.ink}" stroke-width="1.8" '
-        f'stroke-linecap="round" stroke-linejoin="round">{SYMBOLS[look.word]}</g>'
+        f'<g transform="translate({x:g},{y:g})" stroke="{style.ink}" color="{style.ink}" stroke-width="1.8" '
+        f'stroke-linecap="round" stroke-linejoin="round">{SYMBOLS[style.word]}</g>'
     )
 
 
 def _legend(y: float) -> str:
-    entries = [look.value for look in Looks]
+    entries = [style.value for style in Styles]
     return "".join(
-        f'{_symbol(look, MARGIN + 8 + n * 105, y - 4)}<text x="{MARGIN + 22 + n * 105}" y="{y:g}" font-size="11" '
-        f'fill="#57606a">{look.word}</text>'
-        for n, look in enumerate(entries)
+        f'{_symbol(style, MARGIN + 8 + n * 105, y - 4)}<text x="{MARGIN + 22 + n * 105}" y="{y:g}" font-size="11" '
+        f'fill="#57606a">{style.word}</text>'
+        for n, style in enumerate(entries)
     )

@@ -9,15 +9,15 @@ from py_trees.common import Status
 from rich.text import Text
 
 from executive.tree.node_view import NodeView
-from executive.view.looks import Look, look_of
+from executive.view.styles import NodeStyle, style_of
 
 
 @dataclass(frozen=True)
 class Line:
-    """One node as a line: the branches before it, its look, what it is, and a note on its state."""
+    """One node as a line: the branches before it, its style, what it is, and a note on its state."""
 
     branches: str
-    look: Look
+    style: NodeStyle
     kind: str
     name: str
     note: str
@@ -26,7 +26,7 @@ class Line:
 def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
     """The tree as plain lines."""
     text = "\n".join(
-        f"{line.branches}{line.look.ascii if ascii_only else line.look.symbol} {_label(line)}{_dashed(line.note)}"
+        f"{line.branches}{line.style.ascii if ascii_only else line.style.symbol} {_label(line)}{_dashed(line.note)}"
         for line in lines(root, ascii_only=ascii_only)
     )
     return text.encode("ascii", "replace").decode() if ascii_only else text
@@ -38,8 +38,8 @@ def to_rich(root: NodeView, *, collapsed: bool = True) -> Text:
     for n, line in enumerate(lines(root, collapsed=collapsed)):
         text.append("\n" if n else "")
         text.append(line.branches, style="dim")
-        text.append(f"{line.look.symbol} ", style=line.look.style)
-        text.append(_label(line), style=line.look.style)
+        text.append(f"{line.style.symbol} ", style=line.style.rich)
+        text.append(_label(line), style=line.style.rich)
         text.append(_dashed(line.note), style="italic")
     return text
 
@@ -57,7 +57,7 @@ def _lines(node: NodeView, own: str, below: str, pieces: tuple[str, str, str, st
     unseen = node.below if hidden else node.hidden
     if unseen:
         note = " ".join(filter(None, (note, f"({unseen} nodes)")))
-    yield Line(own, look_of(node.state), node.kind, node.name, note)
+    yield Line(own, style_of(node.state), node.kind, node.name, note)
     for child in () if hidden else node.children:
         last = child is node.children[-1]
         yield from _lines(

@@ -1,7 +1,7 @@
-"""The referee: the only one that is told the truth. It watches the plant and judges promises after the fact."""
+"""The referee: the only one that is told the truth. It watches the plant and judges the goal conditions afterwards."""
 
-from plant.referee.cast import Placed
-from plant.referee.promise import Promise, PromiseKind, Region, Verdict
+from plant.referee.entities import Placed
+from plant.referee.goal import GoalCondition, GoalKind, Region, Verdict
 from plant.referee.referee import Referee
 
-__all__ = ["Placed", "Promise", "PromiseKind", "Referee", "Region", "Verdict"]
+__all__ = ["GoalCondition", "GoalKind", "Placed", "Referee", "Region", "Verdict"]

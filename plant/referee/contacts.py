@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pydrake.geometry import GeometryId, PenetrationAsPointPair
 
-from plant.referee.cast import ROBOT_KINDS, Actor, Kind
+from plant.referee.entities import ROBOT_KINDS, Entity, Kind
 from plant.snapshot.values import State
 
 Pair = tuple[int, int]
@@ -16,12 +16,12 @@ FLOOR_Z_M = 0.04
 
 
 def touching(
-    penetrations: Sequence[PenetrationAsPointPair], actor_of_geometry: Mapping[GeometryId, int]
+    penetrations: Sequence[PenetrationAsPointPair], entity_of_geometry: Mapping[GeometryId, int]
 ) -> dict[Pair, float]:
-    """Pairs of actors' numbers (lower first) in contact, and the height of their lowest contact point (m)."""
+    """Pairs of entities' numbers (lower first) in contact, and the height of their lowest contact point (m)."""
     lowest: dict[Pair, float] = {}
     for each in penetrations:
-        a, b = actor_of_geometry[each.id_A], actor_of_geometry[each.id_B]
+        a, b = entity_of_geometry[each.id_A], entity_of_geometry[each.id_B]
         _lower(lowest, a, b, float(each.p_WCa[2] + each.p_WCb[2]) / 2.0)
     return lowest
 
@@ -44,12 +44,12 @@ class Collision:
 class CollisionCounter:
     """Counts rising edges of contact between robots and scenery, persons or other robots.
 
-    A pair that parts for less than `debounce_s` is still the same bump. What touches at the first look does not count.
+    A pair that parts for less than `debounce_s` is still the same bump. What touches at first does not count.
     """
 
-    def __init__(self, actors: Mapping[int, Actor], debounce_s: float = 0.5) -> None:
+    def __init__(self, entities: Mapping[int, Entity], debounce_s: float = 0.5) -> None:
         """Start with a clean record."""
-        self._actors, self._debounce_s = actors, debounce_s
+        self._entities, self._debounce_s = entities, debounce_s
         self._last_touched_s: dict[Pair, float] | None = None
         self.collisions: list[Collision] = []
 
@@ -77,15 +77,15 @@ class CollisionCounter:
 
     def _is_bump(self, pair: Pair, z: float) -> bool:
         """Whether a touch is a collision: not feet on the floor, not loose objects, not a robot with itself."""
-        kinds = {self._actors[index].kind for index in pair}
+        kinds = {self._entities[index].kind for index in pair}
         if Kind.OBJECT in kinds or not kinds & ROBOT_KINDS:
             return False
-        if self._actors[pair[0]].owner == self._actors[pair[1]].owner:
+        if self._entities[pair[0]].owner == self._entities[pair[1]].owner:
             return False
         return not (kinds == {Kind.LEG, Kind.SCENERY} and z < FLOOR_Z_M)
 
     def _collision(self, time_s: float, pair: Pair) -> Collision:
-        first, second = self._actors[pair[0]], self._actors[pair[1]]
+        first, second = self._entities[pair[0]], self._entities[pair[1]]
         robot, other = (first, second) if first.kind in ROBOT_KINDS else (second, first)
         sentence = f"{robot.label} hit {other.label} at {time_s:.2f} s."
         return Collision(time_s, robot.owner, robot.kind, sentence)

@@ -12,11 +12,11 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
-from plant.referee.cast import Cast, Kind, LinkNames, Placed
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
+from plant.referee.entities import Entities, Kind, LinkNames, Placed
+from plant.referee.goal import GoalCondition, Verdict
 from plant.referee.judge import Truth, judge, offered
-from plant.referee.promise import Promise, Verdict
-from plant.referee.story import Lift, Look, ObjectStory
+from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
 from plant.snapshot.values import State, array_of
 from skills.robot import FloatArray
 
@@ -42,9 +42,9 @@ class Referee:
         robots. Raises ValueError that names what the plant does not have.
         """
         self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
-        self._cast = Cast.of(plant, placements, robots, persons, links or LinkNames(), scenery)
-        self._counter = CollisionCounter(self._cast.actors)
-        self._stories = {name: ObjectStory(name, self._cast.classes[name]) for name in self._cast.objects}
+        self._entities = Entities.of(plant, placements, robots, persons, links or LinkNames(), scenery)
+        self._counter = CollisionCounter(self._entities.all)
+        self._histories = {name: ObjectHistory(name, self._entities.classes[name]) for name in self._entities.objects}
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
         self._offers: dict[tuple[str, str], float] = {}
         self.contact_points = 0
@@ -59,17 +59,17 @@ class Referee:
     @property
     def drops(self) -> int:
         """Objects dropped so far."""
-        return sum(story.drops for story in self._stories.values())
+        return sum(history.drops for history in self._histories.values())
 
     @property
     def events(self) -> tuple[str, ...]:
         """What happened, one sentence each: bumps, lifts, drops."""
-        told = [event for story in self._stories.values() for event in story.events]
+        told = [event for history in self._histories.values() for event in history.events]
         return (*told, *(collision.sentence for collision in self._counter.collisions))
 
     def lifts(self, robot: str) -> tuple[Lift, ...]:
         """All that a robot has lifted off its place so far, in the order of time."""
-        all_lifts = (lift for story in self._stories.values() for lift in story.lifts if lift.robot == robot)
+        all_lifts = (lift for history in self._histories.values() for lift in history.lifts if lift.robot == robot)
         return tuple(sorted(all_lifts, key=lambda lift: lift.time_s))
 
     def path(self, robot: str) -> FloatArray:
@@ -77,42 +77,42 @@ class Referee:
         return np.array(self._paths[robot], dtype=np.float64).reshape(-1, 3)
 
     def observe(self, plant_context: Context, time_s: float, *, asleep: Collection[str] = ()) -> None:
-        """Look at the plant's state at time_s; objects that are `asleep` are as they were at the last look."""
+        """Take in the plant's state at time_s; objects that are `asleep` are as they were before."""
         penetrations = self._geometry.Eval(plant_context).ComputePointPairPenetration()
         self.contact_points += len(penetrations)
-        pairs = touching(penetrations, self._cast.actor_of_geometry)
+        pairs = touching(penetrations, self._entities.of_geometry)
         self._counter.update(time_s, pairs)
-        self._bases = {name: self._position(plant_context, body) for name, body in self._cast.bases.items()}
-        self._persons = {name: self._position(plant_context, body) for name, body in self._cast.persons.items()}
+        self._bases = {name: self._position(plant_context, body) for name, body in self._entities.bases.items()}
+        self._persons = {name: self._position(plant_context, body) for name, body in self._entities.persons.items()}
         for name, p_WB in self._bases.items():
             _extend(self._paths[name], p_WB)
         neighbours = self._neighbours(pairs)
-        for name, body in self._cast.objects.items():
-            story, touches = self._stories[name], neighbours.get(int(body.index()), {})
+        for name, body in self._entities.objects.items():
+            history, touches = self._histories[name], neighbours.get(int(body.index()), {})
             if name in asleep:
-                story.take(replace(story.last, time_s=time_s))
+                history.take(replace(history.last, time_s=time_s))
             else:
-                story.take(self._look(plant_context, time_s, self._position(plant_context, body), touches))
+                history.take(self._sample(plant_context, time_s, self._position(plant_context, body), touches))
         self._note_offers(time_s)
 
-    def judge(self, promises: Sequence[Promise]) -> Verdict:
-        """Whether all promises hold as things stand. Raises ValueError before the first look."""
+    def judge(self, conditions: Sequence[GoalCondition]) -> Verdict:
+        """Whether all conditions hold now. Raises ValueError before the first sample."""
         if not self._bases:
             raise ValueError("the referee has not observed anything yet")
         truth = Truth(
-            stories=tuple(self._stories.values()),
+            histories=tuple(self._histories.values()),
             bases=self._bases,
             paths={name: self.path(name) for name in self._paths},
             persons=self._persons,
             offers=frozenset(self._offers),
         )
-        return judge(promises, truth, collisions=len(self._counter.collisions), drops=self.drops)
+        return judge(conditions, truth, collisions=len(self._counter.collisions), drops=self.drops)
 
     def state(self) -> State:
         """The whole record; paths are arrays (N, 3)."""
         return {
             "bumps": self._counter.state(),
-            "stories": {name: story.state() for name, story in self._stories.items()},
+            "histories": {name: history.state() for name, history in self._histories.items()},
             "offers": [[*pair, time_s] for pair, time_s in self._offers.items()],
             "bases": {name: p_W.tolist() for name, p_W in self._bases.items()},
             "persons": {name: p_W.tolist() for name, p_W in self._persons.items()},
@@ -121,19 +121,19 @@ class Referee:
     def restore(self, state: State, paths: Mapping[str, FloatArray]) -> None:
         """Go on with such a record."""
         self._counter.restore(state["bumps"])
-        for name, story in self._stories.items():
-            story.restore(state["stories"][name])
-        self._offers = {(thing, person): time_s for thing, person, time_s in state["offers"]}
+        for name, history in self._histories.items():
+            history.restore(state["histories"][name])
+        self._offers = {(name, person): time_s for name, person, time_s in state["offers"]}
         self._bases = {name: array_of(p_W) for name, p_W in state["bases"].items()}
         self._persons = {name: array_of(p_W) for name, p_W in state["persons"].items()}
         self._paths = {name: list(path) for name, path in paths.items()}
 
     def forget_past(self) -> None:
-        """Begin a new chapter: another mission is judged by what happens from now on."""
+        """Another mission is judged by what happens from now on."""
         self._counter.collisions, self._offers = [], {}
         self._paths = {name: [] for name in self._paths}
-        for story in self._stories.values():
-            story.forget_past()
+        for history in self._histories.values():
+            history.forget_past()
 
     def points(self, robot: str) -> Sequence[FloatArray]:
         """The points of `path`, not to be changed; those that were there stay as more are added."""
@@ -148,35 +148,37 @@ class Referee:
         found: dict[int, dict[int, float]] = {}
         for (a, b), z in pairs.items():
             for this, other in ((a, b), (b, a)):
-                if self._cast.actors[this].kind is Kind.OBJECT:
+                if self._entities.all[this].kind is Kind.OBJECT:
                     found.setdefault(this, {})[other] = z
         return found
 
-    def _look(self, plant_context: Context, time_s: float, p_WO: FloatArray, touches: Mapping[int, float]) -> Look:
-        """One look at an object with the bodies that touch it."""
-        actors = {index: self._cast.actors[index] for index in touches}
-        gripper = next((actor.owner for actor in actors.values() if actor.kind is Kind.GRIPPER), None)
+    def _sample(
+        self, plant_context: Context, time_s: float, p_WO: FloatArray, touches: Mapping[int, float]
+    ) -> ObjectSample:
+        """An object now, with the bodies that touch it."""
+        entities = {index: self._entities.all[index] for index in touches}
+        gripper = next((entity.owner for entity in entities.values() if entity.kind is Kind.GRIPPER), None)
         still = (Kind.SCENERY, Kind.PERSON, Kind.OBJECT)
-        return Look(
+        return ObjectSample(
             time_s=time_s,
             p_WO=p_WO,
             gripper=gripper,
             X_WH=self._hand_pose(plant_context, gripper),
-            supported=any(actor.kind in still for actor in actors.values()),
-            on_floor=any(actors[i].kind is Kind.SCENERY and z < FLOOR_Z_M for i, z in touches.items()),
+            supported=any(entity.kind in still for entity in entities.values()),
+            on_floor=any(entities[i].kind is Kind.SCENERY and z < FLOOR_Z_M for i, z in touches.items()),
         )
 
     def _hand_pose(self, plant_context: Context, robot: str | None) -> RigidTransform | None:
-        if robot is None or robot not in self._cast.hands:
+        if robot is None or robot not in self._entities.hands:
             return None
-        return self._plant.EvalBodyPoseInWorld(plant_context, self._cast.hands[robot])
+        return self._plant.EvalBodyPoseInWorld(plant_context, self._entities.hands[robot])
 
     def _note_offers(self, time_s: float) -> None:
         """Remember which object was held out to whom, and when last."""
-        for story in self._stories.values():
+        for history in self._histories.values():
             for person, p_WP in self._persons.items():
-                if offered(story, p_WP):
-                    self._offers[story.name, person] = time_s
+                if offered(history, p_WP):
+                    self._offers[history.name, person] = time_s
 
 
 def _extend(path: list[FloatArray], p_W: FloatArray) -> None:

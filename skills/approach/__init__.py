@@ -1,1 +1,1 @@
-"""Choosing a place to stand from which a thing is within reach, and going there."""
+"""Choosing a place to stand from which an object is within reach, and going there."""

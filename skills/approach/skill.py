@@ -1,4 +1,4 @@
-"""The approach skill: stand where the thing seen can be grasped, then look at it again."""
+"""The approach skill: stand where the object seen can be grasped, then look at it again."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, ObjectObservation, Running, Succeeded, Surface
-from skills.approach.standing import Standing, free_places, is_comfortable, reachable
+from skills.api import Cause, ObjectObservation, Succeeded, Surface
+from skills.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
@@ -20,7 +20,7 @@ from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.planning import within_reach
 from skills.grasp.posture import body_height_m
-from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.skill import NavigateInputs
 from skills.robot import Pose2D
 
 _STILL_BEFORE_M = 1.3
@@ -28,7 +28,7 @@ _STILL_BEFORE_M = 1.3
 
 @dataclass(frozen=True)
 class ApproachInputs:
-    """The thing as it was seen, and the surfaces around (at least the one that it lies on)."""
+    """The object as it was seen, and the surfaces around (at least the one that it lies on)."""
 
     observation: ObjectObservation
     surfaces: tuple[Surface, ...]
@@ -58,9 +58,9 @@ class Approach(ArmSkill[ApproachInputs]):
     options: ApproachOptions
     outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PLANNING: "no free place to stand is near enough to the thing, or no way leads there",
+        Cause.PLANNING: "no free place to stand is near enough to the object, or no way leads there",
         Cause.EXECUTION: "the robot did not get to where it should stand",
-        Cause.POSTCONDITION: "the thing is not seen again from there",
+        Cause.POSTCONDITION: "the object is not seen again from there",
     }
     default_timeout_s = 150.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5, "observation": 3.0}
@@ -84,7 +84,9 @@ class Approach(ArmSkill[ApproachInputs]):
                     Cause.PLANNING, f"there is no free place to stand from which the {seen.thing} is within reach"
                 )
             yield from self.stow()
-            yield from self.go_to_one([place.pose for place in places[: self.options.tries]])
+            tolerances = (self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s)
+            goals = [NavigateInputs(place.pose, *tolerances) for place in places[: self.options.tries]]
+            yield from go_to_one(self, goals)
         return (yield from self._look_again(inputs))
 
     def undone(self, inputs: ApproachInputs) -> str | None:
@@ -92,20 +94,6 @@ class Approach(ArmSkill[ApproachInputs]):
         (x, y, _), pose = inputs.observation.position_W, self.context.pose()
         off_m = math.hypot(x - pose.x_m, y - pose.y_m)
         return None if off_m < _STILL_BEFORE_M else f"the robot is {off_m:.1f} m from the {inputs.observation.thing}"
-
-    def go_to_one(self, poses: list[Pose2D]) -> Routine[None]:
-        """Drive to the first of some poses to which there is a way."""
-        for k, pose in enumerate(poses):
-            goal = NavigateInputs(
-                pose, self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s
-            )
-            try:
-                yield from self.perform(Navigate(self.context), goal)
-                return
-            except SkillFailure as failure:
-                if k + 1 == len(poses) or failure.cause is not Cause.PLANNING:
-                    raise
-            yield Running("choosing another place to stand")
 
     def _look_again(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         seen = inputs.observation
@@ -133,7 +121,7 @@ def grasp_cost(
     X_WB: RigidTransform,
     seen: ObjectObservation,
 ) -> float | None:
-    """Cost of the best grasp of a thing that the arm reaches with the body at X_WB, beyond the best there is.
+    """Cost of the best grasp of an object that the arm reaches with the body at X_WB, beyond the best there is.
 
     None when it reaches no grasp.
     """

@@ -6,12 +6,15 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from skills.api import Costmap
+from skills.api import Cause, Costmap, Running
+from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
+from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Capabilities, Pose2D
 
 DISTANCES_M = (0.90, 0.94, 0.87, 0.84, 0.98, 0.81, 1.02, 1.06)
@@ -67,3 +70,15 @@ def _cost(pose: Pose2D, here: Pose2D, distance_m: float) -> float:
     turn = abs(wrap(pose.yaw_rad - here.yaw_rad))
     way = float(np.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
     return way + 0.3 * turn + 4.0 * abs(distance_m - DISTANCES_M[0])
+
+
+def go_to_one(skill: RoutineSkill[Any], goals: Sequence[NavigateInputs]) -> Routine[None]:
+    """Drive to the first of some goals to which there is a path. Raises SkillFailure."""
+    for k, goal in enumerate(goals, start=1):
+        try:
+            yield from skill.perform(Navigate(skill.context), goal)
+            return
+        except SkillFailure as failure:
+            if k == len(goals) or failure.cause is not Cause.PLANNING:
+                raise
+        yield Running("choosing another place to stand")

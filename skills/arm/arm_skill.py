@@ -20,7 +20,7 @@ PICTURE_LATENCY_S = 0.1
 SETTLE_S = 0.15
 OLDEST_PICTURE_S = 0.5
 LINE_SPEED_RAD_S = 0.6
-JAW_FORCE_N = 20.0
+GRIPPER_FORCE_N = 20.0
 
 
 class ArmSkill(RoutineSkill[InputsT]):
@@ -54,13 +54,15 @@ class ArmSkill(RoutineSkill[InputsT]):
         p_BP = self.X_WB().inverse() @ np.asarray(p_W)
         return float(np.linalg.norm(self.model.X_BH(self.q_rad()).translation() - p_BP)) < within_m
 
-    def try_shift_hand(self, offset_B: FloatArray, message: str) -> Routine[None]:
-        """Shift the hand where a straight way is found."""
+    def try_shift_hand(self, offset_B: FloatArray, message: str) -> Routine[bool]:
+        """Shift the hand where a straight way is found; whether there was one."""
         try:
             yield from self.shift_hand(offset_B, message)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
+            return False
+        return True
 
     @property
     def model(self) -> ArmModel:
@@ -95,7 +97,7 @@ class ArmSkill(RoutineSkill[InputsT]):
             scene.set_boxes(boxes)
             scene.hold(held)
             scene.set_padding(0.01)
-            scene.set_jaw(opening_rad)
+            scene.set_opening(opening_rad)
             return scene
 
         return prepared
@@ -165,17 +167,17 @@ class ArmSkill(RoutineSkill[InputsT]):
         return np.array([self.gripper.grip_x_m, 0.0, 0.0])
 
     def clear_view(self, message: str) -> Routine[None]:
-        """Open an empty jaw, which else stands before the hand camera."""
+        """Open an empty gripper, which else stands before the hand camera."""
         gripper = self.context.robot.gripper()
         if not gripper.holding and gripper.opening_rad < 0.9 * self.open_rad:
-            yield from self.move_gripper(0.98 * self.open_rad, JAW_FORCE_N, message)
+            yield from self.move_gripper(0.98 * self.open_rad, GRIPPER_FORCE_N, message)
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
-        """Close the jaw and fold the arm onto the body; nothing is done where it lies there already."""
+        """Close the gripper and fold the arm onto the body; nothing is done where it lies there already."""
         stowed = self.model.stowed_rad
         gripper = self.context.robot.gripper()
         if not gripper.holding and gripper.opening_rad > 0.05:
-            yield from self.move_gripper(0.0, JAW_FORCE_N, message)
+            yield from self.move_gripper(0.0, GRIPPER_FORCE_N, message)
         if np.max(np.abs(self.q_rad() - stowed)) > 0.05:
             yield from self.move_to(lambda scene, q: stowed, message)
 

@@ -28,7 +28,7 @@ class Box:
 class ArmScene:
     """The robot standing still with boxes around it, all in the body frame.
 
-    Legs stand at the joint angles given; the jaw's angle and a thing in the hand may change between checks.
+    Legs stand at the joint angles given; the gripper's angle and a thing in the hand may change between checks.
     """
 
     def __init__(
@@ -74,8 +74,8 @@ class ArmScene:
         for box in boxes:
             self._add("held", box, self._instance, self.model.hand_link)
 
-    def set_jaw(self, opening_rad: float) -> None:
-        """Angle of the jaw in later checks, 0 closed."""
+    def set_opening(self, opening_rad: float) -> None:
+        """Angle of the gripper in later checks, 0 closed."""
         self._q[self._jaw] = -opening_rad
 
     def set_padding(self, padding_m: float) -> None:

@@ -52,7 +52,7 @@ class _Stance:
 class RoutineSkill(Skill[InputsT]):
     """A skill whose attempt is one generator, `run`. Commands given through it are stopped by `end`.
 
-    After a short pause in which the robot stayed as it was, the routine goes on in its midst, and the motion that was
+    After a short pause in which the robot stayed as it was, the routine goes on where it was, and the motion that was
     stopped is taken up; else `run_again` looks what is done already.
     """
 
@@ -188,7 +188,7 @@ class RoutineSkill(Skill[InputsT]):
             trajectory = rest_of(trajectory, stopped_s - begun_s, self._stance_now().arm_rad)
 
     def move_gripper(self, opening_rad: float, force_n: float, message: str) -> Routine[None]:
-        """Move the jaw with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
+        """Move the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
         context = self.context
         stopped_s: float | None = 0.0
         while stopped_s is not None:

@@ -1,4 +1,4 @@
-"""The skill that drives a short way to where there is more room."""
+"""The skill that drives a short way to where there is more clearance."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class BackOffOptions:
 
 
 class BackOff(Skill[BackOffInputs]):
-    """Goes straight, slowly, without turning, in the first direction with room; looks at the costmap all the way."""
+    """Goes straight and slowly, without turning, in the first direction with enough clearance that the costmap has."""
 
     name: ClassVar[str] = "back_off"
     Inputs: ClassVar[type] = BackOffInputs
     Options: ClassVar[type] = BackOffOptions
     options: BackOffOptions
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PLANNING: "there is no room in any direction",
+        Cause.PLANNING: "there is no clearance in any direction",
         Cause.EXECUTION: "the robot refuses to drive or does not get on",
     }
     default_timeout_s: ClassVar[float] = 15.0
@@ -73,7 +73,7 @@ class BackOff(Skill[BackOffInputs]):
         if self._goal_O is None:
             chosen = self._choose()
             if chosen is None:
-                return Failed(Cause.PLANNING, "There is no room to back off in any direction.")
+                return Failed(Cause.PLANNING, "There is no clearance to back off in any direction.")
             self._goal_O = compose(self.context.robot.odometry().pose, chosen)
         return self._settling() if self._settled_s is not None else self._going(self._goal_O)
 
@@ -82,7 +82,7 @@ class BackOff(Skill[BackOffInputs]):
         self._base.stop()
 
     def _choose(self) -> Pose2D | None:
-        """Where to go, in the body frame: the first direction with room for the whole way, else the longest way."""
+        """Where to go, in the body frame: the first direction that is clear all along, else the longest."""
         ways = [(self._free_m(direction), direction) for direction in DIRECTIONS_RAD]
         longest = max(ways, key=lambda way: way[0])
         length, direction = next((way for way in ways if way[0] >= self._inputs.distance_m - 1e-6), longest)
@@ -95,9 +95,9 @@ class BackOff(Skill[BackOffInputs]):
         steps = np.arange(1, max(1, round(self._inputs.distance_m / _STEP_M)) + 1) * _STEP_M
         here = self.context.pose()
         poses = [compose(here, Pose2D(s * math.cos(direction_rad), s * math.sin(direction_rad), 0.0)) for s in steps]
-        rooms = footprint_clearance_m(self.context.costmap, self._footprint, pose_array([here, *poses]))
-        allowed = np.minimum(SAFE_MARGIN_M, np.maximum.accumulate(rooms)[:-1] + 1e-3)
-        blocked = np.flatnonzero(rooms[1:] < allowed)
+        clearances = footprint_clearance_m(self.context.costmap, self._footprint, pose_array([here, *poses]))
+        allowed = np.minimum(SAFE_MARGIN_M, np.maximum.accumulate(clearances)[:-1] + 1e-3)
+        blocked = np.flatnonzero(clearances[1:] < allowed)
         return float(steps[-1] if len(blocked) == 0 else (steps[blocked[0] - 1] if blocked[0] > 0 else 0.0))
 
     def _going(self, goal_O: Pose2D) -> Step:

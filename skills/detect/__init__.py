@@ -1,1 +1,1 @@
-"""Finding things with the hand camera."""
+"""Finding objects with the hand camera."""

@@ -1,4 +1,4 @@
-"""Counting what several looks saw, each thing once."""
+"""Counting what several looks saw, each object once."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ SAME_WITHIN_M = 0.12
 
 
 def told_apart(looks: Iterable[Sequence[ObjectObservation]]) -> tuple[ObjectObservation, ...]:
-    """The different things of several looks, those of the first look first.
+    """The different objects of several looks, those of the first look first.
 
-    What a later look saw of the same class within `SAME_WITHIN_M` of a known thing is that thing; the nearest pairs are
-    taken first and each thing is in one pair only, so that two that stand close together stay two.
+    What a later look saw of the same class within `SAME_WITHIN_M` of a known object is that object; the nearest pairs
+    are taken first and each object is in one pair only, so that two that stand close together stay two.
     """
     known: list[ObjectObservation] = []
     for look in looks:

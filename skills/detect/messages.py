@@ -67,7 +67,7 @@ def object_to_detect_message(context: SkillContext, classes: Sequence[str]) -> M
 def object_destination_message(
     context: SkillContext, seen: ObjectObservation, image: Image, X_WO: RigidTransform
 ) -> Message:
-    """Where the thing is: in the world, and from the camera."""
+    """Where the object is: in the world, and from the camera."""
     p_CO = camera_pose_W(image, X_WO).inverse() @ seen.position_W
     sequence = round(image.stamp_s * 1000)
     return {
@@ -86,7 +86,7 @@ def object_destination_message(
 
 
 def tracks_message(context: SkillContext, tracks: Sequence[Track]) -> Message:
-    """What is known of the things around."""
+    """What is known of the objects around."""
     return {"stamp": context.clock.now(), "tracks": [_track(track) for track in tracks]}
 
 

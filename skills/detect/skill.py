@@ -1,4 +1,4 @@
-"""The detect skill: look at surfaces with the hand camera until a thing of some class is found, and look twice."""
+"""The detect skill: look at surfaces with the hand camera until an object is found, and look twice."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ _LOOKED_AT_M = 0.08
 class DetectInputs:
     """What to look for (any of `classes`, with all `attributes`) and on which surfaces.
 
-    The look ends with the first `count` things; with a count of 0 all surfaces are looked at and all things counted.
-    With `expected_W` only that place is looked at, and only what is within 0.35 m of it counts. With `floor` a thing on
-    the floor beside the surfaces counts as well, where it comes into view.
+    The look ends with the first `count` objects; with a count of 0 all surfaces are looked at and all objects counted.
+    With `expected_W` only that place is looked at, and only what is within 0.35 m of it counts. With `floor` an object
+    on the floor beside the surfaces counts as well, where it comes into view.
     """
 
     classes: tuple[str, ...]
@@ -76,7 +76,7 @@ class DetectOptions:
 
     What may be meant is looked at again from aside, turned by `confirm_shifts_rad` about the shoulder; `candidates` of
     them more than are asked for. What has no name yet is looked at from near, `closer_looks` at most; what something
-    hides is looked at from `around_rad`. An answer rests on a picture no older than `fresh_s`. A thing counts within
+    hides is looked at from `around_rad`. An answer rests on a picture no older than `fresh_s`. An object counts within
     `expected_within_m` of where it is expected, and on the floor within `floor_within_m` of the robot.
     """
 
@@ -104,13 +104,13 @@ class Detect(ArmSkill[DetectInputs]):
         Cause.PRECONDITION: "a class, attribute or surface cannot be looked for from here, or there is no arm",
         Cause.PLANNING: "the arm finds no pose to look from",
         Cause.EXECUTION: "the arm did not get to where it looks from, or the camera shows nothing",
-        Cause.POSTCONDITION: "no such thing is seen, or fewer than asked for",
+        Cause.POSTCONDITION: "no such object is seen, or fewer than asked for",
     }
     default_timeout_s = 90.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"observation": 3.0}
 
     def run(self, inputs: DetectInputs) -> Routine[Succeeded]:
-        """Look at each surface in turn; a thing counts when a second look from beside agrees."""
+        """Look at each surface in turn; an object counts when a second look from beside agrees."""
         self._check(inputs)
         self.context.publish("object_to_detect", object_to_detect_message(self.context, inputs.classes))
         X_WB = self.X_WB()
@@ -154,7 +154,7 @@ class Detect(ArmSkill[DetectInputs]):
         return 0 < inputs.count <= len(self._found(inputs))
 
     def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
-        """Look from near where the thing is expected, or at what was not named and may be what is wanted."""
+        """Look from near where the object is expected, or at what was not named and may be what is wanted."""
         if inputs.expected_W is not None:
             if not self._has_enough(inputs):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)

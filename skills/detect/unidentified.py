@@ -16,11 +16,11 @@ _SAME_PLACE_M = 0.05
 _DOUBTED = 0.08
 """How likely something has to be of the classes that are looked for to be worth a closer look."""
 _SMALLEST, _LARGEST = 0.4, 1.3
-"""Shares of the shortest and the longest things of a class, for clusters of which a part is hidden or merged."""
+"""Shares of the shortest and the longest objects of a class, for clusters of which a part is hidden or merged."""
 
 
 def unnamed(clusters: Iterable[Cluster], tracks: Sequence[Track], classes: Sequence[str]) -> list[Cluster]:
-    """Clusters about as large as things of some classes where no track is, each place once; the largest first.
+    """Clusters about as large as objects of some classes where no track is, each place once; the largest first.
 
     A track that is likely enough to be of the classes after all, though it is likelier something else, is none here.
     """
@@ -41,7 +41,7 @@ def _doubted(track: Track, classes: Sequence[str]) -> bool:
 
 
 def _may_be(cluster: Cluster, classes: Sequence[str]) -> bool:
-    """Whether a cluster has the size of a thing of one of the classes."""
+    """Whether a cluster has the size of an object of one of the classes."""
     longest = max(cluster.shape.length_m, cluster.shape.height_m)
     ranges = (class_forms()[name].length_m for name in classes)
     return any(_SMALLEST * low < longest < _LARGEST * high for low, high in ranges)

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Surface
 from skills.arm.collision import Box
-from skills.geometry import inside_polygon
+from skills.geometry import grid_inside
 from skills.perception.detection_3d import depth_ahead_m
 from skills.perception.surface_segmentation import Cluster
 from skills.robot import FloatArray, Image
@@ -70,16 +70,12 @@ def _bins(values: FloatArray, among: NDArray[np.bool_], half_rad: float) -> list
 
 def _samples(surface: Surface, step_m: float = 0.1) -> FloatArray:
     """Points (N, 3) all over a surface, its corners included."""
-    corners = np.asarray(surface.polygon_W, dtype=float)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    grid = np.stack(np.meshgrid(np.arange(low[0], high[0], step_m), np.arange(low[1], high[1], step_m)), axis=-1)
-    rows = grid.reshape(-1, 2)
-    xy = np.concatenate([corners, rows[inside_polygon(rows, surface.polygon_W)]])
+    xy = np.concatenate([np.asarray(surface.polygon_W, dtype=float), grid_inside(surface.polygon_W, step_m)])
     return np.column_stack([xy, np.full(len(xy), surface.height_m)])
 
 
 def in_plain_view(image: Image, X_WO: RigidTransform, p_W: FloatArray) -> bool:
-    """Whether a picture should show a thing at a point: well inside, near, and with nothing before it."""
+    """Whether a picture should show an object at a point: well inside, near, and with nothing before it."""
     beside = p_W + np.array([[0.0, 0.0, 0.0], *(_EDGE_M * np.eye(3)), *(-_EDGE_M * np.eye(3))])
     depth, seen = depth_ahead_m(image, X_WO, beside)
     if not np.all(np.isfinite(depth)) or depth[0] > _PLAIN_M:
@@ -93,12 +89,12 @@ def surface_boxes(surfaces: Iterable[Surface], X_WB: RigidTransform) -> list[Box
 
 
 def cluster_box(cluster: Cluster, X_WB: RigidTransform, grow_m: float = 0.01) -> Box:
-    """A thing seen on a surface as one box in the body frame."""
+    """An object seen on a surface as one box in the body frame."""
     return _part_box(cluster, cluster.points.p_W[:, :2], X_WB, grow_m)
 
 
 def cluster_boxes(clusters: Iterable[Cluster], X_WB: RigidTransform, grow_m: float = 0.01) -> list[Box]:
-    """Things seen on a surface as boxes in the body frame; several for one that a single box would fill badly."""
+    """Objects seen on a surface as boxes in the body frame; several for one that a single box would fill badly."""
     parts = ((cluster, xy) for cluster in clusters for xy in standing_parts(cluster.points.p_W[:, :2]))
     return [_part_box(cluster, xy, X_WB, grow_m) for cluster, xy in parts]
 

@@ -27,7 +27,7 @@ def describe(seen: ObjectObservation) -> str:
 
 
 def counted(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> str:
-    """ "there are two wrenches on the bench"; each kind of thing is counted for itself."""
+    """ "there are two wrenches on the bench"; each kind of object is counted for itself."""
     kinds = list(dict.fromkeys(str(seen.thing) for seen in found))
     numbers = {kind: sum(str(seen.thing) == kind for seen in found) for kind in kinds}
     told = " and ".join(numbered(count, kind) for kind, count in numbers.items())

@@ -1,1 +1,1 @@
-"""Grasping a thing that was seen."""
+"""Grasping an object that was seen."""

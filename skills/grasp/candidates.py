@@ -1,7 +1,7 @@
 """Grasp candidates from the shape of what is seen, and which of them the arm can carry out.
 
-The jaw closes along the hand's z axis, which is kept level: from the side with the wrist rolled for what stands,
-from above for what lies. Along a long thing the local width counts, so that a hammer is taken by its handle.
+The gripper closes along the hand's z axis, which is kept level: from the side with the wrist rolled for what stands,
+from above for what lies. Along a long object the local width counts, so that a hammer is taken by its handle.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _LEAST_BEYOND_M = 0.004
 
 @dataclass(frozen=True)
 class Target:
-    """A thing to grasp, in the body frame: its points (N, 3), outline box, and the height of its surface (m)."""
+    """An object to grasp, in the body frame: its points (N, 3), outline box, and the height of its surface (m)."""
 
     points_B: FloatArray
     centre_B: tuple[float, float]
@@ -43,7 +43,7 @@ class Target:
 
 @dataclass(frozen=True)
 class GraspCandidate:
-    """A hand pose about a thing, the width between the jaws (m), what speaks against it, its tilt (rad, 0 level)."""
+    """A hand pose about an object, the width between the fingers (m), its cost, its tilt (rad, 0 level)."""
 
     X_BH: RigidTransform
     width_m: float
@@ -57,7 +57,7 @@ class GraspCandidate:
 
 @dataclass(frozen=True)
 class _Placement:
-    """A place to grasp along a thing: point (x, y), direction of the approach seen from above, local width, cost."""
+    """A place to grasp along an object: point (x, y), direction of the approach seen from above, local width, cost."""
 
     xy: FloatArray
     azimuth_rad: float
@@ -69,7 +69,7 @@ class _Placement:
 def grasp_candidates(
     target: Target, p_BS: FloatArray, gripper: GripperCapabilities, beside_m: tuple[float, float] = (0.010, 0.017)
 ) -> list[GraspCandidate]:
-    """Candidates, the best first; empty when the thing is too wide. p_BS is the shoulder.
+    """Candidates, the best first; empty when the object is too wide. p_BS is the shoulder.
 
     `beside_m` is left beside the fixed finger, about what stands and about what lies low.
     """
@@ -97,7 +97,7 @@ def _attitudes(target: Target) -> Sequence[tuple[float, float]]:
 
 
 def _round_placements(target: Target, ahead_rad: float) -> list[_Placement]:
-    """A round thing can be approached from any side; from the shoulder's is best."""
+    """A round object can be approached from any side; from the shoulder's is best."""
     centre = np.array(target.centre_B)
     return [
         _Placement(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, 0.5 * abs(turn))
@@ -135,11 +135,8 @@ def _candidate(
     beside_m: float,
 ) -> GraspCandidate | None:
     tilt, lean = attitude
-    c, s = np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad)
-    x_axis = np.array([np.cos(tilt) * c, np.cos(tilt) * s, -np.sin(tilt)])
-    z_axis = side * np.array([-s, c, 0.0])
-    upright_hand = RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
-    R_BH = RotationMatrix(AngleAxis(lean, np.array([c, s, 0.0]))) @ upright_hand
+    ahead = np.array([np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad), 0.0])
+    R_BH = RotationMatrix(AngleAxis(lean, ahead)) @ hand_rotation(tilt, placement.azimuth_rad, side)
     if target.upright:
         height = float(np.clip(0.56 * target.height_m, 0.05, 0.095))
         depth = gripper.palm_x_m + placement.half_depth_m + 0.008
@@ -148,9 +145,9 @@ def _candidate(
         height = 0.5 * target.height_m
         down = -R_BH.matrix()[2, 0]
         least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
-        room = height - _tip_drop(R_BH, placement.width_m, gripper, beside_m)
-        above = _above_surface(target.height_m, room - least * down)
-        beyond = (room - above) / down
+        clearance = height - _tip_drop(R_BH, placement.width_m, gripper, beside_m)
+        above = _above_surface(target.height_m, clearance - least * down)
+        beyond = (clearance - above) / down
         if beyond < least or height + beyond * down < _LEAST_GRIP_M:
             return None
         depth = gripper.tip_x_m - beyond
@@ -161,13 +158,21 @@ def _candidate(
     return GraspCandidate(X_BH, placement.width_m, float(cost), tilt)
 
 
+def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationMatrix:
+    """R_BH of a hand whose fingers point tilt_rad below level towards azimuth_rad; side (1, -1) turns it over."""
+    c, s = np.cos(azimuth_rad), np.sin(azimuth_rad)
+    x_axis = np.array([np.cos(tilt_rad) * c, np.cos(tilt_rad) * s, -np.sin(tilt_rad)])
+    z_axis = side * np.array([-s, c, 0.0])
+    return RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
+
+
 def _above_surface(height_m: float, spare_m: float) -> float:
-    """How far the fingertips stay above the surface (m): more for what is high, less where a flat thing spares less."""
+    """How far the fingertips stay above the surface (m): more for what is high, less for what is flat."""
     usual = _ABOVE_SURFACE_M + 0.4 * max(0.0, height_m - 0.03)
     return float(np.clip(spare_m - 1e-6, _LEAST_ABOVE_SURFACE_M, usual))
 
 
 def _tip_drop(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities, beside_m: float) -> float:
-    """How far below the middle of the fingertips their lowest corner lies, for a thing of some width between them."""
+    """How far below the middle of the fingertips their lowest corner lies, for an object of some width between them."""
     half = 0.5 * width_m + beside_m + gripper.tip_thickness_m
     return float(abs(R_BH.matrix()[2, 1]) * gripper.half_breadth_m + abs(R_BH.matrix()[2, 2]) * half)

@@ -20,7 +20,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class TriedGrasp:
-    """A grasp in the world's axes: where the fingers point, along what the jaw closes, the hand from the thing (m)."""
+    """A grasp in the world's axes: where the fingers point, how they close, the hand from the object (m)."""
 
     pointing_W: Vector
     closing_W: Vector
@@ -28,7 +28,7 @@ class TriedGrasp:
 
 
 def tried_grasp(candidate: GraspCandidate, centre_B: tuple[float, float], X_WB: RigidTransform) -> TriedGrasp:
-    """A candidate as it is remembered; `centre_B` is the thing's centre (x, y), X_WB the body's pose then."""
+    """A candidate as it is remembered; `centre_B` is the object's centre (x, y), X_WB the body's pose then."""
     R_WH = X_WB.rotation().matrix() @ candidate.X_BH.rotation().matrix()
     p_B = candidate.X_BH.translation() - np.array([*centre_B, 0.0])
     return TriedGrasp(_vector(R_WH[:, 0]), _vector(R_WH[:, 2]), _vector(X_WB.rotation().matrix() @ p_B))
@@ -50,7 +50,7 @@ def others_first(
 
 
 def same_grasp(one: TriedGrasp, other: TriedGrasp) -> bool:
-    """Whether two grasps are the same but for small differences; the jaw may be turned over."""
+    """Whether two grasps are the same but for small differences; the gripper may be turned over."""
     least = math.cos(SAME_TURN_RAD)
     pointing = float(np.dot(one.pointing_W, other.pointing_W))
     closing = abs(float(np.dot(one.closing_W, other.closing_W)))

@@ -33,7 +33,7 @@ class GraspPlan:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What stands around the thing, and the thing itself, as boxes in B; `up_B` points up in the body frame."""
+    """What stands around the object, and the object itself, as boxes in B; `up_B` points up in the body frame."""
 
     boxes: Sequence[Box]
     target: Box
@@ -135,4 +135,4 @@ def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray, arm_planner: Arm
         except PlanningError:
             continue
         return lift_B
-    raise PlanningError("the arm cannot lift the thing from there")
+    raise PlanningError("the arm cannot lift the object from there")

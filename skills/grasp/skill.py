@@ -1,4 +1,4 @@
-"""The grasp skill: look closely, choose a grasp, take the thing, lift it and make sure that it is held."""
+"""The grasp skill: look closely, choose a grasp, take the object, lift it and make sure that it is held."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, LocalisationEstimate, ObjectObservation, Succeeded, Surface
-from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill
+from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.poses import carry_configuration, close_viewpoints, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
@@ -35,7 +35,7 @@ _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 @dataclass(frozen=True)
 class GraspInputs:
-    """The thing to take, as it was seen; grasps like those in `avoid` are chosen only when there are no others."""
+    """The object to take, as it was seen; grasps like those in `avoid` are chosen only when there are no others."""
 
     observation: ObjectObservation
     avoid: tuple[TriedGrasp, ...] = ()
@@ -43,7 +43,7 @@ class GraspInputs:
 
 @dataclass(frozen=True)
 class CloseView:
-    """The thing and what is around it, seen closely; X_WB at that time."""
+    """The object and what is around it, seen closely; X_WB at that time."""
 
     target: Target
     boxes: tuple[Box, ...]
@@ -66,7 +66,7 @@ class GraspOptions:
 
 
 class Grasp(ArmSkill[GraspInputs]):
-    """Ends with the thing held near the body; on failure the jaw is opened and the arm stowed.
+    """Ends with the object held near the body; on failure the gripper is opened and the arm stowed.
 
     The output `tried` is `avoid` and the grasp of this attempt, also after a failure in which one was tried.
     """
@@ -77,24 +77,24 @@ class Grasp(ArmSkill[GraspInputs]):
     options: GraspOptions
     outputs: ClassVar[Mapping[str, type]] = {"tried": tuple[TriedGrasp, ...]}
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "the thing is not where it was seen, the jaw holds something already, or there is no arm",
+        Cause.PRECONDITION: "the object is not where it was seen, the gripper is full, or there is no arm",
         Cause.PLANNING: "no grasp is within reach and free",
-        Cause.EXECUTION: "the arm or the jaw did not get to where it was sent",
-        Cause.POSTCONDITION: "the jaw closed on nothing, or the thing slipped out",
+        Cause.EXECUTION: "the arm or the gripper did not get to where it was sent",
+        Cause.POSTCONDITION: "the gripper closed on nothing, or the object slipped out",
     }
     default_timeout_s = 120.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
     changes_world = True
 
     def undone(self, inputs: GraspInputs) -> str | None:
-        """The jaw tells."""
-        return None if self.context.robot.gripper().holding else f"the {inputs.observation.thing} is not in the jaw"
+        """The gripper tells."""
+        return None if self.context.robot.gripper().holding else f"the {inputs.observation.thing} is not in the gripper"
 
     def run(self, inputs: GraspInputs) -> Routine[Succeeded]:
         """Look, plan, take, lift, carry."""
         thing = inputs.observation.thing
         if self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.PRECONDITION, "the jaw holds something already")
+            raise SkillFailure(Cause.PRECONDITION, "the gripper holds something already")
         seen, capabilities = inputs.observation, self.context.robot.capabilities()
         try:
             height_m = body_height_m(seen.position_W[2] - 0.5 * seen.size_m[2], capabilities)
@@ -128,19 +128,19 @@ class Grasp(ArmSkill[GraspInputs]):
         return SkillFailure(failure.cause, failure.message, {"tried": self._tried})
 
     def run_again(self, inputs: GraspInputs) -> Routine[Succeeded]:
-        """A thing in the jaw is taken along and not taken again; from an empty jaw's side all begins anew."""
+        """An object in the gripper is taken along; with an empty gripper all begins anew."""
         seen = inputs.observation
-        yield from self.pause(_FEEL_S, "feeling what the jaw holds")
+        yield from self.pause(_FEEL_S, "feeling what the gripper holds")
         at_thing = self.hand_near(np.array(seen.position_W), _AT_THING_M)
         if not self.context.robot.gripper().holding:
             if at_thing:
                 yield from self._let_go()
             return (yield from self.run(inputs))
         yield from self._take_along(seen, at_thing)
-        return Succeeded(f"the {seen.thing} was in the jaw already; holding it", {"tried": self._tried})
+        return Succeeded(f"the {seen.thing} was in the gripper already; holding it", {"tried": self._tried})
 
     def _take_along(self, seen: ObjectObservation, at_thing: bool) -> Routine[None]:
-        """Clamp, lift and draw back what the jaw has hold of, hold it near the body, and make sure that it is held."""
+        """Clamp, lift and draw back what the gripper grips, carry it near the body, and check that it is held."""
         yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {seen.thing}")
         yield from self.pause(_FEEL_S, f"closing on the {seen.thing}")
         message, opening = f"carrying the {seen.thing}", self._check_held(str(seen.thing), None)
@@ -154,18 +154,13 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
 
     def _lift_again(self, message: str) -> Routine[None]:
-        """Lift what the jaw has hold of by the first way that the arm finds; where it finds none, it is carried low."""
+        """Lift what the gripper grips in the first way that the arm finds; where it finds none, it is carried low."""
         for way_B in lifts(self.model, self.model.X_BH(self.q_rad()), self._up_B()):
-            try:
-                yield from self.shift_hand(way_B, message)
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
-            else:
+            if (yield from self.try_shift_hand(way_B, message)):
                 return
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
-        """A view of the thing from 0.4 m; the plane and what stands around come with it."""
+        """A view of the object from 0.4 m; the plane and what stands around come with it."""
         message = f"looking closely at the {seen.thing}"
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
         surface = _square(seen.position_W, base_m, seen.surface or "surface")
@@ -199,15 +194,15 @@ class Grasp(ArmSkill[GraspInputs]):
         candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
-            raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the jaw")
+            raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the gripper")
         opening = 0.9 * self.open_rad
-        yield from self.move_gripper(opening, JAW_FORCE_N, "opening the jaw")
+        yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
 
         scene_now, q, stack = self.scene_now(), self.q_rad(), self.context.stack
 
         def plan() -> GraspPlan:
             scene = scene_now()
-            scene.set_jaw(opening)
+            scene.set_opening(opening)
             around = Surroundings(view.boxes, view.target_box, up_B)
             return stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng)
 
@@ -230,42 +225,33 @@ class Grasp(ArmSkill[GraspInputs]):
         """Lift as planned or, where the hand came to stand otherwise, in another way. Raises SkillFailure."""
         others = lifts(self.model, self.model.X_BH(self.q_rad()), self._up_B())
         for lift_B in (planned_B, *others):
-            try:
-                yield from self.shift_hand(lift_B, message)
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
-            else:
+            if (yield from self.try_shift_hand(lift_B, message)):
                 return
-        raise SkillFailure(Cause.PLANNING, "the arm cannot lift the thing from where it has hold of it")
+        raise SkillFailure(Cause.PLANNING, "the arm cannot lift the object from where it has hold of it")
 
     def _check_held(self, thing: str, opening_before_rad: float | None) -> float:
         gripper = self.context.robot.gripper()
         if gripper.opening_rad < _CLOSED_RAD or not gripper.holding:
-            raise SkillFailure(Cause.POSTCONDITION, f"the jaw closed on nothing where the {thing} was seen")
+            raise SkillFailure(Cause.POSTCONDITION, f"the gripper closed on nothing where the {thing} was seen")
         if opening_before_rad is not None and abs(gripper.opening_rad - opening_before_rad) > self.options.slip_rad:
-            raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the jaw while it was lifted")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the gripper while it was lifted")
         return gripper.opening_rad
 
     def _carry(self, view: CloseView, grasp: GraspCandidate, thing: str) -> Routine[None]:
-        """Draw back from the surface, hold the thing near the body, and check once more."""
+        """Draw back from the surface, hold the object near the body, and check once more."""
         opening = self._check_held(thing, None)
         X_HB = grasp.X_BH.inverse()
         self.held = [_held_box(X_HB, view.target_box)]
         message = f"carrying the {thing}"
         ahead = grasp.X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
-        try:
-            yield from self.shift_hand(-self.options.pull_back_m * ahead + 0.02 * self._up_B(), message)
-        except SkillFailure as failure:
-            if failure.cause is not Cause.PLANNING:
-                raise
+        yield from self.try_shift_hand(-self.options.pull_back_m * ahead + 0.02 * self._up_B(), message)
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
         self._check_held(thing, opening)
 
     def _let_go(self) -> Routine[None]:
-        """On failure: open the jaw, draw back, stow; what does not work is left out."""
+        """On failure: open the gripper, draw back, stow; what does not work is left out."""
         for recovery in (self._open, self._draw_back, self.try_stow, self._stand_down):
             try:
                 yield from recovery()
@@ -273,20 +259,15 @@ class Grasp(ArmSkill[GraspInputs]):
                 continue
 
     def _open(self) -> Routine[None]:
-        yield from self.move_gripper(0.9 * self.open_rad, JAW_FORCE_N, "opening the jaw after the failure")
+        yield from self.move_gripper(0.9 * self.open_rad, GRIPPER_FORCE_N, "opening the gripper after the failure")
 
     def _draw_back(self) -> Routine[None]:
-        """Out of the thing's reach, since the closing jaw must not catch it."""
+        """Out of the object's reach, since the closing gripper must not catch it."""
         ahead = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
         for distance_m in _DRAW_BACK_M:
-            try:
-                yield from self.shift_hand(-distance_m * ahead, "drawing back after the failure")
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
-            else:
+            if (yield from self.try_shift_hand(-distance_m * ahead, "drawing back after the failure")):
                 break
-        yield from self.move_gripper(0.0, JAW_FORCE_N, "closing the empty jaw")
+        yield from self.move_gripper(0.0, GRIPPER_FORCE_N, "closing the empty gripper")
 
     def _stand_down(self) -> Routine[None]:
         yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
@@ -327,7 +308,7 @@ def _examine(
 
 
 def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:
-    """The surface as far as its own points show it, and the same all around the thing, since its edge may be unseen."""
+    """The surface as far as its own points show it, and as much all around the object, since its edge may be unseen."""
     xy = view.plane_points.p_W[:, :2]
     low, high = np.percentile(xy, [0.2, 99.8], axis=0)
     low, high = (
@@ -341,7 +322,7 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
 def _same_thing(
     view: SurfaceView, seen: ObjectObservation, found: tuple[Detection3D, ...], within_m: float
 ) -> Cluster | None:
-    """The cluster that is the thing: detected as of its class and nearest, else nearest of all; None: all are far."""
+    """The cluster that is the object: detected as of its class and nearest, else nearest of all; None: all are far."""
     expected = np.array(seen.position_W[:2])
 
     def off(cluster: Cluster) -> float:
@@ -374,7 +355,7 @@ def _target(cluster: Cluster, X_WB: RigidTransform) -> Target:
 
 
 def _held_box(X_HB: RigidTransform, box: Box) -> Box:
-    """A box in B as the upright box about it in H, for the thing once it is held."""
+    """A box in B as the upright box about it in H, for the object once it is held."""
     half = 0.5 * np.array(box.size_m)
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     X_HG = X_HB @ box.X_FG

@@ -1,1 +1,1 @@
-"""Holding a thing out to a person."""
+"""Holding an object out to a person."""

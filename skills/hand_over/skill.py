@@ -1,4 +1,4 @@
-"""The hand-over skill: hold the thing out to a person, near enough to be taken, and keep holding it."""
+"""The hand-over skill: hold the object out to a person, near enough to be taken, and keep holding it."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Running, Succeeded
+from skills.approach.standing import go_to_one
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
-from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.skill import NavigateInputs
 from skills.perception.people import SeenPerson, people_in_scan
 from skills.robot import FloatArray, Pose2D
 
@@ -50,7 +51,7 @@ class HandOverOptions:
 
 
 class HandOver(ArmSkill[HandOverInputs]):
-    """Finds the person by LiDAR, goes before them, stretches out the arm; the thing stays in the jaw."""
+    """Finds the person by LiDAR, goes before them, stretches out the arm; the object stays in the gripper."""
 
     name = "hand_over"
     Inputs = HandOverInputs
@@ -60,7 +61,7 @@ class HandOver(ArmSkill[HandOverInputs]):
         Cause.PRECONDITION: "nothing is held, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free way for the arm",
         Cause.EXECUTION: "the robot or its arm did not get there",
-        Cause.POSTCONDITION: "the thing is no longer held, or not near the person",
+        Cause.POSTCONDITION: "the object is no longer held, or not near the person",
     }
     default_timeout_s = 120.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
@@ -69,7 +70,7 @@ class HandOver(ArmSkill[HandOverInputs]):
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
         """Find, go, hold out."""
         if not self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the jaw to hand over")
+            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to hand over")
         person = yield from self._find(inputs.person)
         if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
             yield from self._go_before(person, inputs.person)
@@ -98,14 +99,9 @@ class HandOver(ArmSkill[HandOverInputs]):
         poses = facing_poses(person.place_W, self.context.pose(), self.options.stand_off_m)
         footprint = Footprint.of(self.context.robot.capabilities())
         free = [pose for pose in poses if footprint_clear(self.context.costmap, footprint, pose)]
-        for k, pose in enumerate(free[:3]):
-            try:
-                yield from self.perform(Navigate(self.context), NavigateInputs(pose, 0.08, 0.1, 0.5))
-                return
-            except SkillFailure as failure:
-                if k == min(len(free), 3) - 1 or failure.cause is not Cause.PLANNING:
-                    raise
-        raise SkillFailure(Cause.PLANNING, f"there is no free place to stand before {name}")
+        if not free:
+            raise SkillFailure(Cause.PLANNING, f"there is no free place to stand before {name}")
+        yield from go_to_one(self, [NavigateInputs(pose, 0.08, 0.1, 0.5) for pose in free[:3]])
 
     def _hold_out(self, person: SeenPerson, name: str) -> Routine[None]:
         """Stretch the arm towards the person."""
@@ -118,17 +114,17 @@ class HandOver(ArmSkill[HandOverInputs]):
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
             return hold_out_configuration(scene, R_BH, p_BP, self.p_HT, level_m, self.options.gaps_m, q)
 
-        yield from self.move_to(goal, f"holding the thing out to {name}", speed_rad_s=0.8)
+        yield from self.move_to(goal, f"holding the object out to {name}", speed_rad_s=0.8)
 
     def _checked(self, person: SeenPerson, name: str) -> Succeeded:
-        """Raise SkillFailure with cause POSTCONDITION unless the thing is held out near the person."""
+        """Raise SkillFailure with cause POSTCONDITION unless the object is held out near the person."""
         if not self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.POSTCONDITION, f"the thing was lost while it was held out to {name}")
+            raise SkillFailure(Cause.POSTCONDITION, f"the object was lost while it was held out to {name}")
         p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
         off = float(np.linalg.norm(p_BT[:2] - self._ahead(person)))
         if off > self.options.furthest_m:
-            raise SkillFailure(Cause.POSTCONDITION, f"the thing is held {off:.2f} m from {name}, which is too far")
-        return Succeeded(f"holding the thing out, {off:.2f} m from {name}")
+            raise SkillFailure(Cause.POSTCONDITION, f"the object is held {off:.2f} m from {name}, which is too far")
+        return Succeeded(f"holding the object out, {off:.2f} m from {name}")
 
     def _ahead(self, person: SeenPerson) -> FloatArray:
         """The person's axis (x, y) in the body frame."""
@@ -157,9 +153,9 @@ def hold_out_configuration(
     gaps_m: Sequence[float],
     q_near_rad: FloatArray,
 ) -> FloatArray:
-    """Arm angles with the thing before the person, as upright as it is held; level_m is its height in B.
+    """Arm angles with the object before the person, as upright as it is held; level_m is its height in B.
 
-    The person's axis is at p_BP (2,), the middle of the thing at p_HT. Raises PlanningError out of the arm's reach.
+    The person's axis is at p_BP (2,), the middle of the object at p_HT. Raises PlanningError out of the arm's reach.
     """
     direction = math.atan2(p_BP[1], p_BP[0])
     heading = np.array([math.cos(direction), math.sin(direction), 0.0])
@@ -172,7 +168,7 @@ def hold_out_configuration(
         free = [q for q in scene.model.inverse(X_BH, margin_rad=0.05) if scene.free(q)]
         if free:
             return min(free, key=lambda q: float(np.max(np.abs(q - q_near_rad))))
-    raise PlanningError("the arm cannot hold the thing out near enough to the person from here")
+    raise PlanningError("the arm cannot hold the object out near enough to the person from here")
 
 
 def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:

@@ -1,1 +1,1 @@
-"""What the robot makes of its pictures and scans: things with a place, surfaces, people."""
+"""What the robot makes of its pictures and scans: objects with a place, surfaces, people."""

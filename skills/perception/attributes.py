@@ -1,4 +1,4 @@
-"""Whether a thing that was seen is red, or big: colours of its own pixels, its size among those of its class."""
+"""Whether an object that was seen is red, or big: colours of its own pixels, its size among those of its class."""
 
 from __future__ import annotations
 

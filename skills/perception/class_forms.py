@@ -1,4 +1,4 @@
-"""What the classes of things are like in general: `class_forms.yaml`."""
+"""What the classes of objects are like in general: `class_forms.yaml`."""
 
 from __future__ import annotations
 

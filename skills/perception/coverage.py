@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.api import Surface
-from skills.geometry import inside_polygon
+from skills.geometry import grid_inside
 from skills.perception.detection_3d import depth_ahead_m
 from skills.robot import FloatArray, Image
 
@@ -73,10 +73,6 @@ def _shares(states: NDArray[np.int8]) -> SurfaceShares:
 
 def _cells(surface: Surface) -> FloatArray:
     """Points (N, 3) all over a surface; its middle when it is small."""
-    corners = np.asarray(surface.polygon_W, dtype=float)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    axes = (np.arange(a + 0.5 * _CELL_M, b, _CELL_M) for a, b in zip(low, high, strict=True))
-    grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-    inside = grid[inside_polygon(grid, surface.polygon_W)]
-    xy = inside if len(inside) else corners.mean(axis=0)[None]
+    inside = grid_inside(surface.polygon_W, _CELL_M, first_m=0.5 * _CELL_M)
+    xy = inside if len(inside) else np.mean(surface.polygon_W, axis=0)[None]
     return np.column_stack([xy, np.full(len(xy), surface.height_m)])

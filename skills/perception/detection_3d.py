@@ -1,4 +1,4 @@
-"""Detections with a place: where in the world each thing is, how large, on which surface, of which colours."""
+"""Detections with a place: where in the world each object is, how large, on which surface, of which colours."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Detection3D:
 
     `covariance` (3, 3) is that of position_W from the camera at capture; `place_covariance` adds the localisation's.
     `size_m` and `yaw_rad` are as in `ObjectObservation`; `eye_W` is where the camera was; `pixels` (N, 2) as (u, v) are
-    the thing's own, as far as depth tells, and `colours` (N, 3) theirs, none in a grey picture; `surface` is what it
+    the object's own, as far as depth tells, and `colours` (N, 3) theirs, none in a grey picture; `surface` is what it
     rests on, "floor" for the floor, None for what is not known.
     """
 
@@ -57,7 +57,7 @@ def detections_3d(
     """The detections that have a place.
 
     Left out are those where no depth is seen, of classes without a form, and those that span far more than the longest
-    things of their class do.
+    objects of their class do.
     """
     known = [detection for detection in detections if detection.class_name in class_forms()]
     placed = zip(known, _positions(image, known), strict=True)
@@ -73,7 +73,7 @@ def _is_far_too_large(detection: Detection, position: Position) -> bool:
 
 
 def _positions(image: Image, detections: Sequence[Detection]) -> list[Position | None]:
-    """The place of each detection; what long things lie between or behind is found first, and is none of theirs."""
+    """The place of each detection; what long objects lie between or behind is found first, and is none of theirs."""
     shape = (image.intrinsics.height, image.intrinsics.width)
     taken, found = np.zeros(shape, dtype=bool), dict[int, Position | None]()
     for k in sorted(range(len(detections)), key=lambda k: _is_long(detections[k])):
@@ -124,7 +124,7 @@ def place_covariance(p_W: FloatArray, p_WB: FloatArray, covariance: FloatArray) 
 
 
 def surface_below(p_W: FloatArray, base_m: float, surfaces: Sequence[Surface]) -> str | None:
-    """The surface on which a thing at p_W rests whose base is at a height (m), "floor", or None."""
+    """The surface on which an object at p_W rests whose base is at a height (m), "floor", or None."""
     off = {surface.name: abs(base_m - surface.height_m) for surface in surfaces if _above(surface, p_W)}
     near = [name for name in sorted(off, key=lambda name: off[name]) if off[name] < _SURFACE_HEIGHT_M]
     return near[0] if near else FLOOR if abs(base_m) < _FLOOR_HEIGHT_M else None
@@ -135,7 +135,7 @@ def _above(surface: Surface, p_W: FloatArray) -> bool:
 
 
 def _pixels(image: Image, position: Position) -> NDArray[np.int64]:
-    """The thing's own pixels (N, 2)."""
+    """The object's own pixels (N, 2)."""
     window, mask = position.segment.window, position.segment.mask
     u = np.clip(np.rint(window.u[mask]), 0, image.intrinsics.width - 1)
     v = np.clip(np.rint(window.v[mask]), 0, image.intrinsics.height - 1)

@@ -1,6 +1,6 @@
-"""The points of a thing among those in its box: what stands above the plane below it, and fills the box best.
+"""The points of an object among those in its box: what stands above the plane below it, and fills the box best.
 
-Every level plane that is seen about the box is supposed to be what the thing rests on, in turn, and so is none. What
+Every level plane that is seen about the box is supposed to be what the object rests on, in turn, and so is none. What
 stands above it is grouped as seen from above; the supposition counts whose group has the box of the detection.
 Heights are along z of the level frame O of the picture's frame tree.
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from skills.perception.class_forms import ClassForm
 from skills.perception.plane import LevelPlane
-from skills.perception.point_cloud import MAX_DEPTH_M, MIN_DEPTH_M
+from skills.perception.point_cloud import MAX_DEPTH_M, MIN_DEPTH_M, grid_labels
 from skills.robot import FloatArray, Image, Intrinsics
 
 Box = tuple[float, float, float, float]
@@ -82,9 +82,9 @@ class Window:
 
 @dataclass(frozen=True)
 class ObjectSegment:
-    """The points of a thing: their mask in the window, the plane below (None: none is seen), how well they fit the box.
+    """The points of an object: their mask in the window, the plane below (None: unseen), how well they fit the box.
 
-    An empty mask means that nothing rises above the plane: the thing is flat.
+    An empty mask means that nothing rises above the plane: the object is flat.
     """
 
     window: Window
@@ -94,7 +94,7 @@ class ObjectSegment:
     covered: float
 
     def pixel_mask(self, height: int, width: int) -> Mask:
-        """The thing's pixels in the whole colour picture (height, width), the gaps between them closed."""
+        """The object's pixels in the whole colour picture (height, width), the gaps between them closed."""
         mask = np.zeros((height, width), dtype=np.uint8)
         u, v = self.window.u[self.mask], self.window.v[self.mask]
         mask[_index(v, height), _index(u, width)] = 1
@@ -109,7 +109,7 @@ class ObjectSegment:
 def window_about(image: Image, box: Box, taken: Mask | None = None) -> Window | None:
     """The depth about a box of the colour picture; None when no depth is there at all.
 
-    `taken` (H, W) tells which pixels of the colour picture are known to be other things.
+    `taken` (H, W) tells which pixels of the colour picture are known to be other objects.
     """
     lens, depth_lens = image.intrinsics, image.depth_intrinsics
     if image.depth_m.ndim != 2 or image.depth_m.size == 0:
@@ -152,7 +152,7 @@ def _pixels(low: float, high: float, c: float, f: float, depth_c: float, depth_f
 
 
 def segment_object(window: Window, form: ClassForm) -> ObjectSegment:
-    """What in the window is the thing, whose class has a form."""
+    """What in the window is the object, whose class has a form."""
     planes = [*level_planes(window), None]
     found = [each for plane in planes for each in _supposing(window, plane, form)]
     return max(found, key=lambda each: each.fit)
@@ -189,29 +189,19 @@ def _peaks(counts: FloatArray, edges: FloatArray, least: float) -> Iterator[floa
 
 
 def _fitted(points: FloatArray, height_m: float) -> LevelPlane | None:
-    """The plane near a height, by trimmed least squares; a slope beyond 2 degrees is taken for other things."""
+    """The plane near a height, by trimmed least squares; a slope beyond 2 degrees is taken for clutter."""
     near = points[np.abs(points[:, 2] - height_m) < 0.02]
     if len(near) < _FEWEST_ON_PLANE:
         return None
     origin = near[:, :2].mean(axis=0)
     plane = LevelPlane((float(origin[0]), float(origin[1])), height_m, (0.0, 0.0), 0.005)
     for _ in range(3):
-        residual = near[:, 2] - plane.z(near[:, :2])
-        kept = near[np.abs(residual) < max(0.004, 2.0 * plane.noise_m)]
-        if len(kept) < _FEWEST_ON_PLANE:
-            return plane
-        design = np.column_stack([np.ones(len(kept)), kept[:, :2] - origin])
-        (height, sx, sy), *_ = np.linalg.lstsq(design, kept[:, 2], rcond=None)
-        if math.hypot(sx, sy) > 0.035:
-            height, sx, sy = float(np.median(kept[:, 2])), 0.0, 0.0
-        fitted = LevelPlane(plane.origin, float(height), (float(sx), float(sy)), 0.0)
-        noise = 1.48 * float(np.median(np.abs(kept[:, 2] - fitted.z(kept[:, :2]))))
-        plane = LevelPlane(fitted.origin, fitted.height_m, fitted.slope, max(noise, 0.001))
+        plane = plane.refined(near, max(0.004, 2.0 * plane.noise_m)) or plane
     return plane
 
 
 def _supposing(window: Window, plane: LevelPlane | None, form: ClassForm) -> Iterator[ObjectSegment]:
-    """The segment if the thing rests on a plane, or on nothing that is seen; by each way of grouping."""
+    """The segment if the object rests on a plane, or on nothing that is seen; by each way of grouping."""
     standing = window.valid & ~_level(window, plane)
     ways = [_groups_from_above(window, standing), _groups_in_picture(window, standing, parted=False)]
     if form.form != "long":
@@ -288,12 +278,8 @@ def _groups_from_above(window: Window, standing: Mask) -> tuple[NDArray[np.int32
         return labels, 1
     about = standing & window.inside
     cell_m = 0.006 + 2.5 * window.pixel_m * float(np.median(window.z[about if np.any(about) else standing]))
-    cells = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / cell_m).astype(np.int64) + 1
-    counts = np.zeros(cells.max(axis=0) + 2, dtype=np.int32)
-    np.add.at(counts, (cells[:, 0], cells[:, 1]), 1)
-    count, grid = cv2.connectedComponents((counts >= 2).astype(np.uint8), connectivity=8)
-    labels[standing] = grid[cells[:, 0], cells[:, 1]]
-    return labels, int(count)
+    labels[standing], count = grid_labels(points[:, :2], cell_m, fewest=2)
+    return labels, count
 
 
 def _groups_in_picture(window: Window, standing: Mask, *, parted: bool) -> tuple[NDArray[np.int32], int]:
@@ -329,7 +315,7 @@ def _covered(window: Window, inside: Mask) -> float:
 
 
 def _sized(points: FloatArray, form: ClassForm) -> float:
-    """1 for points that a thing of the form has room for, less the more they are spread beyond it."""
+    """1 for points that an object of the form has room for, less the more they are spread beyond it."""
     middled = points - np.median(points, axis=0)
     _, axes = np.linalg.eigh(middled.T @ middled)
     low, high = np.percentile(middled @ axes, [3, 97], axis=0)

@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
+from skills.perception.point_cloud import grid_labels
 from skills.robot import FloatArray, Pose2D, Scan
 
 __all__ = ["SeenPerson", "merged", "people_in_scan"]
@@ -92,12 +92,8 @@ def _clusters(points_B: FloatArray) -> list[FloatArray]:
     """Points (N, 3) joined where they are neighbours on a grid seen from above."""
     if len(points_B) == 0:
         return []
-    cells = np.floor((points_B[:, :2] - points_B[:, :2].min(axis=0)) / _CELL_M).astype(np.int64) + 2
-    occupied = np.zeros(cells.max(axis=0) + 3, dtype=np.uint8)
-    occupied[cells[:, 0], cells[:, 1]] = 1
-    count, labels = cv2.connectedComponents(cv2.dilate(occupied, np.ones((3, 3), np.uint8)), connectivity=8)
-    label = labels[cells[:, 0], cells[:, 1]]
-    groups = [points_B[label == k] for k in range(1, count)]
+    labels, count = grid_labels(points_B[:, :2], _CELL_M, dilated=True)
+    groups = [points_B[labels == k] for k in range(1, count)]
     return [group for group in groups if len(group) >= 3]
 
 

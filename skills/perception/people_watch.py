@@ -146,7 +146,7 @@ class PeopleWatch:
         return one.class_name == PERSON and one.score >= self._options.least_score
 
     def _placed(self, image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D) -> SeenPerson | None:
-        """Where a detected person is; None for other things, and for people out of the reach of depth."""
+        """Where a detected person is; None for other objects, and for people out of the reach of depth."""
         if not self._is_person(one):
             return None
         position = position_of(image, one)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
@@ -73,3 +74,19 @@ def _colour_pixels(image: Image, rays: FloatArray) -> NDArray[np.int64]:
     u = np.clip(np.rint(rays[:, 0] * lens.fx + lens.cx), 0, lens.width - 1)
     v = np.clip(np.rint(rays[:, 1] * lens.fy + lens.cy), 0, lens.height - 1)
     return np.stack([u, v], axis=1).astype(np.int64)
+
+
+def grid_labels(
+    xy: FloatArray, cell_m: float, *, fewest: int = 1, dilated: bool = False
+) -> tuple[NDArray[np.int32], int]:
+    """Points (N, 2) grouped by neighbourhood on a grid: the label of each, 0 for none, and the number of labels.
+
+    Cells with less than `fewest` points are empty; `dilated`, groups also join across a gap of one cell or two.
+    """
+    cells = np.floor((xy - xy.min(axis=0)) / cell_m).astype(np.int64) + 1
+    counts = np.zeros(cells.max(axis=0) + 2, dtype=np.int32)
+    np.add.at(counts, (cells[:, 0], cells[:, 1]), 1)
+    occupied = (counts >= fewest).astype(np.uint8)
+    joined = cv2.dilate(occupied, np.ones((3, 3), np.uint8)) if dilated else occupied
+    count, grid = cv2.connectedComponents(joined, connectivity=8)
+    return np.asarray(np.where(occupied > 0, grid, 0)[cells[:, 0], cells[:, 1]]), int(count)

@@ -1,12 +1,12 @@
-"""Where a detected thing is: the middle of the whole thing, not of the side that is seen, with its covariance.
+"""Where a detected object is: the middle of the whole object, not of the side that is seen, with its covariance.
 
-The segment of the box gives the side that is seen. The form of the class tells how far the thing goes on behind it:
+The segment of the box gives the side that is seen. The form of the class tells how far the object goes on behind it:
 
 | form | middle |
 |---|---|
 | round, upright | the axis: behind the nearest points by half the width across the view, or of the circle that fits |
-| round, lying | the outline from above, made as wide as the thing is high, from its near side on |
-| box | the outline from above, made as wide and long as the thing is high, from its near sides on |
+| round, lying | the outline from above, made as wide as the object is high, from its near side on |
+| box | the outline from above, made as wide and long as the object is high, from its near sides on |
 | long | the outline from above; where too little of it rises above the plane, the ray of the box's middle meets it |
 | person | behind the nearest points by half a body's depth; from the floor to the top that is seen, or a usual height |
 
@@ -18,14 +18,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from skills.api import Detection
 from skills.perception.class_forms import ClassForm, class_forms
 from skills.perception.object_segmentation import Mask, ObjectSegment, Window, segment_object, window_about
 from skills.perception.plane import LevelPlane
-from skills.perception.shape import circle_seen, without_strays
+from skills.perception.shape import circle_seen, smallest_rectangle, without_strays
 from skills.robot import FloatArray, Image
 
 _UPRIGHT = 1.15
@@ -41,7 +40,7 @@ _END_AT_BORDER_PX = 30.0
 
 @dataclass(frozen=True)
 class Extents:
-    """An upright box about a thing in the level frame: middle (x, y, z), length, width, height (m), yaw of the length.
+    """An upright box about an object in the level frame: middle, length, width, height (m), yaw of its length.
 
     `sure_m` is how well the middle is known along the view, across it and upwards (one sigma, m).
     """
@@ -57,7 +56,7 @@ class Extents:
 
 @dataclass(frozen=True)
 class Position:
-    """Where a thing is in the odometry frame at capture: p_OT (m), covariance (3, 3), extents and points."""
+    """Where an object is in the odometry frame at capture: p_OT (m), covariance (3, 3), extents and points."""
 
     p_OT: FloatArray
     covariance_O: FloatArray
@@ -66,7 +65,7 @@ class Position:
 
     @property
     def spanned_m(self) -> float:
-        """How long the longer side of the box is at the depth of the thing."""
+        """How long the longer side of the box is at the depth of the object."""
         window = self.segment.window
         u0, v0, u1, v1 = window.box
         depth_m = float((window.R_OC.T @ (self.p_OT - window.p_OC))[2])
@@ -74,9 +73,9 @@ class Position:
 
 
 def position_of(image: Image, detection: Detection, taken: Mask | None = None) -> Position | None:
-    """Where the thing of a box is; None where no depth is seen there. Raises KeyError for a class without a form.
+    """Where the object of a box is; None where no depth is seen there. Raises KeyError for a class without a form.
 
-    `taken` (H, W) tells which pixels are known to be other things.
+    `taken` (H, W) tells which pixels are known to be other objects.
     """
     form = class_forms()[detection.class_name]
     window = window_about(image, detection.box, taken)
@@ -92,7 +91,7 @@ def position_of(image: Image, detection: Detection, taken: Mask | None = None) -
 
 
 def _doubted(extents: Extents, segment: ObjectSegment, cut: _Cut) -> tuple[float, float, float]:
-    """The sigmas of the extents, larger where the thing reaches beyond the picture or its base is not seen."""
+    """The sigmas of the extents, larger where the object reaches beyond the picture or its base is not seen."""
     along, across, up = extents.sure_m
     longest = max(extents.length_m, extents.height_m)
     if cut.anywhere:
@@ -147,7 +146,7 @@ def _extents(segment: ObjectSegment, form: ClassForm, cut: _Cut) -> Extents | No
 
 
 def _uncut(base_m: float, height_m: float, form: ClassForm, segment: ObjectSegment, cut: _Cut) -> tuple[float, float]:
-    """Base and height of a standing thing, of usual height where the picture ends above or below it."""
+    """Base and height of a standing object, of usual height where the picture ends above or below it."""
     missing_m = max(0.0, form.usual_m - height_m)
     if cut.top:
         return base_m, height_m + missing_m
@@ -157,7 +156,7 @@ def _uncut(base_m: float, height_m: float, form: ClassForm, segment: ObjectSegme
 
 
 def _base(segment: ObjectSegment, points: FloatArray) -> float:
-    """Height of what the thing rests on; of its lowest points where that is not seen."""
+    """Height of what the object rests on; of its lowest points where that is not seen."""
     if segment.plane is None:
         return float(np.percentile(points[:, 2], 1))
     return float(segment.plane.z(np.median(points[:, :2], axis=0)))
@@ -177,7 +176,7 @@ def _across(points: FloatArray, p_OC: FloatArray) -> float:
 
 
 def _upright(points: FloatArray, segment: ObjectSegment, form: ClassForm, base_m: float, height_m: float) -> Extents:
-    """A standing round thing: its axis behind the side that is seen."""
+    """A standing round object: its axis behind the side that is seen."""
     above = points[:, 2] - base_m
     body = points[(above > 0.12 * height_m) & (above < 0.6 * height_m), :2]
     body = body if len(body) >= 12 else points[:, :2]
@@ -199,7 +198,7 @@ def _upright(points: FloatArray, segment: ObjectSegment, form: ClassForm, base_m
 
 
 def _near_axis(points: FloatArray, axis: FloatArray, p_OC: FloatArray) -> FloatArray:
-    """Points that are no farther behind or before an axis than the thing reaches to its sides."""
+    """Points that are no farther behind or before an axis than the object reaches to its sides."""
     along, across = _view(points, p_OC)
     reach = min(_REACH_M, float(np.percentile(np.abs((points[:, :2] - axis) @ across), 98)))
     kept = points[np.abs((points[:, :2] - axis) @ along) < reach]
@@ -217,7 +216,7 @@ def _with_appendages(
     x, y, radius = tank
     turns = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
     rim = np.stack([x + radius * np.cos(turns), y + radius * np.sin(turns)], axis=1)
-    (cx, cy), length, width, yaw = _smallest_rectangle(np.concatenate([without_strays(points[:, :2]), rim]))
+    (cx, cy), length, width, yaw = smallest_rectangle(np.concatenate([without_strays(points[:, :2]), rim]))
     return Extents((float(cx), float(cy), base_m + 0.5 * height_m), length, width, height_m, yaw, False, sure_m)
 
 
@@ -265,15 +264,7 @@ def _outline(
     """A rectangle about points seen from above: middle, length, width, yaw of the length."""
     upper = points[points[:, 2] - base_m > 0.25 * height_m, :2]
     xy = without_strays(upper if len(upper) >= 12 else points[:, :2])
-    return _rectangle_along(xy, _main_yaw(xy)) if form.form == "long" else _smallest_rectangle(xy)
-
-
-def _smallest_rectangle(xy: FloatArray) -> tuple[FloatArray, float, float, float]:
-    middle = xy.mean(axis=0)
-    (x, y), (first, second), angle_deg = cv2.minAreaRect((xy - middle).astype(np.float32))
-    yaw = math.radians(angle_deg) + (0.0 if first >= second else 0.5 * math.pi)
-    yaw = (yaw + 0.5 * math.pi) % math.pi - 0.5 * math.pi
-    return middle + [x, y], float(max(first, second)), float(min(first, second)), yaw
+    return _rectangle_along(xy, _main_yaw(xy)) if form.form == "long" else smallest_rectangle(xy)
 
 
 def _main_yaw(xy: FloatArray) -> float:
@@ -311,7 +302,7 @@ def _completed(
 
 
 def _flat(segment: ObjectSegment, plane: LevelPlane, form: ClassForm) -> Extents | None:
-    """A flat thing: where the ray through the middle of its box meets the plane that it lies on."""
+    """A flat object: where the ray through the middle of its box meets the plane that it lies on."""
     window = segment.window
     meeting = _on_plane(window, plane, 0.35 * form.width_m[0])
     if meeting is None:

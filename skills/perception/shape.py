@@ -1,7 +1,8 @@
-"""The size and place of a thing from the side of it that was seen."""
+"""The size and place of an object from the side of it that was seen."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -12,7 +13,7 @@ from skills.robot import FloatArray
 
 @dataclass(frozen=True)
 class SeenShape:
-    """A box about a thing: centre (x, y) in W, length >= width, height above its surface (m), yaw of the length.
+    """A box about an object: centre (x, y) in W, length >= width, height above its surface (m), yaw of the length.
 
     `round` tells that its outline from above fits a circle.
     """
@@ -26,7 +27,7 @@ class SeenShape:
 
 
 def measure(points_W: FloatArray, plane_m: FloatArray, p_WC: FloatArray) -> SeenShape:
-    """Shape of the points (N, 3) of one thing, seen from p_WC; plane_m (N,) is the surface's height below each."""
+    """Shape of the points (N, 3) of one object, seen from p_WC; plane_m (N,) is the surface's height below each."""
     above = points_W[:, 2] - plane_m
     height = float(np.percentile(above, 98))
     if height > 0.06:
@@ -35,17 +36,18 @@ def measure(points_W: FloatArray, plane_m: FloatArray, p_WC: FloatArray) -> Seen
         if circle is not None:
             x, y, radius = circle
             return SeenShape((x, y), 2 * radius, 2 * radius, height, 0.0, True)
-    return _rectangle(_upper(points_W, above, height), height)
+    (x, y), length, width, yaw = smallest_rectangle(without_strays(_upper(points_W, above, height)))
+    return SeenShape((float(x), float(y)), length, width, height, yaw, False)
 
 
 def _upper(points_W: FloatArray, above: FloatArray, height: float) -> FloatArray:
-    """Points (x, y) without the lowest, where the thing meets the noise of its surface."""
+    """Points (x, y) without the lowest, where the object meets the noise of its surface."""
     kept = points_W[above > 0.3 * height, :2]
     return kept if len(kept) >= 8 else points_W[:, :2]
 
 
 def circle_seen(xy: FloatArray, p_WC: FloatArray, largest_m: float = 0.09) -> tuple[float, float, float] | None:
-    """Centre and radius, at most largest_m, of the visible front (N, 2) of a round thing; None when it is not round."""
+    """Centre and radius, at most largest_m, of the seen front (N, 2) of a round object; None when it is not round."""
     view = np.mean(xy, axis=0) - p_WC[:2]
     distance = float(np.linalg.norm(view))
     view = view / max(distance, 1e-6)
@@ -69,15 +71,13 @@ def circle_seen(xy: FloatArray, p_WC: FloatArray, largest_m: float = 0.09) -> tu
     return float(fit.x[0]), float(fit.x[1]), float(radius)
 
 
-def _rectangle(xy: FloatArray, height: float) -> SeenShape:
-    """The smallest rectangle about points (N, 2), without stray ones."""
-    kept = without_strays(xy)
-    (x, y), (first, second), angle_deg = cv2.minAreaRect((kept - kept.mean(axis=0)).astype(np.float32))
-    yaw = np.radians(angle_deg) + (0.0 if first >= second else np.pi / 2)
-    centre = kept.mean(axis=0) + (x, y)
-    yaw = float((yaw + np.pi / 2) % np.pi - np.pi / 2)
-    length, width = float(max(first, second)), float(min(first, second))
-    return SeenShape((float(centre[0]), float(centre[1])), length, width, height, yaw, False)
+def smallest_rectangle(xy: FloatArray) -> tuple[FloatArray, float, float, float]:
+    """The smallest rectangle about points (N, 2): middle, length, width, yaw of the length in [-pi/2, pi/2)."""
+    middle = xy.mean(axis=0)
+    (x, y), (first, second), angle_deg = cv2.minAreaRect((xy - middle).astype(np.float32))
+    yaw = math.radians(angle_deg) + (0.0 if first >= second else 0.5 * math.pi)
+    yaw = (yaw + 0.5 * math.pi) % math.pi - 0.5 * math.pi
+    return middle + [x, y], float(max(first, second)), float(min(first, second)), yaw
 
 
 def without_strays(xy: FloatArray, cell_m: float = 0.006) -> FloatArray:

@@ -15,7 +15,7 @@ from skills.detection import box_overlap
 from skills.geometry import inside_polygon
 from skills.perception.detection_3d import Detection3D
 from skills.perception.plane import LevelPlane
-from skills.perception.point_cloud import PointCloud, camera_pose_W, cloud_from_image
+from skills.perception.point_cloud import PointCloud, camera_pose_W, cloud_from_image, grid_labels
 from skills.perception.shape import SeenShape, measure
 from skills.robot import FloatArray, Image
 
@@ -33,7 +33,7 @@ _APART_M = 0.035
 
 @dataclass(frozen=True)
 class Cluster:
-    """The points of one thing, the plane that it stands on, its shape and its box (u0, v0, u1, v1) in the picture."""
+    """The points of one object, the plane that it stands on, its shape and its box (u0, v0, u1, v1) in the picture."""
 
     points: PointCloud
     surface: str
@@ -43,7 +43,7 @@ class Cluster:
 
     @property
     def base_m(self) -> float:
-        """Height of the surface under the thing."""
+        """Height of the surface under the object."""
         return float(self.plane.z(np.array([self.shape.centre]))[0])
 
 
@@ -85,7 +85,7 @@ def _view(cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: float
 
 
 def fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:
-    """The plane near a surveyed height, robust against things standing on it; None when too few points show it."""
+    """The plane near a surveyed height, robust against objects standing on it; None when too few points show it."""
     near = points_W[np.abs(points_W[:, 2] - height_m) < _PLANE_BAND_M]
     if len(near) < 80:
         return None
@@ -95,37 +95,16 @@ def fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:
     origin = near[:, :2].mean(axis=0)
     plane = LevelPlane((float(origin[0]), float(origin[1])), level, (0.0, 0.0), 0.004)
     for _ in range(4):
-        plane = _refined(plane, near) or plane
+        plane = plane.refined(near, max(0.006, 2.5 * plane.noise_m)) or plane
     return plane
-
-
-def _refined(plane: LevelPlane, points_W: FloatArray) -> LevelPlane | None:
-    """One step of trimmed least squares; slopes beyond 2 degrees are taken for other things and dropped."""
-    residual = points_W[:, 2] - plane.z(points_W[:, :2])
-    inliers = points_W[np.abs(residual) < max(0.006, 2.5 * plane.noise_m)]
-    if len(inliers) < 40:
-        return None
-    design = np.column_stack([np.ones(len(inliers)), inliers[:, :2] - np.array(plane.origin)])
-    (height, slope_x, slope_y), *_ = np.linalg.lstsq(design, inliers[:, 2], rcond=None)
-    if np.hypot(slope_x, slope_y) > 0.035:
-        height, slope_x, slope_y = float(np.median(inliers[:, 2])), 0.0, 0.0
-    fitted = LevelPlane(plane.origin, float(height), (float(slope_x), float(slope_y)), plane.noise_m)
-    noise = 1.48 * float(np.median(np.abs(inliers[:, 2] - fitted.z(inliers[:, :2]))))
-    return LevelPlane(fitted.origin, fitted.height_m, fitted.slope, max(noise, 0.001))
 
 
 def _groups(points: PointCloud) -> list[PointCloud]:
     """Points grouped by neighbourhood on a grid seen from above."""
     if len(points) < _FEWEST_POINTS:
         return []
-    cells = np.floor((points.p_W[:, :2] - points.p_W[:, :2].min(axis=0)) / _CELL_M).astype(np.int64) + 1
-    counts = np.zeros(cells.max(axis=0) + 2, dtype=np.int32)
-    np.add.at(counts, (cells[:, 0], cells[:, 1]), 1)
-    occupied = (counts >= 2).astype(np.uint8)
-    count, labels = cv2.connectedComponents(cv2.dilate(occupied, np.ones((3, 3), np.uint8)), connectivity=8)
-    labels = np.where(occupied > 0, labels, 0)
-    label = labels[cells[:, 0], cells[:, 1]]
-    groups = [points.where(label == k) for k in range(1, count)]
+    labels, count = grid_labels(points.p_W[:, :2], _CELL_M, fewest=2, dilated=True)
+    groups = [points.where(labels == k) for k in range(1, count)]
     return [group for group in groups if len(group) >= _FEWEST_POINTS]
 
 
@@ -136,7 +115,7 @@ def _cluster(points: PointCloud, surface: str, plane: LevelPlane, p_WC: FloatArr
 
 
 def parted(view: SurfaceView, detected: Detection3D) -> SurfaceView:
-    """The view with a detected thing cut out of a cluster that holds others as well, such as two things that touch.
+    """The view with a detected object cut out of a cluster that holds others as well, such as two objects that touch.
 
     What is above or below it is a part of it that its box left out.
     """
@@ -156,7 +135,7 @@ def parted(view: SurfaceView, detected: Detection3D) -> SurfaceView:
 
 
 def _own(pixels: NDArray[np.int64], of_thing: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which pixels (N, 2) lie among those of a thing, which may be only every few of them."""
+    """Which pixels (N, 2) lie among those of an object, which may be only every few of them."""
     width, height = np.maximum(pixels.max(axis=0), of_thing.max(axis=0)) + 1
     mask = np.zeros((height, width), dtype=np.uint8)
     mask[of_thing[:, 1], of_thing[:, 0]] = 1
@@ -165,7 +144,7 @@ def _own(pixels: NDArray[np.int64], of_thing: NDArray[np.int64]) -> NDArray[np.b
 
 
 def cluster_of(clusters: tuple[Cluster, ...], detected: Detection3D) -> Cluster | None:
-    """The cluster that a detected thing is: the one near it whose box overlaps the detection's most; None if none."""
+    """The cluster that a detected object is: the one near it whose box overlaps the detection's most; None if none."""
     near = [one for one in clusters if _apart(one, detected) < _SAME_THING_M + 0.5 * one.shape.length_m]
     overlaps = {id(one): box_overlap(one.box, detected.detection.box) for one in near}
     best = max(near, key=lambda one: overlaps[id(one)], default=None)

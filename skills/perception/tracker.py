@@ -1,4 +1,4 @@
-"""Things seen over several views: one track for each, with its place, its class and how sure it is that it is there.
+"""Objects seen over several views: one track for each, with its place, its class and how sure it is that it is there.
 
 A detection belongs to the track that it fits by place (Mahalanobis distance) and class; places are fused as information
 (inverse covariances add). A track that a picture should show and that is not detected there loses belief. What is seen
@@ -19,7 +19,7 @@ from skills.perception.detection_3d import Detection3D
 from skills.robot import FloatArray
 
 GATE = 16.3
-"""Squared Mahalanobis distance within which 99.9 % of the detections of a thing lie."""
+"""Squared Mahalanobis distance within which 99.9 % of the detections of an object lie."""
 DIFFERENT_PLACES_M = 0.03
 CONFIRMED_BELIEF = 0.6
 SURE_SCORE = 0.5
@@ -30,7 +30,7 @@ _NEAR_M = 0.03
 _CONFUSED = 0.02
 _MISSED_IF_THERE, _MISSED_IF_NOT = 0.15, 0.88
 _SEEN_BY_CHANCE = 0.25
-"""The share of things among all that is seen at least faintly."""
+"""The share of objects among all that is seen at least faintly."""
 _NEW_IN_A_VIEW = 0.5
 """How much of what a view tells the others have not told yet; 1 were views that err independently."""
 _MOST_SURE = 0.97
@@ -39,7 +39,7 @@ _MOST_BELIEF, _LEAST_BELIEF = 0.999, 0.05
 
 @dataclass(frozen=True)
 class Track:
-    """One thing. `position_W` with `covariance` (3, 3) from the views, without the localisation's error.
+    """One object. `position_W` with `covariance` (3, 3) from the views, without the localisation's error.
 
     `classes` tells how likely each class is, `belief` how likely it is that something is there at all. `views` counts
     the places that it was seen from; `latest` is its last detection, `best` its surest one.
@@ -78,7 +78,7 @@ class Track:
 
 
 class Tracks(Protocol):
-    """Gives what is known of the things around."""
+    """Gives what is known of the objects around."""
 
     def snapshot(self) -> tuple[Track, ...]:
         """All tracks, the surest first; immutable."""
@@ -134,7 +134,7 @@ class Tracker:
 
 
 def distinct(seen: Sequence[Detection3D]) -> tuple[Detection3D, ...]:
-    """The detections of one picture, each thing once where it was detected as two classes."""
+    """The detections of one picture, each object once where it was detected as two classes."""
     kept: list[Detection3D] = []
     for one in sorted(seen, key=lambda detected: -detected.detection.score):
         if not any(_is_same_thing(one, other) for other in kept):
@@ -170,9 +170,9 @@ def _matched(tracks: Sequence[Track], seen: Sequence[Detection3D]) -> dict[int, 
 
 
 def fits(track: Track, detected: Detection3D) -> bool:
-    """Whether a detection can be of a track's thing: near enough, and of a class that it may have.
+    """Whether a detection can be of a track's object: near enough, and of a class that it may have.
 
-    What is within 3 cm is the same thing, whatever its class.
+    What is within 3 cm is the same object, whatever its class.
     """
     apart_m = float(np.linalg.norm(track.position_W - detected.position_W))
     possible = track.classes[detected.class_name] > _CONFUSED or apart_m < _NEAR_M
@@ -216,17 +216,19 @@ def _latest(track: Track, detected: Detection3D) -> Detection3D:
 
 
 def _classes(before: Mapping[str, float], detected: Detection3D) -> Mapping[str, float]:
-    """Class beliefs after a detection: its scores for its class and for the rivals, the rest spread over the others."""
+    """Class beliefs after a detection: its scores for its class and the alternatives, the rest spread over others."""
     score = float(np.clip(detected.detection.score, 0.3, 0.97))
     others = (1.0 - score) / max(len(before) - 1, 1)
-    scores = {name: max(rival, others) for name, rival in detected.detection.rivals} | {detected.class_name: score}
+    scores = {name: max(alternative, others) for name, alternative in detected.detection.alternatives} | {
+        detected.class_name: score
+    }
     raw = {name: p * scores.get(name, others) for name, p in before.items()}
     total = sum(raw.values())
     return MappingProxyType({name: max(value / total, 1e-3) for name, value in raw.items()})
 
 
 def _evidence(detected: Detection3D) -> float:
-    """How much likelier a detection is of a thing than of nothing.
+    """How much likelier a detection is of an object than of nothing.
 
     Scores are taken for the shares of detections that are right, as they are about (docs/finding-things.md).
     """

@@ -1,1 +1,1 @@
-"""Putting a held thing down on a surface."""
+"""Putting a held object down on a surface."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from skills.api import Surface
-from skills.geometry import inside_polygon
+from skills.geometry import grid_inside
 from skills.perception.surface_segmentation import SurfaceView
 from skills.robot import FloatArray
 
@@ -18,18 +18,14 @@ _GRID_M = 0.04
 
 def spots(surface: Surface) -> FloatArray:
     """Points (N, 2) of a surface at least EDGE_M from its edges, or its middle when it is small."""
-    corners = np.asarray(surface.polygon_W, dtype=float)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    axes = np.meshgrid(np.arange(low[0], high[0], _GRID_M), np.arange(low[1], high[1], _GRID_M))
-    grid = np.stack(axes, axis=-1).reshape(-1, 2)
-    kept = grid[inside_polygon(grid, surface.polygon_W, -EDGE_M)]
-    return kept if len(kept) else np.asarray([corners.mean(axis=0)])
+    kept = grid_inside(surface.polygon_W, _GRID_M, margin_m=-EDGE_M)
+    return kept if len(kept) else np.asarray([np.mean(surface.polygon_W, axis=0)])
 
 
 def free_spots(view: SurfaceView, candidates: FloatArray, avoid_W: Sequence[FloatArray] = ()) -> FloatArray:
     """Candidates (N, 2) around which the surface is seen, with nothing on it within CLEARANCE_M.
 
-    `avoid_W` holds more points (M, 2) of things that stand there.
+    `avoid_W` holds more points (M, 2) of objects that stand there.
     """
     if len(candidates) == 0 or len(view.plane_points) == 0:
         return np.empty((0, 2))

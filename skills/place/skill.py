@@ -1,4 +1,4 @@
-"""The place skill: find a free spot on a surface, lower the thing until it stands, let go, look whether it is there."""
+"""The place skill: find a free spot on a surface, lower the object until it stands, let go, check that it is there."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import COMFORTABLE_M, free_places
-from skills.arm.arm_skill import JAW_FORCE_N, ArmSkill
+from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene
 from skills.arm.poses import look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.geometry import wrap
+from skills.grasp.candidates import hand_rotation
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import free_spots, spots
@@ -36,7 +37,7 @@ _TIPS_BEYOND_M = 0.03
 
 @dataclass(frozen=True)
 class PlaceInputs:
-    """Where to put the thing down."""
+    """Where to put the object down."""
 
     surface: Surface
 
@@ -54,7 +55,7 @@ class PlaceOptions:
 
 
 class Place(ArmSkill[PlaceInputs]):
-    """Goes nearer when no spot is within reach. Ends with the jaw empty and the arm stowed."""
+    """Goes nearer when no spot is within reach. Ends with the gripper empty and the arm stowed."""
 
     name = "place"
     Inputs = PlaceInputs
@@ -64,21 +65,21 @@ class Place(ArmSkill[PlaceInputs]):
         Cause.PRECONDITION: "nothing is held",
         Cause.PLANNING: "no free spot is seen within reach, or the arm finds no way to it",
         Cause.EXECUTION: "the robot or its arm did not get there",
-        Cause.POSTCONDITION: "the thing is not seen where it was put down, or is still in the jaw",
+        Cause.POSTCONDITION: "the object is not seen where it was put down, or is still in the gripper",
     }
     default_timeout_s = 150.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
     changes_world = True
 
     def undone(self, inputs: PlaceInputs) -> str | None:
-        """The jaw tells."""
-        return "the thing is still in the jaw" if self.context.robot.gripper().holding else None
+        """The gripper tells."""
+        return "the object is still in the gripper" if self.context.robot.gripper().holding else None
 
     def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
         """Go near, look, put down, look again."""
         surface = inputs.surface
         if not self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the jaw to put down")
+            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
         carried = self._carried()
         yield from self._go_near(surface)
         view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
@@ -89,29 +90,29 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self._let_go()
         yield from self._check(surface, spot_W)
         yield from self.stow()
-        return Succeeded(f"put the thing down on the {surface.name}")
+        return Succeeded(f"put the object down on the {surface.name}")
 
     def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
-        """With an empty jaw: draw the hand back, and look whether the thing stands where it was to be put."""
+        """With an empty gripper: draw the hand back, and look whether the object stands where it was to be put."""
         surface = inputs.surface
-        yield from self.pause(_FEEL_S, "feeling what the jaw holds")
+        yield from self.pause(_FEEL_S, "feeling what the gripper holds")
         spot = self.checkpoint.get("spot_W")
         spot_W = None if spot is None else np.array([*spot, surface.height_m])
         over_spot = spot_W is not None and self.hand_near(spot_W, _OVER_SPOT_M)
         if self.context.robot.gripper().holding:
             if over_spot:
-                yield from self.try_shift_hand(np.array([0.0, 0.0, _SURELY_FREE_M]), "lifting the thing again")
+                yield from self.try_shift_hand(np.array([0.0, 0.0, _SURELY_FREE_M]), "lifting the object again")
             return (yield from self.run(inputs))
         if spot_W is None:
-            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the jaw, and it was not yet over its place")
+            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper, and it was not yet over its place")
         if over_spot:
             yield from self._let_go()
         yield from self._check(surface, spot_W[:2])
         yield from self.stow()
-        return Succeeded(f"the thing stood on the {surface.name} already")
+        return Succeeded(f"the object stood on the {surface.name} already")
 
     def _carried(self) -> RotationMatrix:
-        """How the hand was turned as the thing was brought, which an attempt that was broken off has noted."""
+        """How the hand was turned as the object was brought, which an attempt that was broken off has noted."""
         noted = self.checkpoint.get("carried")
         rotation = self.model.X_BH(self.q_rad()).rotation() if noted is None else RotationMatrix(np.array(noted))
         self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
@@ -132,7 +133,7 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))
 
     def _look(self, surface: Surface, spot_W: FloatArray) -> Routine[SurfaceView]:
-        """A picture of the surface; the thing in the jaw hides its lower half, so the camera looks low."""
+        """A picture of the surface; the object in the gripper hides its lower half, so the camera looks low."""
         message = f"looking for a free spot on the {surface.name}"
         X_WB = self.X_WB()
         self.boxes = surface_boxes([surface], X_WB)
@@ -155,7 +156,7 @@ class Place(ArmSkill[PlaceInputs]):
         return view
 
     def _go_above(self, surface: Surface, view: SurfaceView, carried: RotationMatrix) -> Routine[FloatArray]:
-        """Bring the thing above the best free spot; gives the joint angles that the arm is to have there."""
+        """Bring the object above the best free spot; gives the joint angles that the arm is to have there."""
         X_WB = self.X_WB()
         free = free_spots(view, spots(surface))
         if len(free) == 0:
@@ -164,16 +165,16 @@ class Place(ArmSkill[PlaceInputs]):
         tops = [X_BW @ np.array([x, y, view.plane.height_m + ABOVE_M]) for x, y in _by_distance(free, X_WB)]
         self.boxes = [*surface_boxes([surface], X_WB), *cluster_boxes(view.clusters, X_WB)]
         goal = above_goal(tops, carried, self.gripper, self.context.stack.arm_planner)
-        return (yield from self.move_to(goal, f"bringing the thing over the {surface.name}", speed_rad_s=0.8))
+        return (yield from self.move_to(goal, f"bringing the object over the {surface.name}", speed_rad_s=0.8))
 
     def _lower(self, surface: Surface, q_above_rad: FloatArray) -> Routine[None]:
         """Go down in small steps until the arm is held up, by contact, or the height is that of the surface.
 
         The way down begins at the angles for which it was found to be possible, and not at those that the arm has: they
         differ a little, and near a singular posture that may make the difference between a way and none.
-        After contact the arm no longer presses, or it would dip onto the surface as the jaw lets go.
+        After contact the arm no longer presses, or it would dip onto the surface as the gripper lets go.
         """
-        message = f"putting the thing down on the {surface.name}"
+        message = f"putting the object down on the {surface.name}"
         p_BH = self.model.X_BH(q_above_rad).translation() - [0.0, 0.0, ABOVE_M - _SURELY_FREE_M]
         yield from self.move_straight(p_BH, message, q_from_rad=q_above_rad)
         q_wanted = self.q_rad()
@@ -195,34 +196,30 @@ class Place(ArmSkill[PlaceInputs]):
 
     def _let_go(self) -> Routine[None]:
         """Open, and draw the hand back along its fingers."""
-        yield from self.move_gripper(0.75 * self.open_rad, JAW_FORCE_N, "letting go")
+        yield from self.move_gripper(0.75 * self.open_rad, GRIPPER_FORCE_N, "letting go")
         yield from self.pause(0.3, "letting go")
         fingers = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
-        try:
-            yield from self.shift_hand(-0.16 * fingers, "drawing the hand back")
-        except SkillFailure as failure:
-            if failure.cause is not Cause.PLANNING:
-                raise
+        if not (yield from self.try_shift_hand(-0.16 * fingers, "drawing the hand back")):
             yield from self.shift_hand(-0.08 * fingers, "drawing the hand back")
 
     def _check(self, surface: Surface, spot_W: FloatArray) -> Routine[None]:
-        """Raise SkillFailure with cause POSTCONDITION unless something stands where the thing was put."""
+        """Raise SkillFailure with cause POSTCONDITION unless something stands where the object was put."""
         if self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.POSTCONDITION, "the thing is still in the jaw")
+            raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
         self.boxes = surface_boxes([surface], self.X_WB())
         view = yield from self._look(surface, spot_W)
         off = [float(np.min(np.linalg.norm(c.points.p_W[:, :2] - spot_W, axis=1))) for c in view.clusters]
         if not off or min(off) > self.options.seen_again_m:
             yield from self.try_stow()
             raise SkillFailure(
-                Cause.POSTCONDITION, f"the thing is not seen on the {surface.name} where it was put down"
+                Cause.POSTCONDITION, f"the object is not seen on the {surface.name} where it was put down"
             )
 
     def _hand_z(self) -> float:
         return float(self.model.X_BH(self.q_rad()).translation()[2])
 
     def _below_hand_m(self) -> float:
-        """Height in B of the thing's middle as it is held."""
+        """Height in B of the object's middle as it is held."""
         return float((self.model.X_BH(self.q_rad()) @ self.p_HT)[2])
 
     def _below_hand_W(self) -> FloatArray:
@@ -233,9 +230,9 @@ class Place(ArmSkill[PlaceInputs]):
 def above_goal(
     tops_B: list[FloatArray], carried: RotationMatrix, gripper: GripperCapabilities, planner: ArmPlanner
 ) -> Callable[[ArmScene, FloatArray], FloatArray]:
-    """A goal with the thing above the first of some points that the arm can reach, tilted as fits how it is held.
+    """A goal with the object above the first of some points that the arm can reach, tilted as fits how it is held.
 
-    A thing taken from the side (jaw closing level) keeps its tilt; one taken from above is held below the hand again.
+    An object taken from the side (fingers closing level) keeps its tilt; one taken from above hangs below the hand.
     """
     side = abs(carried.matrix()[2, 2]) < 0.5
     ahead_m = gripper.grip_x_m if side else gripper.tip_x_m - _TIPS_BEYOND_M
@@ -272,16 +269,9 @@ def _side(carried: RotationMatrix, azimuth: float) -> list[RotationMatrix]:
 
 
 def _from_above(azimuth: float) -> list[RotationMatrix]:
-    """Fingers down, or as far down as may be; the jaw closes level."""
-    rotations = []
-    for tilt in np.radians([90.0, 75.0, 60.0, 45.0]):
-        x_axis = np.array([np.cos(tilt) * np.cos(azimuth), np.cos(tilt) * np.sin(azimuth), -np.sin(tilt)])
-        for z_axis in (
-            np.array([-np.sin(azimuth), np.cos(azimuth), 0]),
-            np.array([np.sin(azimuth), -np.cos(azimuth), 0]),
-        ):
-            rotations.append(RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1)))
-    return rotations
+    """Fingers down, or as far down as may be; the gripper closes level."""
+    tilts = np.radians([90.0, 75.0, 60.0, 45.0])
+    return [hand_rotation(tilt, azimuth, side) for tilt in tilts for side in (1.0, -1.0)]
 
 
 def _nearest_spot(surface: Surface, X_WB: RigidTransform) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The stow skill: the arm folded onto the body, or, with a thing in the jaw, the thing held near the body."""
+"""The stow skill: the arm folded onto the body, or, with an object in the gripper, the object held near the body."""
 
 from __future__ import annotations
 
@@ -47,4 +47,4 @@ class Stow(ArmSkill[StowInputs]):
             yield from self.move_to(
                 lambda scene, q: carry_configuration(scene, rotation, q), "drawing in the arm", speed_rad_s=0.9
             )
-        return Succeeded("the thing is held near the body")
+        return Succeeded("the object is held near the body")

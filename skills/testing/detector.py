@@ -18,7 +18,7 @@ _FEWEST_PIXELS = 6
 
 @dataclass(frozen=True)
 class PlainColours:
-    """Takes every patch of just the colour of a class for a thing of that class; red cans for cokes, unless said."""
+    """Takes every patch of just the colour of a class for an object of that class; red cans for cokes, unless said."""
 
     colours: Mapping[str, Colour] = field(default_factory=lambda: MappingProxyType({"coke": TABLE_CAN.colour}))
     score: float = 0.9

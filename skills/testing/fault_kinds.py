@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.robot import CommandState, CommandStatus, Robot
+from skills.robot import CommandState, CommandStatus, Image, Robot
 
 THIEF: Final = "the tablet"
 """Who takes the lease in "lease taken"."""
@@ -26,7 +26,7 @@ SENSE_VERBS: Final = ("odometry", "imu", "scan", "image", "joints", "gripper", "
 MOTION_VERBS: Final = ("drive", "stand", "sit", "move_arm", "set_gripper")
 
 _OTHER_WORDS: Final[Mapping[str, str]] = MappingProxyType(
-    {"camera": "image", "lidar": "scan", "arm": "move_arm", "jaw": "set_gripper", "base": "drive", "body": "stand"}
+    {"camera": "image", "lidar": "scan", "arm": "move_arm", "base": "drive", "body": "stand"}
 )
 
 
@@ -85,7 +85,8 @@ def verb_of(word: str) -> str:
 
 
 def _among(match: re.Match[str], verbs: tuple[str, ...]) -> frozenset[str]:
-    verb = verb_of(match["verb"])
+    closes = match["verb"] == "gripper" and "set_gripper" in verbs
+    verb = "set_gripper" if closes else verb_of(match["verb"])
     if verb not in verbs:
         raise ValueError(f"'{match['verb']}' cannot do that; those that can are {', '.join(verbs)}")
     return frozenset((verb,))
@@ -114,7 +115,7 @@ def _raises(match: re.Match[str]) -> Effect:
 
 
 def _refuses(match: re.Match[str]) -> Effect:
-    return _answered(match, CommandStatus(CommandState.REFUSED, f"{verb_of(match['verb'])} is out of order"))
+    return _answered(match, CommandStatus(CommandState.REFUSED, f"{match['verb']} is out of order"))
 
 
 def _never_ends(match: re.Match[str]) -> Effect:
@@ -139,36 +140,32 @@ def _answered(match: re.Match[str], status: CommandStatus) -> Effect:
     return Effect(_among(match, MOTION_VERBS), act, always=frozenset(("command_status",)))
 
 
+def _reads(verb: str, change: Callable[[Any], Any]) -> Effect:
+    """The verb's answers are changed."""
+    return Effect(frozenset((verb,)), lambda call: change(call.proceed()))
+
+
 def _gripper(match: re.Match[str]) -> Effect:
     holding = match["what"] != "nothing"
-
-    def act(call: Call) -> Any:
-        return dataclasses.replace(call.proceed(), holding=holding, force_n=20.0 if holding else 0.0)
-
-    return Effect(frozenset(("gripper",)), act)
+    return _reads("gripper", lambda reading: replace(reading, holding=holding, force_n=20.0 * holding))
 
 
 def _no_depth(match: re.Match[str]) -> Effect:
     value = np.nan if match["what"].lower() == "nan" else 0.0
-
-    def act(call: Call) -> Any:
-        image = call.proceed()
-        return dataclasses.replace(image, depth_m=np.full_like(image.depth_m, value))
-
-    return Effect(frozenset(("image",)), act)
+    return _reads("image", lambda image: replace(image, depth_m=np.full_like(image.depth_m, value)))
 
 
 def _black(_: re.Match[str]) -> Effect:
-    def act(call: Call) -> Any:
-        image = call.proceed()
+    def blackened(image: Image) -> Image:
+        """The picture without light."""
         colour = None if image.colour is None else np.zeros_like(image.colour)
-        return dataclasses.replace(image, colour=colour, grey=np.zeros_like(image.grey))
+        return replace(image, colour=colour, grey=np.zeros_like(image.grey))
 
-    return Effect(frozenset(("image",)), act)
+    return _reads("image", blackened)
 
 
 def _missing(_: re.Match[str]) -> Effect:
-    return Effect(frozenset(("scan",)), lambda call: None)
+    return _reads("scan", lambda scan: None)
 
 
 def _garbage(match: re.Match[str]) -> Effect:
@@ -178,12 +175,10 @@ def _garbage(match: re.Match[str]) -> Effect:
 
 def _spoiled(reading: Any) -> Any:
     """The reading with every float that is not its stamp made NaN."""
-    changes: dict[str, Any] = {}
-    for each in dataclasses.fields(reading) if dataclasses.is_dataclass(reading) else ():
-        value = getattr(reading, each.name)
-        if each.name != "stamp_s":
-            changes[each.name] = _nan_like(value)
-    return dataclasses.replace(reading, **changes) if changes else reading
+    if not dataclasses.is_dataclass(reading) or isinstance(reading, type):
+        return reading
+    names = (each.name for each in dataclasses.fields(reading) if each.name != "stamp_s")
+    return replace(reading, **{name: _nan_like(getattr(reading, name)) for name in names})
 
 
 def _nan_like(value: Any) -> Any:
@@ -200,25 +195,15 @@ def _nan_like(value: Any) -> Any:
 
 def _jumps(match: re.Match[str]) -> Effect:
     ahead = RigidTransform(np.array([float(match["metres"]), 0.0, 0.0]))
-
-    def act(call: Call) -> Any:
-        reading = call.proceed()
-        return dataclasses.replace(reading, X_OB=reading.X_OB @ ahead)
-
-    return Effect(frozenset(("odometry",)), act)
+    return _reads("odometry", lambda reading: replace(reading, X_OB=reading.X_OB @ ahead))
 
 
 def _battery(match: re.Match[str]) -> Effect:
-    charge = float(match["percent"]) / 100.0
-
-    def act(call: Call) -> Any:
-        return dataclasses.replace(call.proceed(), charge=charge)
-
-    return Effect(frozenset(("battery",)), act)
+    return _reads("battery", lambda reading: replace(reading, charge=float(match["percent"]) / 100.0))
 
 
 def _reports(match: re.Match[str]) -> Effect:
-    return Effect(frozenset(("faults",)), lambda call: (*call.proceed(), match["fault"]))
+    return _reads("faults", lambda faults: (*faults, match["fault"]))
 
 
 def _lease(_: re.Match[str]) -> Effect:

@@ -40,8 +40,7 @@ class Fault:
 def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> Fault:
     """The fault of these words.
 
-    Raises:
-        ValueError: no kind has such words, or they name something that the robot does not have; with the mend.
+    Raises ValueError: no kind has such words, or they name something that the robot does not have; with the mend.
     """
     when = _WHEN.fullmatch(" ".join(words.split()))
     what = words if when is None else when["what"]
@@ -92,10 +91,14 @@ class FaultyRobot:
         if name not in VERBS:
             return value
 
+        bind = inspect.signature(value).bind
+
         def faulty(*arguments: Any, **options: Any) -> Any:
-            given = tuple(inspect.signature(value).bind(*arguments, **options).arguments.values())
+            """The verb as the faults let it happen."""
+            given = tuple(bind(*arguments, **options).arguments.values())
             return self._call(name, lambda: value(*arguments, **options), given)
 
+        self.__dict__[name] = faulty
         return faulty
 
     def _call(self, verb: str, proceed: Callable[[], Any], arguments: tuple[Any, ...]) -> Any:

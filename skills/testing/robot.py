@@ -1,4 +1,4 @@
-"""A robot without dynamics that keeps the whole Robot protocol: expiry, lease, limits, LiDAR, depth, an arm, a jaw."""
+"""A robot without dynamics that keeps the whole Robot protocol: expiry, lease, limits, LiDAR, depth, arm, gripper."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from skills.testing.sensing import FRONT_CAMERAS, mount_of, picture, sweep
 _ACCELERATION_M_S2 = 2.5
 _BRAKING_M_S2 = 8.0
 _RISE_M_S = 0.4
-_JAW_RAD_S = 3.0
+_GRIPPER_RAD_S = 3.0
 _ARM_RAD_S = 4.0
 _SCAN_PERIOD_S = 0.1
 _TRAJECTORY_START_RAD = 0.25
@@ -63,15 +63,15 @@ BASE_ONLY = Capabilities(
 
 @dataclass(frozen=True)
 class Start:
-    """How the robot begins: its true pose in the world, arm angles (stowed unless said), jaw, charge.
+    """How the robot begins: its true pose in the world, arm angles (stowed unless said), gripper, charge.
 
-    `in_jaw_rad` is the jaw's opening about what lies between its fingers: closing stops there and holds it. None means
-    that there is nothing. `holding` begins with the jaw closed about it. A `docked` robot charges.
+    `in_gripper_rad` is the opening at which a closing gripper meets what lies between its fingers (None: nothing).
+    `holding` begins with the gripper closed about it. A `docked` robot charges.
     """
 
     pose: Pose2D = field(default_factory=lambda: Pose2D(0.0, 0.0, 0.0))
     arm_rad: tuple[float, ...] | None = None
-    in_jaw_rad: float | None = None
+    in_gripper_rad: float | None = None
     holding: bool = False
     charge: float = 0.9
     docked: bool = False
@@ -103,9 +103,9 @@ class ScriptedRobot:
         self.odometry_scale, self.yaw_drift_rad_per_m = 1.0, 0.0
         self.height_m, self.pitch_rad = capabilities.standing_height_m, 0.0
         self.q_rad = self._first_angles(start)
-        self.opening_rad = (start.in_jaw_rad or 0.3) if start.holding else 0.0
-        self.in_jaw_rad = self.opening_rad if start.holding else start.in_jaw_rad
-        self.jaw_force_n = 20.0 if start.holding else 0.0
+        self.opening_rad = (start.in_gripper_rad or 0.3) if start.holding else 0.0
+        self.in_gripper_rad = self.opening_rad if start.holding else start.in_gripper_rad
+        self.clamp_force_n = 20.0 if start.holding else 0.0
         self.held: Block | None = can_at(0.0, 0.0, 0.0) if start.holding else None
         self._hangs_down_m = 0.057  # of what is held, below the fingers' middle
         self.charge, self.docked = start.charge, start.docked
@@ -137,8 +137,9 @@ class ScriptedRobot:
 
     @property
     def holding(self) -> bool:
-        """Whether the jaw is closed about something."""
-        return self.in_jaw_rad is not None and self.jaw_force_n > 0.0 and self.opening_rad <= self.in_jaw_rad + 0.02
+        """Whether the gripper is closed about something."""
+        met_rad = self.in_gripper_rad
+        return met_rad is not None and self.clamp_force_n > 0.0 and self.opening_rad <= met_rad + 0.02
 
     def capabilities(self) -> Capabilities:
         """What the robot is and can do."""
@@ -166,9 +167,10 @@ class ScriptedRobot:
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Take a picture with depth now, whichever is asked for. Raises ValueError for an unknown source."""
         self.calls.append("image")
-        camera = next((each for each in self._capabilities.cameras if each.source == source), None)
+        cameras = {each.source: each for each in self._capabilities.cameras}
+        camera = cameras.get(source)
         if camera is None:
-            raise ValueError(f"{self._name} has no camera '{source}'; it has {self._capabilities.camera_sources}")
+            raise ValueError(f"{self._name} has no camera '{source}'; it has {', '.join(cameras)}")
         mount = mount_of(camera)
         X_BF = self.arm.X_BH(self.q_rad) if mount.frame == "hand" else RigidTransform()
         edges = {"body": ("odom", self._X_OB())}
@@ -188,7 +190,7 @@ class ScriptedRobot:
     def gripper(self) -> Gripper:
         """Latest gripper state."""
         self.calls.append("gripper")
-        return Gripper(self._clock.now(), self.opening_rad, self.jaw_force_n if self.holding else 0.0, self.holding)
+        return Gripper(self._clock.now(), self.opening_rad, self.clamp_force_n if self.holding else 0.0, self.holding)
 
     def battery(self) -> Battery:
         """Latest battery state."""
@@ -231,12 +233,12 @@ class ScriptedRobot:
         return "" if near else "the trajectory does not begin where the arm is"
 
     def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the jaw; it stops where something lies between its fingers."""
+        """Move the gripper; it stops where something lies between its fingers."""
         fault = "" if self._capabilities.gripper is not None else "there is no gripper"
         return self._begin("set_gripper", (opening_rad, force_n), until_s, lease, fault)
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
-        """Stop all motion, or only the given command; the jaw keeps its force."""
+        """Stop all motion, or only the given command; the gripper keeps its force."""
         self.calls.append("stop")
         if lease != self._lease:
             return self._commands.note(CommandStatus(CommandState.REFUSED, "the lease was taken away"))
@@ -278,9 +280,9 @@ class ScriptedRobot:
         driving = ("drive",) if float(np.max(np.abs(self.velocity))) > 0.01 else ()
         return (*driving, *(part for part in self._commands.moving_parts if part != "drive"))
 
-    def put_in_jaw(self, opening_rad: float | None) -> None:
-        """From now on closing the jaw stops at this opening and holds something; None takes it away."""
-        self.in_jaw_rad = opening_rad
+    def put_in_gripper(self, opening_rad: float | None) -> None:
+        """From now on closing the gripper stops at this opening and holds something; None takes it away."""
+        self.in_gripper_rad = opening_rad
 
     def _begin(
         self, part: str, goal: object, until_s: float, lease: Lease, fault: str, *, verb: str | None = None
@@ -306,7 +308,7 @@ class ScriptedRobot:
         self._move_base(dt_s)
         self._move_body(dt_s)
         self._move_arm()
-        self._move_jaw(dt_s)
+        self._move_gripper(dt_s)
         used = -dt_s / _CHARGING_S if self.docked else dt_s / _BATTERY_RUNTIME_S
         self.charge = min(1.0, max(0.0, self.charge - used))
 
@@ -349,17 +351,17 @@ class ScriptedRobot:
         if t >= times[-1]:
             self._commands.finish("move_arm", CommandState.DONE)
 
-    def _move_jaw(self, dt_s: float) -> None:
+    def _move_gripper(self, dt_s: float) -> None:
         active = self._commands.active("set_gripper")
         if active is None:
             return
-        opening_rad, self.jaw_force_n = active.goal
-        if opening_rad < self.opening_rad and self.in_jaw_rad is None:
+        opening_rad, self.clamp_force_n = active.goal
+        if opening_rad < self.opening_rad and self.in_gripper_rad is None:
             self._feel()
-        if self.held is not None and self.in_jaw_rad is not None and opening_rad > self.in_jaw_rad + 0.02:
+        if self.held is not None and self.in_gripper_rad is not None and opening_rad > self.in_gripper_rad + 0.02:
             self._let_go(self.held)
-        before, least = self.opening_rad, self.in_jaw_rad
-        most = _JAW_RAD_S * dt_s
+        before, least = self.opening_rad, self.in_gripper_rad
+        most = _GRIPPER_RAD_S * dt_s
         self.opening_rad += max(-most, min(most, opening_rad - self.opening_rad))
         met = least is not None and before >= least > self.opening_rad
         if met and least is not None:
@@ -373,22 +375,22 @@ class ScriptedRobot:
         return np.asarray(self._X_WB() @ self.arm.X_BH(self.q_rad) @ np.array([grip_m, 0.0, 0.0]))
 
     def _feel(self) -> None:
-        """A closing jaw takes the loose block between its fingers, if there is one."""
+        """A closing gripper takes the loose block between its fingers, if there is one."""
         gripper = self._capabilities.gripper
         place_W = self._between_fingers_W()
         taken = next((b for b in self.blocks if b.loose and b.holds(place_W, _FINGER_M)), None)
         if taken is None or gripper is None:
             return
         width_m = min(taken.x1 - taken.x0, taken.y1 - taken.y0)
-        self.in_jaw_rad = gripper.open_rad * min(1.0, width_m / gripper.max_opening_m)
+        self.in_gripper_rad = gripper.open_rad * min(1.0, width_m / gripper.max_opening_m)
         self.held, self._hangs_down_m = taken, float(place_W[2]) - taken.z0
         self.blocks.remove(taken)
 
     def _let_go(self, held: Block) -> None:
-        """An opening jaw lets what it held stand on whatever is below."""
+        """An opening gripper lets what it held stand on whatever is below."""
         x, y, z = (float(v) for v in self._between_fingers_W())
         self.blocks.append(held.standing_at(x, y, z - self._below_fingers_m()))
-        self.held = self.in_jaw_rad = None
+        self.held = self.in_gripper_rad = None
 
     def _below_fingers_m(self) -> float:
         """How high the fingers' middle is above the top, or the floor, below it."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.robot import CameraCapabilities, FloatArray, FrameTree, Image, Intrinsics, Scan
+from skills.robot import CameraCapabilities, FloatArray, FrameTree, Image, Intrinsics, Scan, unit_rays
 from skills.testing.blocks import Block, block_array, cast_rays, colours_of
 
 X_BL = RigidTransform(np.array([-0.2, 0.0, 0.4]))
@@ -57,8 +57,7 @@ def sweep(
     """A LiDAR revolution at the true pose X_WB."""
     around = np.linspace(-math.pi, math.pi, azimuths, endpoint=False)
     X_WL = X_WB @ X_BL
-    e, a = ELEVATIONS_RAD[:, None], around[None, :]
-    rays = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e) + 0.0 * a], axis=-1).reshape(-1, 3)
+    rays = unit_rays(ELEVATIONS_RAD, around).reshape(-1, 3)
     rays_W = np.ascontiguousarray(rays @ X_WL.rotation().matrix().T)
     ranges, _ = cast_rays(X_WL.translation(), rays_W, block_array(blocks), SCAN_LIMIT_M)
     ranges = ranges + noise_m * rng.standard_normal(ranges.shape)

@@ -19,7 +19,7 @@ from pydrake.math import RigidTransform
 from executive.cli.assembly import shared_detector
 from skills.api import Detection, LocalisationEstimate
 from skills.detection import box_overlap
-from skills.perception.detection_3d import sightings
+from skills.perception.detection_3d import detections_3d
 from tests.benchmarks.position_scenes import Shot, Truth, counts, load, shots
 
 Boxes = Callable[[Shot], tuple[Detection, ...]]
@@ -52,7 +52,7 @@ def misses(shot: Shot, boxes: Boxes) -> Iterator[Miss]:
     """Of each thing that counts and has a box of its class, how far off it is."""
     found = boxes(shot)
     X_OC = shot.image.frames.pose(shot.image.camera_frame)
-    placed = {id(each.detection): each for each in sightings(shot.image, HERE, found, ())}
+    placed = {id(each.detection): each for each in detections_3d(shot.image, HERE, found, ())}
     for truth in filter(counts, shot.truths):
         box = next((each for each in found if _same(each, truth.detection)), None)
         if box is None:

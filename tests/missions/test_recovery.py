@@ -96,8 +96,8 @@ def test_a_blocked_doorway_is_gone_around(tmp_path):
     assert verdict.collisions == 0
 
 
-class WeakJaw:
-    """A robot whose jaw closes too weakly at first."""
+class WeakGripper:
+    """A robot whose gripper closes too weakly at first."""
 
     def __init__(self, robot, weak_times, force_n):
         self._robot, self._left, self._force_n = robot, weak_times, force_n
@@ -114,7 +114,7 @@ class WeakJaw:
 
 def test_a_thing_that_slips_is_taken_again():
     mission = Mission(FETCH)
-    robot = WeakJaw(mission.entry.robot, weak_times=1, force_n=1.0)
+    robot = WeakGripper(mission.entry.robot, weak_times=1, force_n=1.0)
     result, verdict = mission.run(robot)
     honest(result, verdict)
     assert mission.ended("1-kitchen/grasp") == ["FAILURE", "SUCCESS"]

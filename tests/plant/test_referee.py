@@ -11,8 +11,8 @@ from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, Multibod
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.referee import Promise, PromiseKind, Referee, Region
-from plant.referee.cast import Kind
+from plant.referee import GoalCondition, GoalKind, Referee, Region
+from plant.referee.entities import Kind
 
 FRICTION = CoulombFriction(0.8, 0.8)
 HALF = 0.03  # half a side of the objects, which are cubes
@@ -125,13 +125,13 @@ class Stage:
             self.put(name, start - (0, 0, 4.905 * t * t)).watch(0.05)
         return self.put(name, end).watch(0.6)
 
-    def holds(self, *promises):
-        return self.referee.judge(promises).success
+    def holds(self, *conditions):
+        return self.referee.judge(conditions).success
 
 
-GRASPED = Promise(PromiseKind.GRASPED, ("coke", "beer"), source=(TABLE,))
-HANDED = Promise(PromiseKind.HANDED_OVER, ("coke",), person="robin")
-PLACED = Promise(PromiseKind.PLACED, ("coke",), goal=(SHELF,))
+GRASPED = GoalCondition(GoalKind.GRASPED, ("coke", "beer"), source=(TABLE,))
+HANDED = GoalCondition(GoalKind.HANDED_OVER, ("coke",), person="robin")
+PLACED = GoalCondition(GoalKind.PLACED, ("coke",), goal=(SHELF,))
 AT_ROBIN = (0.0, 2.4, 0.9)
 ON_SHELF = (-1.5, 0.3, TABLE_Z + HALF - TOUCH)
 
@@ -178,7 +178,7 @@ def test_object_that_passes_the_gripper_in_flight_is_not_grasped():
 
 
 def test_object_from_elsewhere_or_of_another_class_is_not_grasped():
-    hammer = Promise(PromiseKind.GRASPED, ("hammer",), source=(TABLE,))
+    hammer = GoalCondition(GoalKind.GRASPED, ("hammer",), source=(TABLE,))
     stage = Stage().lift("hammer", (-1.5, 0, TABLE_Z + HALF - TOUCH))
     assert not stage.holds(hammer)
     assert not stage.holds(GRASPED)
@@ -252,7 +252,7 @@ def test_still_in_the_gripper_is_not_placed():
 
 
 def test_what_lies_there_from_the_start_is_not_placed():
-    there = Promise(PromiseKind.PLACED, ("hammer",), goal=(SHELF,))
+    there = GoalCondition(GoalKind.PLACED, ("hammer",), goal=(SHELF,))
     assert not Stage().watch().holds(there)
 
 
@@ -265,7 +265,7 @@ def test_placed_on_the_wrong_surface_is_said():
 
 def test_placed_earlier_and_then_taken_again_still_counts_in_a_sequence():
     stage = placed_stage().let_go().watch().lift("coke", ON_SHELF)
-    again = Promise(PromiseKind.GRASPED, ("coke",), source=(SHELF,))
+    again = GoalCondition(GoalKind.GRASPED, ("coke",), source=(SHELF,))
     assert stage.holds(PLACED, again)
     assert not stage.holds(PLACED)
 
@@ -345,7 +345,7 @@ def test_robot_links_that_touch_each_other_do_not_collide():
 def test_went_is_judged_where_the_body_is_at_the_end():
     kitchen, hall = square("kitchen", 2.0, -3.0), square("hall", -3.0, -3.0)
     stage = Stage()
-    to_kitchen, to_hall = (Promise(PromiseKind.WENT, goal=(place,), robot="alice") for place in (kitchen, hall))
+    to_kitchen, to_hall = (GoalCondition(GoalKind.WENT, goal=(place,), robot="alice") for place in (kitchen, hall))
     stage.put("body", (2.0, -3.0, 0.5)).watch()
     assert stage.holds(to_kitchen)
     assert not stage.holds(to_hall)
@@ -356,7 +356,7 @@ def test_went_is_judged_where_the_body_is_at_the_end():
 @pytest.mark.parametrize(("answer", "true_of"), [(True, TABLE), (False, SHELF)])
 def test_answer_is_compared_with_the_truth(answer, true_of):
     stage = Stage()
-    asked = Promise(PromiseKind.ANSWERED, ("coke",), source=(true_of,), answer=answer)
+    asked = GoalCondition(GoalKind.ANSWERED, ("coke",), source=(true_of,), answer=answer)
     assert stage.holds(asked)
     assert not stage.holds(dataclasses.replace(asked, answer=not answer))
     assert not stage.holds(dataclasses.replace(asked, answer=None))

@@ -11,12 +11,12 @@ from pydrake.multibody.tree import PdControllerGains, PrismaticJoint, SpatialIne
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.referee import Promise, PromiseKind, Referee, Region
+from plant.referee import GoalCondition, GoalKind, Referee, Region
 
 FRICTION = CoulombFriction(0.9, 0.9)
 TABLE = Region("the table", ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)), 0.7, 1.0)
-GRASPED = Promise(PromiseKind.GRASPED, ("coke",), source=(TABLE,))
-ON_TABLE = Promise(PromiseKind.ANSWERED, ("coke",), source=(TABLE,), answer=True)
+GRASPED = GoalCondition(GoalKind.GRASPED, ("coke",), source=(TABLE,))
+ON_TABLE = GoalCondition(GoalKind.ANSWERED, ("coke",), source=(TABLE,), answer=True)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def test_block_let_go_in_the_air_is_dropped_once():
 def test_block_set_down_and_let_go_is_not_dropped():
     press = Press().run(0.0, 0.12, 0.3).run(0.0, 0.07, 0.5).run(0.2, 0.07, 0.8).run(0.0, 0.07, 0.8)
     press.run(0.0, 0.14, 0.4).run(0.3, 0.14, 0.8)
-    placed = Promise(PromiseKind.PLACED, ("coke",), source=(TABLE,), goal=(TABLE,))
+    placed = GoalCondition(GoalKind.PLACED, ("coke",), source=(TABLE,), goal=(TABLE,))
     verdict = press.referee.judge([GRASPED, placed])
     assert verdict.success, verdict.why
     assert verdict.drops == 0

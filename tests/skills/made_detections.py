@@ -6,11 +6,11 @@ from skills.api import Detection
 from skills.perception.detection_3d import Detection3D
 
 
-def detected_3d(x=1.0, y=0.0, name="coke", score=0.9, eye=(0.0, 0.0, 1.0), sigma=0.01, stamp=1.0, rivals=()):
+def detected_3d(x=1.0, y=0.0, name="coke", score=0.9, eye=(0.0, 0.0, 1.0), sigma=0.01, stamp=1.0, alternatives=()):
     covariance = sigma**2 * np.eye(3)
     return Detection3D(
         stamp_s=stamp,
-        detection=Detection(name, score, (0.0, 0.0, 10.0, 10.0), rivals),
+        detection=Detection(name, score, (0.0, 0.0, 10.0, 10.0), alternatives),
         position_W=np.array([x, y, 0.8]),
         covariance=covariance,
         place_covariance=covariance,

@@ -129,7 +129,7 @@ class PlanarRobot:
         return self._scan
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        if source not in self.capabilities().camera_sources:
+        if source not in [each.source for each in self.capabilities().cameras]:
             raise ValueError(f"no camera {source!r}")
         self.images_taken += 1
         u, v = np.meshgrid(np.arange(LENS.width), np.arange(LENS.height))

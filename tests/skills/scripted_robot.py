@@ -36,7 +36,7 @@ LENS = Intrinsics(64, 48, 55.2, 55.2, 32.0, 24.0)
 
 @dataclass
 class ScriptedRobot:
-    """Commands are done one tick later; `arm_answers` and `jaw_stops_rad` script what goes wrong.
+    """Commands are done one tick later; `arm_answers` and `gripper_stops_rad` script what goes wrong.
 
     Pictures are dark and without depth unless there are `things` on a table (`table_scene`).
     """
@@ -47,7 +47,7 @@ class ScriptedRobot:
     q: Any = field(default_factory=lambda: MODEL.stowed_rad.copy())
     opening_rad: float = 0.0
     holding: bool = False
-    jaw_stops_rad: float = 0.0
+    gripper_stops_rad: float = 0.0
     scan_now: Any = None
     things: Any = None
     arm_answers: dict[int, CommandStatus] = field(default_factory=dict)
@@ -108,7 +108,7 @@ class ScriptedRobot:
         return self._note(CommandStatus(CommandState.RUNNING))
 
     def set_gripper(self, opening_rad, force_n, *, until_s, lease):
-        self.opening_rad = max(opening_rad, self.jaw_stops_rad)
+        self.opening_rad = max(opening_rad, self.gripper_stops_rad)
         self.holding = self.opening_rad > opening_rad
         return self._note(CommandStatus(CommandState.RUNNING))
 

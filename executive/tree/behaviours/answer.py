@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.tree.behaviours.board import Board
@@ -20,6 +20,7 @@ from skills.detect.words import counted
 ANSWER_TOPIC: Final = "answer"
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Answer(ExplainedDecorator):
     """Turns a search into a yes or a no.
 
@@ -30,29 +31,19 @@ class Answer(ExplainedDecorator):
     that `tells` repeats what was seen where.
 
     With `tallies` the child looks at all surfaces, and what its leaves saw, each under a blackboard key, is counted,
-    each thing once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
+    each object once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
     looked at, and else FAILURE as above.
     """
 
-    def __init__(
-        self,
-        *,
-        path_id: str,
-        name: str,
-        child: Behaviour,
-        question: str,
-        looks: Mapping[str, Sequence[str]],
-        key: str,
-        board: Board,
-        publish: Publish,
-        tells: bool = False,
-        tallies: Mapping[str, str] | None = None,
-        needed: int = 1,
-    ) -> None:
-        super().__init__(path_id=path_id, name=name, child=child)
-        self.answer: bool | None = None
-        self._question, self._looks, self._key, self._board = question, looks, key, board
-        self._publish, self._tells, self._tallies, self._needed = publish, tells, tallies or {}, needed
+    question: str
+    looks: Mapping[str, Sequence[str]]
+    key: str
+    board: Board
+    publish: Publish
+    tells: bool = False
+    tallies: Mapping[str, str] = field(default_factory=dict)
+    needed: int = 1
+    answer: bool | None = field(default=None, init=False)
 
     def initialise(self) -> None:
         """Forget an earlier answer."""
@@ -64,19 +55,19 @@ class Answer(ExplainedDecorator):
         if status == Status.RUNNING:
             return status
         nodes = {node.path_id: node for node in self.iterate() if isinstance(node, Explained)}
-        unseen = [surface for surface, leaves in self._looks.items() if not _looked(leaves, nodes)]
-        if self._tallies:
+        unseen = [surface for surface, leaves in self.looks.items() if not _looked(leaves, nodes)]
+        if self.tallies:
             return self._counted(nodes, unseen)
         if status == Status.FAILURE and unseen:
             return self._not_looked(nodes, unseen)
         answer = status == Status.SUCCESS
-        return self._answered(answer, self.message if answer and self._tells else "")
+        return self._answered(answer, self.message if answer and self.tells else "")
 
     def _counted(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
-        seen = [key for leaf, key in self._tallies.items() if leaf in nodes and nodes[leaf].status == Status.SUCCESS]
-        looks: list[tuple[ObjectObservation, ...]] = [self._board.get(key) for key in seen]
+        seen = [key for leaf, key in self.tallies.items() if leaf in nodes and nodes[leaf].status == Status.SUCCESS]
+        looks: list[tuple[ObjectObservation, ...]] = [self.board.get(key) for key in seen]
         found = told_apart(looks)
-        enough = len(found) >= self._needed
+        enough = len(found) >= self.needed
         if unseen and not enough:
             return self._not_looked(nodes, unseen)
         limits = f", as far as was seen: not {', '.join(unseen)}" if unseen else ""
@@ -87,10 +78,10 @@ class Answer(ExplainedDecorator):
 
     def _answered(self, answer: bool, found: str) -> Status:
         self.answer, self.cause = answer, None
-        self.message = f"{'yes' if answer else 'no'}: {self._question}" + (f"; {found}" if found else "")
-        self._board.put(self._key, answer)
-        told = {"node": self.path_id, "question": self._question, "answer": answer, "message": self.message}
-        self._publish(ANSWER_TOPIC, told)
+        self.message = f"{'yes' if answer else 'no'}: {self.question}" + (f"; {found}" if found else "")
+        self.board.put(self.key, answer)
+        told = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
+        self.publish(ANSWER_TOPIC, told)
         return Status.SUCCESS
 
 

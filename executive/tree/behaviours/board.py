@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 from skills.api import ObjectObservation, Surface
+from skills.geometry import compose
 from skills.robot import Pose2D
 
 
@@ -98,8 +98,8 @@ class BesideBoard(FromBoard):
 
 
 @dataclass(frozen=True)
-class SurfaceOfSighting(FromBoard):
-    """A port bound to the surface on which the thing under a blackboard key was seen; to all, when that is unknown."""
+class SurfaceOfDetection(FromBoard):
+    """A port bound to the surface on which the object under a blackboard key was seen; to all, when that is unknown."""
 
     gives: ClassVar[Any] = tuple[Surface, ...]
     surfaces: tuple[Surface, ...]
@@ -112,5 +112,4 @@ class SurfaceOfSighting(FromBoard):
 
 def beside(pose: Pose2D, forward_m: float, left_m: float) -> Pose2D:
     """The pose shifted along its own axes, turned the same way."""
-    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-    return Pose2D(pose.x_m + c * forward_m - s * left_m, pose.y_m + s * forward_m + c * left_m, pose.yaw_rad)
+    return compose(pose, Pose2D(forward_m, left_m, 0.0))

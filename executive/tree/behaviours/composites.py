@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Final, Protocol, runtime_checkable
+from typing import ClassVar, Final, Protocol, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Composite
 
-from executive.tree.behaviours.explained import Explained, cause_of, message_of
+from executive.tree.behaviours.explained import ExplainedNode, cause_of, message_of
 from executive.tree.node import NodeKind
 from skills.api import Cause
 
@@ -25,18 +26,18 @@ class Conditional(Protocol):
         """Whether there is any sense in ticking it now."""
 
 
-class MemoryComposite(Explained, Composite):
+@dataclass(kw_only=True, eq=False, repr=False)
+class MemoryComposite(ExplainedNode, Composite):
     """Ticks its children one after the other and never goes back to one that is done."""
 
-    goes_on_after: frozenset[Status]
+    goes_on_after: ClassVar[frozenset[Status]] = frozenset({Status.SUCCESS})
+    children: list[Behaviour]
+    _index: int = field(default=0, init=False)
 
-    def __init__(self, *, path_id: str, name: str, children: Sequence[Behaviour]) -> None:
-        if not children:
-            raise ValueError(f"{path_id}: a {type(self).__name__} needs at least one child")
-        super().__init__(name, list(children))
-        self.path_id = path_id
-        self._index = 0
-        self.clear_explanation()
+    def __post_init__(self) -> None:
+        if not self.children:
+            raise ValueError(f"{self.path_id}: a {type(self).__name__} needs at least one child")
+        Composite.__init__(self, self.name, list(self.children))
 
     def tick(self) -> Iterator[Behaviour]:
         """Tick the present child, and the next ones while they allow it."""
@@ -97,9 +98,8 @@ class MemorySequence(MemoryComposite):
     the next in the same tick; after the last: SUCCESS.
     """
 
-    goes_on_after = frozenset({Status.SUCCESS})
 
-
+@dataclass(kw_only=True, eq=False, repr=False)
 class MemorySelector(MemoryComposite):
     """One way after the other until one works.
 
@@ -110,18 +110,8 @@ class MemorySelector(MemoryComposite):
     """
 
     goes_on_after = frozenset({Status.FAILURE})
-
-    def __init__(
-        self,
-        *,
-        path_id: str,
-        name: str,
-        children: Sequence[Behaviour],
-        exhausted_cause: Cause | None = None,
-        exhausted_message: str = "",
-    ) -> None:
-        super().__init__(path_id=path_id, name=name, children=children)
-        self._exhausted_cause, self._exhausted_message = exhausted_cause, exhausted_message
+    exhausted_cause: Cause | None = None
+    exhausted_message: str = ""
 
     def _passes_over(self, child: Behaviour) -> bool:
         return child.status != Status.RUNNING and isinstance(child, Conditional) and not child.applies()
@@ -129,18 +119,18 @@ class MemorySelector(MemoryComposite):
     def _explanation(self, child: Behaviour) -> tuple[Cause, str]:
         failed = [one for one in self.children if one.status == Status.FAILURE]
         if not failed:
-            return self._exhausted_cause or Cause.PRECONDITION, self._exhausted_message or "nothing of it applies"
+            return self.exhausted_cause or Cause.PRECONDITION, self.exhausted_message or "nothing of it applies"
         cause = self._decisive_cause([cause_of(one) for one in failed])
         tried = [one for one in failed if cause_of(one) is not Cause.PRECONDITION] or failed
         sentences = list(dict.fromkeys(map(message_of, tried)))
         shown = "; ".join(sentences[:4]) + (f"; and {len(sentences) - 4} more" if len(sentences) > 4 else "")
-        return cause, f"{self._exhausted_message}: {shown}" if self._exhausted_message else shown
+        return cause, f"{self.exhausted_message}: {shown}" if self.exhausted_message else shown
 
     def _decisive_cause(self, causes: Sequence[Cause]) -> Cause:
         obstacles = [cause for cause in causes if cause not in _MERELY_NOT_SO]
         if Cause.ERROR in obstacles:
             return Cause.ERROR
-        return obstacles[0] if obstacles else self._exhausted_cause or causes[-1]
+        return obstacles[0] if obstacles else self.exhausted_cause or causes[-1]
 
 
 class MemoryRound(MemorySelector):

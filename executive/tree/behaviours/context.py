@@ -4,28 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields
 
 from executive.tree.behaviours.board import Board
-from skills.api import (
-    NO_WORK_COUNTER,
-    Ask,
-    Costmap,
-    Detector,
-    Localiser,
-    Publish,
-    SkillContext,
-    WorkCounter,
-    Worker,
-    nobody_to_ask,
-)
-from skills.detection import NO_DETECTOR
-from skills.robot import Clock, Lease, Pose2D, Robot
-from skills.stack import RobotStack, default_stack
-
-if TYPE_CHECKING:
-    from pydrake.math import RigidTransform
+from skills.api import SkillContext
+from skills.robot import Pose2D
 
 
 def leaf_seed(run_seed: int, path_id: str) -> int:
@@ -39,49 +22,21 @@ def never_pressed() -> str | None:
     return None
 
 
-@dataclass(frozen=True)
-class RunContext:
-    """One robot, its lease, its estimators, and what the run lends to all nodes of its tree.
+@dataclass(frozen=True, kw_only=True)
+class RunContext(SkillContext):
+    """What the run lends to all nodes of a robot's tree: what skills may touch, the blackboard, the stop button.
 
-    `stop_pressed` says why nothing may move while a stop button is pressed, else None.
+    `seed` is the run's. `stop_pressed` says why nothing may move while a stop button is pressed, else None.
     """
 
-    robot: Robot
-    lease: Lease
-    clock: Clock
-    worker: Worker
-    localiser: Localiser
-    costmap: Costmap
-    publish: Publish
-    seed: int
     board: Board
-    ask: Ask = nobody_to_ask
-    detector: Detector = NO_DETECTOR
     stop_pressed: Callable[[], str | None] = never_pressed
-    stack: RobotStack = field(default_factory=default_stack)
-    work: WorkCounter = NO_WORK_COUNTER
 
-    def pose(self) -> Pose2D | None:
+    def known_pose(self) -> Pose2D | None:
         """Where the robot believes to be, the planar part of X_WB; None while it is not localised."""
-        return Pose2D.from_transform(self.X_WB()) if self.localiser.estimate().localised else None
-
-    def X_WB(self) -> RigidTransform:
-        """The body's pose in the world, as estimated."""
-        return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB
+        return self.pose() if self.localiser.estimate().localised else None
 
     def for_skill(self, path_id: str) -> SkillContext:
-        """The part of it that a skill may touch."""
-        return SkillContext(
-            robot=self.robot,
-            lease=self.lease,
-            clock=self.clock,
-            worker=self.worker,
-            localiser=self.localiser,
-            costmap=self.costmap,
-            publish=self.publish,
-            seed=leaf_seed(self.seed, path_id),
-            ask=self.ask,
-            detector=self.detector,
-            work=self.work,
-            stack=self.stack,
-        )
+        """The part of it that a skill may touch, with a seed of its own."""
+        lent = {each.name: getattr(self, each.name) for each in fields(SkillContext)}
+        return SkillContext(**{**lent, "seed": leaf_seed(self.seed, path_id)})

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -12,21 +13,21 @@ from py_trees.decorators import Decorator
 
 from executive.tree.behaviours.conditions import Condition, Waiting
 from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import Explained, cause_of, message_of
-from executive.tree.behaviours.requirements import Requirement
+from executive.tree.behaviours.explained import ExplainedNode, cause_of, message_of
 from executive.tree.behaviours.suspension import StoppableTime, suspend
 from executive.tree.node import NodeKind
 from skills.api import Cause, Failed
 from skills.robot import Clock
 
 
-class ExplainedDecorator(Explained, Decorator):
+@dataclass(kw_only=True, eq=False, repr=False)
+class ExplainedDecorator(ExplainedNode, Decorator):
     """A decorator that takes its child's explanation unless it has its own."""
 
-    def __init__(self, *, path_id: str, name: str, child: Behaviour) -> None:
-        super().__init__(name, child)
-        self.path_id = path_id
-        self.clear_explanation()
+    child: Behaviour
+
+    def __post_init__(self) -> None:
+        Decorator.__init__(self, self.name, self.child)
 
     def stop(self, new_status: Status) -> None:
         """Interrupted while running: stop the child and say so. Reset: reset the child too."""
@@ -49,6 +50,7 @@ class ExplainedDecorator(Explained, Decorator):
         return Status.FAILURE
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Timeout(ExplainedDecorator):
     """A limit on the robot's clock.
 
@@ -56,13 +58,12 @@ class Timeout(ExplainedDecorator):
     now. Else as the child. Time in which the tree is suspended does not count.
     """
 
-    def __init__(self, *, path_id: str, name: str, child: Behaviour, limit_s: float, clock: Clock) -> None:
-        super().__init__(path_id=path_id, name=name, child=child)
-        self._limit_s, self._clock, self._time = limit_s, clock, StoppableTime(clock)
+    limit_s: float
+    clock: Clock
 
     def initialise(self) -> None:
         """Start the time."""
-        self._time = StoppableTime(self._clock)
+        self._time = StoppableTime(self.clock)
 
     def suspend(self) -> None:
         """Stop counting until the next tick."""
@@ -71,12 +72,13 @@ class Timeout(ExplainedDecorator):
     def update(self) -> Status:
         """The child's status, unless the time is over."""
         self._time.go_on()
-        late = self._time.elapsed_s() > self._limit_s
+        late = self._time.elapsed_s() > self.limit_s
         if late and self.decorated.status != Status.FAILURE:
-            return self.fail(Failed(Cause.TIMEOUT, f"not done within {self._limit_s:g} s"))
+            return self.fail(Failed(Cause.TIMEOUT, f"not done within {self.limit_s:g} s"))
         return self.pass_on()
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Retry(ExplainedDecorator):
     """Tries again, but only after failures of given causes.
 
@@ -84,10 +86,9 @@ class Retry(ExplainedDecorator):
     Else RUNNING, and at the next tick the child starts anew from its first step with nothing remembered.
     """
 
-    def __init__(self, *, path_id: str, name: str, child: Behaviour, attempts: int, causes: frozenset[Cause]) -> None:
-        super().__init__(path_id=path_id, name=name, child=child)
-        self._attempts, self._causes = attempts, causes
-        self.attempt = 1
+    attempts: int
+    causes: frozenset[Cause]
+    attempt: int = field(default=1, init=False)
 
     def initialise(self) -> None:
         """Count from the first attempt."""
@@ -98,15 +99,16 @@ class Retry(ExplainedDecorator):
         status = self.pass_on()
         if status != Status.FAILURE:
             return status
-        if self.cause in self._causes and self.attempt < self._attempts:
+        if self.cause in self.causes and self.attempt < self.attempts:
             self.attempt += 1
-            self.cause, self.message = None, f"attempt {self.attempt} of {self._attempts}, since {self.message}"
+            self.cause, self.message = None, f"attempt {self.attempt} of {self.attempts}, since {self.message}"
             return Status.RUNNING
         if self.attempt > 1:
             self.message = f"{self.message} (after {self.attempt} attempts)"
         return Status.FAILURE
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Guard(ExplainedDecorator):
     """A condition above actions, looked at before every tick.
 
@@ -114,15 +116,18 @@ class Guard(ExplainedDecorator):
     Else as the child.
     """
 
-    def __init__(self, *, path_id: str, name: str, child: Behaviour, condition: Condition, context: RunContext) -> None:
-        super().__init__(path_id=path_id, name=name, child=child)
-        self._condition, self._context = condition, context
+    condition: Condition
+    context: RunContext
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.condition = self.condition.for_run(self.context)
 
     def tick(self) -> Iterator[Behaviour]:
         """Look at the condition, then tick the child."""
         if self.status != Status.RUNNING:
-            self._condition.begin(self._context)
-        verdict = self._condition.violated(self._context)
+            self.condition.begin(self.context)
+        verdict = self.condition.violated(self.context)
         if verdict is None:
             yield from super().tick()
             return
@@ -138,14 +143,10 @@ class Guard(ExplainedDecorator):
         return self.pass_on()
 
 
-def _guard(*, requirement: Requirement, context: RunContext, **node: Any) -> Guard:
-    return Guard(condition=requirement.condition(context), context=context, **node)
-
-
 KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
     {
         "timeout": NodeKind(Timeout, ("child", "clock")),
         "retry": NodeKind(Retry, ("child",)),
-        "guard": NodeKind(_guard, ("child", "context")),
+        "guard": NodeKind(Guard, ("child", "context")),
     }
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
@@ -28,6 +30,24 @@ class Explained:
         """Say that the node was stopped from outside, and while doing what."""
         self.cause = Cause.CANCELLED
         self.message = f"stopped while: {self.message}" if self.message else "stopped"
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class ExplainedNode(Explained):
+    """An explained node of ours: what a spec says of it is given by keywords."""
+
+    path_id: str
+    name: str
+    cause: Cause | None = field(default=None, init=False)
+    message: str = field(default="", init=False)
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class ExplainedLeaf(ExplainedNode, Behaviour):
+    """One without children."""
+
+    def __post_init__(self) -> None:
+        Behaviour.__init__(self, self.name)
 
 
 def cause_of(node: Behaviour) -> Cause:

@@ -3,121 +3,99 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.mission.geometry import distance_m
 from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviours.explained import ExplainedLeaf
 from executive.tree.node import NodeKind
 from skills.api import Cause, Surface
 from skills.robot import Clock, Pose2D
 
 
-class RememberPose(Explained, Behaviour):
+@dataclass(kw_only=True, eq=False, repr=False)
+class RememberPose(ExplainedLeaf):
     """Writes the robot's present pose in the world to the blackboard. Always SUCCESS once the robot is localised.
 
     FAILURE with PRECONDITION when the robot does not know where it is for longer than `patience_s`. With `keep`, a pose
     that is there already stays: the mission was asked for where another one began.
     """
 
-    def __init__(
-        self,
-        *,
-        path_id: str,
-        name: str,
-        key: str,
-        context: RunContext,
-        patience_s: float = 5.0,
-        keep: bool = False,
-    ) -> None:
-        super().__init__(name)
-        self.path_id = path_id
-        self._keep = keep
-        self._key, self._context, self._patience_s, self._started_s = key, context, patience_s, 0.0
-        self.clear_explanation()
+    key: str
+    context: RunContext
+    patience_s: float = 5.0
+    keep: bool = False
 
     def initialise(self) -> None:
         """Start the patience."""
         self.clear_explanation()
-        self._started_s = self._context.clock.now()
+        self._started_s = self.context.clock.now()
 
     def update(self) -> Status:
         """Write the pose, or wait for one."""
-        if self._keep and self._key in self._context.board:
+        if self.keep and self.key in self.context.board:
             self.message = "began before"
             return Status.SUCCESS
-        if self._context.localiser.estimate().localised:
-            pose = self._context.for_skill(self.path_id).pose()
-            self._context.board.put(self._key, pose)
+        if self.context.localiser.estimate().localised:
+            pose = self.context.pose()
+            self.context.board.put(self.key, pose)
             self.message = f"stands at ({pose.x_m:.2f}, {pose.y_m:.2f}) m"
             return Status.SUCCESS
-        if self._context.clock.now() - self._started_s <= self._patience_s:
+        if self.context.clock.now() - self._started_s <= self.patience_s:
             self.message = "waits until it knows where it is"
             return Status.RUNNING
         self.cause, self.message = Cause.PRECONDITION, "the robot does not know where it is"
         return Status.FAILURE
 
 
-class Pause(Explained, Behaviour):
-    """RUNNING for `duration_s` on the robot's clock, then SUCCESS: things may come to rest, readings may come in."""
+@dataclass(kw_only=True, eq=False, repr=False)
+class Pause(ExplainedLeaf):
+    """RUNNING for `duration_s` on the robot's clock, then SUCCESS: objects may come to rest, readings may come in."""
 
-    def __init__(self, *, path_id: str, name: str, duration_s: float, clock: Clock) -> None:
-        super().__init__(name)
-        self.path_id = path_id
-        self._duration_s, self._clock, self._end_s = duration_s, clock, 0.0
-        self.clear_explanation()
+    duration_s: float
+    clock: Clock
 
     def initialise(self) -> None:
         """Start the time."""
         self.clear_explanation()
-        self._end_s = self._clock.now() + self._duration_s
+        self._end_s = self.clock.now() + self.duration_s
 
     def update(self) -> Status:
         """Wait until the time is over."""
-        done = self._clock.now() >= self._end_s
-        self.message = f"waited {self._duration_s:g} s" if done else "waits a moment"
+        done = self.clock.now() >= self._end_s
+        self.message = f"waited {self.duration_s:g} s" if done else "waits a moment"
         return Status.SUCCESS if done else Status.RUNNING
 
 
-class SurfacesNear(Explained, Behaviour):
+@dataclass(kw_only=True, eq=False, repr=False)
+class SurfacesNear(ExplainedLeaf):
     """Writes those of some surfaces to the blackboard that lie within `within_m` of the robot, the nearest first.
 
     SUCCESS when there are some. FAILURE with POSTCONDITION when there are none: `otherwise` says what that means.
     """
 
-    def __init__(
-        self,
-        *,
-        path_id: str,
-        name: str,
-        surfaces: Sequence[Surface],
-        within_m: float,
-        key: str,
-        otherwise: str,
-        context: RunContext,
-    ) -> None:
-        super().__init__(name)
-        self.path_id = path_id
-        self._surfaces, self._within_m, self._key = tuple(surfaces), within_m, key
-        self._otherwise, self._context = otherwise, context
-        self.clear_explanation()
+    surfaces: Sequence[Surface]
+    within_m: float
+    key: str
+    otherwise: str
+    context: RunContext
 
     def update(self) -> Status:
         """Look which surfaces are near."""
-        pose = self._context.for_skill(self.path_id).pose()
+        pose = self.context.pose()
         here = (pose.x_m, pose.y_m)
-        near = sorted((distance_m(surface.polygon_W, here), k) for k, surface in enumerate(self._surfaces))
-        found = tuple(self._surfaces[k] for distance, k in near if distance <= self._within_m)
+        near = sorted((distance_m(surface.polygon_W, here), k) for k, surface in enumerate(self.surfaces))
+        found = tuple(self.surfaces[k] for distance, k in near if distance <= self.within_m)
         if found:
-            self._context.board.put(self._key, found)
+            self.context.board.put(self.key, found)
             self.cause, self.message = None, f"near here: {', '.join(surface.name for surface in found)}"
             return Status.SUCCESS
         self.cause = Cause.POSTCONDITION
-        self.message = f"there is no surface within {self._within_m:g} m of {_xy(here)}; {self._otherwise}"
+        self.message = f"there is no surface within {self.within_m:g} m of {_xy(here)}; {self.otherwise}"
         return Status.FAILURE
 
 

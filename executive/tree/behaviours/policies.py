@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
@@ -17,22 +18,21 @@ from executive.tree.node import NodeKind
 from skills.api import Asked, Cause, Failed, Question
 
 FINAL_CAUSES: Final = frozenset({Cause.ERROR, Cause.CANCELLED})
-"""A defect and somebody's wish to stop are neither skipped, nor asked about, nor tried again."""
+"""A defect and somebody's request to stop are neither skipped, nor asked about, nor tried again."""
 RETRY: Final = "retry"
 SKIP: Final = "skip"
 STOP: Final = "stop"
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Skip(ExplainedDecorator):
     """A step that may fail; `step` is the step in words.
 
     Child FAILURE: SUCCESS, and `skipped` says why; but FAILURE when its cause is ERROR or CANCELLED. Else as the child.
     """
 
-    def __init__(self, *, path_id: str, name: str, child: Behaviour, step: str) -> None:
-        super().__init__(path_id=path_id, name=name, child=child)
-        self.step = step
-        self.skipped: str | None = None
+    step: str
+    skipped: str | None = field(default=None, init=False)
 
     def initialise(self) -> None:
         """Nothing is skipped yet."""
@@ -52,6 +52,7 @@ class Skip(ExplainedDecorator):
         return Status.SUCCESS
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class AskOperator(Skip):
     """A step about which the operator is asked when it fails.
 
@@ -60,24 +61,12 @@ class AskOperator(Skip):
     A failure with cause ERROR or CANCELLED is passed on without a question. Else as the child.
     """
 
-    def __init__(
-        self,
-        *,
-        path_id: str,
-        name: str,
-        child: Behaviour,
-        step: str,
-        options: tuple[str, ...],
-        default: str,
-        limit_s: float,
-        text: str | None,
-        context: RunContext,
-    ) -> None:
-        super().__init__(path_id=path_id, name=name, child=child, step=step)
-        self._options, self._default, self._limit_s, self._text = options, default, limit_s, text
-        self._context = context
-        self._asked: Asked | None = None
-        self._failure = Failed(Cause.EXECUTION, "")
+    options: tuple[str, ...]
+    default: str
+    limit_s: float
+    text: str | None
+    context: RunContext
+    _asked: Asked | None = field(default=None, init=False)
 
     def tick(self) -> Iterator[Behaviour]:
         """Tick the child, or wait for the answer."""
@@ -93,9 +82,9 @@ class AskOperator(Skip):
         if status != Status.FAILURE or self.cause is None or self.cause in FINAL_CAUSES:
             return status
         self._failure = Failed(self.cause, self.message)
-        text = f"{self._text} ({self.message})" if self._text else f"{self.message}. What now?"
-        question = Question(self.path_id, text, self._options, self._default, self._limit_s)
-        self._asked = self._context.ask(question)
+        text = f"{self.text} ({self.message})" if self.text else f"{self.message}. What now?"
+        question = Question(self.path_id, text, self.options, self.default, self.limit_s)
+        self._asked = self.context.ask(question)
         self.cause, self.message = None, f"asks the operator: {text}"
         return Status.RUNNING
 
@@ -131,41 +120,40 @@ class GoBack(MemorySequence):
         """Tick what is to be done, or the way back."""
         if self.status != Status.RUNNING:
             self._restart()
-        deed, way_back = self.children
-        child = deed if self._index == 0 else way_back
+        action, way_back = self.children
+        child = action if self._index == 0 else way_back
         self.current_child = child
         yield from child.tick()
-        if child is deed and deed.status == Status.FAILURE and self._may_go_back(deed):
+        if child is action and action.status == Status.FAILURE and self._may_go_back(action):
             self._index, self.status = 1, Status.RUNNING
-            self.message = f"goes back, since {message_of(deed)}"
-        elif child is deed:
-            self._take_over(deed)
+            self.message = f"goes back, since {message_of(action)}"
+        elif child is action:
+            self._take_over(action)
         elif way_back.status == Status.RUNNING:
             self.message = f"goes back ({message_of(way_back)})"
         else:
-            self._end(deed, way_back)
+            self._end(action, way_back)
         yield self
 
-    def _may_go_back(self, deed: Behaviour) -> bool:
-        return not (isinstance(deed, Explained) and deed.cause in FINAL_CAUSES)
+    def _may_go_back(self, action: Behaviour) -> bool:
+        return not (isinstance(action, Explained) and action.cause in FINAL_CAUSES)
 
-    def _end(self, deed: Behaviour, way_back: Behaviour) -> None:
+    def _end(self, action: Behaviour, way_back: Behaviour) -> None:
         back = way_back.status == Status.SUCCESS
         told = "is back where it started" if back else f"could not go back: {message_of(way_back)}"
-        self.cause, self.message = self._explanation(deed)
+        self.cause, self.message = self._explanation(action)
         self.message = f"{self.message}; the robot {told}"
         self.stop(Status.FAILURE)
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Summary(ExplainedDecorator):
     """The end of a mission in which steps may be skipped; `steps` are the path ids of its steps' outermost nodes.
 
     As the child, but a SUCCESS names what was skipped, and it is FAILURE when every one of the steps was skipped.
     """
 
-    def __init__(self, *, path_id: str, name: str, child: Behaviour, steps: Sequence[str]) -> None:
-        super().__init__(path_id=path_id, name=name, child=child)
-        self._steps = frozenset(steps)
+    steps: Sequence[str]
 
     def update(self) -> Status:
         """The child's status, and what was skipped."""
@@ -175,7 +163,7 @@ class Summary(ExplainedDecorator):
         if status != Status.SUCCESS or not skipped:
             return status
         told = "; ".join(skipped.values())
-        if self._steps <= skipped.keys():
+        if skipped.keys() >= set(self.steps):
             return self.fail(Failed(Cause.EXECUTION, f"all steps were skipped: {told}"))
         self.message = f"done, but skipped: {told}"
         return status

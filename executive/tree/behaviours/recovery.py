@@ -7,7 +7,7 @@ the attempts share on purpose.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
@@ -57,6 +57,7 @@ class Recovery:
         return any(trigger.fits(attempt) for trigger in self.triggers)
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Recover(MemoryComposite):
     """An attempt (the first child), with recoveries (the others, each with its `Recovery`) before the next attempt.
 
@@ -67,25 +68,13 @@ class Recover(MemoryComposite):
     When it starts anew, recoveries are counted from zero and the blackboard keys in `forgets` are empty.
     """
 
-    goes_on_after = frozenset({Status.SUCCESS})
-
-    def __init__(
-        self,
-        *,
-        path_id: str,
-        name: str,
-        children: Sequence[Behaviour],
-        recoveries: Sequence[Recovery],
-        attempts: int,
-        board: Board,
-        forgets: Sequence[str] = (),
-    ) -> None:
-        super().__init__(path_id=path_id, name=name, children=children)
-        self._recoveries, self._attempts = tuple(recoveries), attempts
-        self._forgets, self._board = tuple(forgets), board
-        self.attempt = 1
-        self._uses = [0] * len(recoveries)
-        self._due: list[int] = []
+    recoveries: Sequence[Recovery]
+    attempts: int
+    board: Board
+    forgets: Sequence[str] = ()
+    attempt: int = field(default=1, init=False)
+    _uses: list[int] = field(default_factory=list, init=False)
+    _due: list[int] = field(default_factory=list, init=False)
 
     def tick(self) -> Iterator[Behaviour]:
         """Tick the attempt or the recovery that is under way, and see what comes of it."""
@@ -103,8 +92,8 @@ class Recover(MemoryComposite):
 
     def _restart(self) -> None:
         super()._restart()
-        self.attempt, self._uses, self._due = 1, [0] * len(self._recoveries), []
-        self._board.forget(self._forgets)
+        self.attempt, self._uses, self._due = 1, [0] * len(self.recoveries), []
+        self.board.forget(self.forgets)
 
     def _attempt_ended(self) -> None:
         """Success ends it; after a failure the recoveries that fit are due."""
@@ -112,8 +101,8 @@ class Recover(MemoryComposite):
         if attempt.status == Status.SUCCESS:
             self._end(Status.SUCCESS, None, message_of(attempt))
             return
-        fitting = [i for i, r in enumerate(self._recoveries) if self._uses[i] < r.uses and r.fits(attempt)]
-        self._due = fitting if self.attempt < self._attempts else []
+        fitting = [i for i, r in enumerate(self.recoveries) if self._uses[i] < r.uses and r.fits(attempt)]
+        self._due = fitting if self.attempt < self.attempts else []
         if not self._next_recovery():
             tried = f" (after {self.attempt} attempts)" if self.attempt > 1 else ""
             self._end(Status.FAILURE, cause_of(attempt), f"{message_of(attempt)}{tried}")
@@ -145,6 +134,7 @@ class Recover(MemoryComposite):
         self.stop(status)
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class Afterwards(MemoryComposite):
     """Something to be done (the first child), and what tidies up after it (the second), however it ended.
 
@@ -153,18 +143,7 @@ class Afterwards(MemoryComposite):
     with the second's failure mentioned.
     """
 
-    goes_on_after = frozenset({Status.SUCCESS})
-
-    def __init__(
-        self,
-        *,
-        path_id: str,
-        name: str,
-        children: Sequence[Behaviour],
-        only_after_failure: bool = False,
-    ) -> None:
-        super().__init__(path_id=path_id, name=name, children=children)
-        self._after = {Status.FAILURE} if only_after_failure else {Status.SUCCESS, Status.FAILURE}
+    only_after_failure: bool = False
 
     def tick(self) -> Iterator[Behaviour]:
         """Tick the first child; when it is done, the second."""
@@ -174,7 +153,8 @@ class Afterwards(MemoryComposite):
         if self._index == 0:
             self.current_child = first
             yield from first.tick()
-            self._index = int(first.status in self._after)
+            done = first.status == Status.FAILURE or (first.status == Status.SUCCESS and not self.only_after_failure)
+            self._index = int(done)
         if self._index == 1:
             self.current_child = then
             yield from then.tick()
@@ -192,32 +172,27 @@ class Afterwards(MemoryComposite):
         self.stop(first.status)
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class OnlyIfKnown(MemoryComposite):
     """As its only child, for selectors that pass it over while the blackboard does not hold `key`."""
 
-    goes_on_after = frozenset({Status.SUCCESS})
-
-    def __init__(self, *, path_id: str, name: str, child: Behaviour, key: str, board: Board) -> None:
-        super().__init__(path_id=path_id, name=name, children=[child])
-        self._key, self._board = key, board
+    key: str
+    board: Board
 
     def applies(self) -> bool:
         """Whether the key has been written."""
-        return self._key in self._board
+        return self.key in self.board
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class OnlyIfHolding(MemoryComposite):
     """As its only child, for selectors that pass it over while the gripper holds nothing."""
 
-    goes_on_after = frozenset({Status.SUCCESS})
-
-    def __init__(self, *, path_id: str, name: str, child: Behaviour, robot: Robot) -> None:
-        super().__init__(path_id=path_id, name=name, children=[child])
-        self._robot = robot
+    robot: Robot
 
     def applies(self) -> bool:
         """Whether something is held."""
-        return self._robot.gripper().holding
+        return self.robot.gripper().holding
 
 
 KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
@@ -225,8 +200,8 @@ KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
         "recover": NodeKind(Recover, ("children", "board")),
         "afterwards": NodeKind(Afterwards, ("children",)),
         "only if known": NodeKind(
-            OnlyIfKnown, ("child", "board"), writes=lambda options: {options["key"]: ObjectObservation}
+            OnlyIfKnown, ("children", "board"), writes=lambda options: {options["key"]: ObjectObservation}
         ),
-        "only if holding": NodeKind(OnlyIfHolding, ("child", "robot")),
+        "only if holding": NodeKind(OnlyIfHolding, ("children", "robot")),
     }
 )

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.tree.behaviours.board import Binding
 from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviours.explained import ExplainedLeaf
 from executive.tree.behaviours.freshness import refuse_stale
 from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.node import NodeKind
@@ -23,7 +23,8 @@ ResultT = TypeVar("ResultT")
 ERROR_TOPIC = "errors"
 
 
-class SkillLeaf(Explained, Behaviour):
+@dataclass(kw_only=True, eq=False, repr=False)
+class SkillLeaf(ExplainedLeaf):
     """Runs one skill.
 
     RUNNING while the skill says `Running` and its time is not over. SUCCESS when it says `Succeeded` in time and
@@ -34,27 +35,18 @@ class SkillLeaf(Explained, Behaviour):
     RUNNING; its skill goes on at the next tick (`Skill.resume`), and the time between does not count.
     """
 
-    def __init__(
-        self,
-        *,
-        path_id: str,
-        name: str,
-        skill: type[Skill[Any]],
-        limit_s: float,
-        context: RunContext,
-        inputs: Mapping[str, Binding] = MappingProxyType({}),
-        outputs: Mapping[str, str] = MappingProxyType({}),
-    ) -> None:
-        super().__init__(name)
-        self.path_id = path_id
-        self.progress: float | None = None
-        self._skill_class, self._inputs, self._outputs = skill, dict(inputs), dict(outputs)
-        self._limit_s, self._context = limit_s, context
-        self._skill: Skill[Any] | None = None
-        self._values: Any = None
-        self._time = StoppableTime(context.clock)
-        self._false_start: Failed | None = None
-        self.clear_explanation()
+    skill: type[Skill[Any]]
+    limit_s: float
+    context: RunContext
+    inputs: Mapping[str, Binding] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    _skill: Skill[Any] | None = field(default=None, init=False)
+    _values: Any = field(default=None, init=False)
+    _false_start: Failed | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._time = StoppableTime(self.context.clock)
 
     @property
     def active(self) -> bool:
@@ -69,7 +61,7 @@ class SkillLeaf(Explained, Behaviour):
     @property
     def skill_name(self) -> str:
         """The registered name of the skill."""
-        return self._skill_class.name
+        return self.skill.name
 
     @property
     def suspended(self) -> bool:
@@ -122,11 +114,11 @@ class SkillLeaf(Explained, Behaviour):
             self.cause, self.message = defect.cause, defect.message
 
     def _begin(self) -> None:
-        self._time = StoppableTime(self._context.clock)
-        board = self._context.board
-        values = {port: binding.read(board) for port, binding in self._inputs.items()}
-        self._skill = self._skill_class(self._context.for_skill(self.path_id))
-        self._values = self._skill_class.Inputs(**values)
+        self._time = StoppableTime(self.context.clock)
+        board = self.context.board
+        values = {port: binding.read(board) for port, binding in self.inputs.items()}
+        self._skill = self.skill(self.context.for_skill(self.path_id))
+        self._values = self.skill.Inputs(**values)
         self._skill.begin(self._values)
 
     def _go_on(self) -> None:
@@ -145,12 +137,12 @@ class SkillLeaf(Explained, Behaviour):
 
     def _judged(self, step: Step) -> Step:
         """Time over turns going on, and a success that comes too late, into a failure."""
-        late = self._time.elapsed_s() > self._limit_s
+        late = self._time.elapsed_s() > self.limit_s
         if late and not isinstance(step, Failed):
-            return Failed(Cause.TIMEOUT, f"{self.name} took longer than {self._limit_s:g} s ({step.message})")
+            return Failed(Cause.TIMEOUT, f"{self.name} took longer than {self.limit_s:g} s ({step.message})")
         if isinstance(step, Succeeded):
             success = step
-            return self._guarded(lambda: refuse_stale(self._skill_class, success, self._context))
+            return self._guarded(lambda: refuse_stale(self.skill, success, self.context))
         return step
 
     def _ended(self) -> Failed | None:
@@ -163,16 +155,16 @@ class SkillLeaf(Explained, Behaviour):
 
         A failure need not fill all ports: what it learnt is for the next attempt.
         """
-        given = step.outputs if isinstance(step, Failed) else self._skill_class.outputs
-        for port, kind in self._skill_class.outputs.items():
+        given = step.outputs if isinstance(step, Failed) else self.skill.outputs
+        for port, kind in self.skill.outputs.items():
             if port not in given:
                 continue
             if not conforms(step.outputs.get(port), kind):
                 found = type(step.outputs[port]).__name__ if port in step.outputs else "nothing"
                 return Failed(Cause.ERROR, f"{self.name} gave {found} on port '{port}', not {describe_type(kind)}")
-        for port, key in self._outputs.items():
+        for port, key in self.outputs.items():
             if port in given:
-                self._context.board.put(key, step.outputs[port])
+                self.context.board.put(key, step.outputs[port])
         return step
 
     def _guarded(self, call: Callable[[], ResultT]) -> ResultT | Failed:
@@ -181,7 +173,7 @@ class SkillLeaf(Explained, Behaviour):
             return call()
         except Exception as defect:
             trace = traceback.format_exc()
-            self._context.publish(ERROR_TOPIC, {"node": self.path_id, "traceback": trace})
+            self.context.publish(ERROR_TOPIC, {"node": self.path_id, "traceback": trace})
             text = str(defect.args[0]) if isinstance(defect, KeyError) and defect.args else str(defect)
             return Failed(Cause.ERROR, f"{self.name} raised {type(defect).__name__}: {text}")
 

@@ -74,8 +74,7 @@ class _Item:
 def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> tuple[NodeSpec, tuple[StepPart, ...]]:
     """The root of a mission's tree, and its parts in order.
 
-    Raises:
-        InputError: unknown names, ports wired wrongly, commands that cannot be carried out; all in `others`.
+    Raises InputError: unknown names, ports wired wrongly, commands that cannot be carried out; all in `others`.
     """
     base = f"{slug(mission.robot_name)}/{slug(mission.name)}"
     assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name))
@@ -96,7 +95,7 @@ def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> t
 
 
 def step_name(command: Command) -> str:
-    """The step's name in path ids: the goal, else the thing."""
+    """The step's name in path ids: the goal, else the object."""
     return slug(command.goal or str(command.object or command.item or "anywhere"))
 
 
@@ -130,7 +129,7 @@ class _Assembler:
         return made
 
     def _group(self, items: Sequence[_Item], base: str) -> Assembled:
-        """The subtrees of items in a row; commands to get and bring several things become trips."""
+        """The subtrees of items in a row; commands to get and bring several objects become trips."""
         made, problems, done = Assembled(), Problems(), 0
         for item, after in zip(items, (*items[1:], None), strict=True):
             if item.number <= done:
@@ -214,7 +213,7 @@ def _goals(command: Command | None, knowledge: Knowledge) -> frozenset[str]:
 
 
 def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
-    """Where else the thing of a command to get it may be found."""
+    """Where else the object of a command to get it may be found."""
     command, knowledge = builder.command, builder.knowledge
     if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
         return ()

@@ -45,8 +45,8 @@ def after(*causes: Cause, of: NodeSpec | None = None, own: bool = False) -> Trig
 class PlanBuilder:
     """Makes the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
 
-    `anywhere` says whether a thing that is not in its place is looked for elsewhere, too, but never on the surfaces in
-    `avoided`: what lies there is where it is to go.
+    `anywhere` says whether an object that is not in its place is looked for elsewhere, too, but never on the surfaces
+    in `avoided`: what lies there is where it is to go.
     """
 
     knowledge: Knowledge
@@ -76,8 +76,7 @@ class PlanBuilder:
     ) -> NodeSpec:
         """A leaf that runs the registered skill `name`; inputs that are no binding are constants.
 
-        Raises:
-            InputError: no skill of that name is registered.
+        Raises InputError: no skill of that name is registered.
         """
         if name not in self.registry:
             raise self.error(f"there is no skill '{name}'", f"registered are {listing(sorted(self.registry))}")
@@ -127,25 +126,17 @@ class PlanBuilder:
         return Surface(name=name, polygon_W=facts.polygon, height_m=facts.height)
 
     def place(self, name: str) -> str:
-        """The known place that `name` means.
-
-        Raises:
-            InputError: it is not known.
-        """
+        """The known place that `name` means. Raises InputError: it is not known."""
         known = self.knowledge.place(name)
         if known is None:
             raise self.error(f"the place '{name}' is not known", suggestion(name, self.knowledge.place_names()))
         return known
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """The classes that a thing's name stands for.
-
-        Raises:
-            InputError: it is not known.
-        """
+        """The classes that an object's name stands for. Raises InputError: it is not known."""
         classes = self.knowledge.classes(self.knowledge.thing(name) or name)
         if not classes:
-            raise self.error(f"the thing '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
+            raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
         return classes
 
     def error(self, message: str, mend: str) -> InputError:

@@ -1,15 +1,15 @@
-"""Subtrees of handling things, with the recovery that fits each cause.
+"""Subtrees of handling objects, with the recovery that fits each cause.
 
 | what failed | cause | what is done before the next attempt |
 |---|---|---|
 | going somewhere | PLANNING, EXECUTION | see anew what stands in the way; back off; another pose nearby |
-| finding | not seen | from aside; where such things usually are; other surfaces (`search`) |
+| finding | not seen | from aside; where such objects usually are; other surfaces (`search`) |
 | standing before it | PLANNING | see anew what stands around; back off |
 | standing before it | others | look again |
 | grasping | POSTCONDITION (slipped) | look again, take another grasp |
 | grasping | PLANNING | look again; back off and stand anew |
 | grasping | PRECONDITION, EXECUTION | look again |
-| carrying | the thing was lost | find it on the surfaces near there, pick it up again |
+| carrying | the object was lost | find it on the surfaces near there, pick it up again |
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def pick_up_plan(
     builder: PlanBuilder, thing: Thing, search: NodeSpec, key: str, surfaces: tuple[Surface, ...] | FromBoard
 ) -> NodeSpec:
     """Find (`search`, which writes `key`), approach and grasp, with recoveries; a failure ends with the arm stowed."""
-    near, tried = f"{builder.path_id}/near-sighting", f"{builder.path_id}/tried-grasps"
+    near, tried = f"{builder.path_id}/near-detection", f"{builder.path_id}/tried-grasps"
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     grasp = _grasp_plan(builder, near, tried)
     attempt = builder.at("pick-up").sequence(f"pick up {thing}", search, approach, grasp)
@@ -85,7 +85,7 @@ def _grasp_plan(builder: PlanBuilder, near: str, tried: str) -> NodeSpec:
 
 
 def tuck_plan(builder: PlanBuilder) -> NodeSpec:
-    """Draw the arm in, twice if need be; where that does not work but the thing is held, go on with it."""
+    """Draw the arm in, twice if need be; where that does not work but the object is held, go on with it."""
     causes = frozenset({Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
     twice = builder.node(
         "retry", "draw in the arm, twice if need be", builder.skill("stow"), part="tuck-in", attempts=2, causes=causes
@@ -103,7 +103,7 @@ def tidied(builder: PlanBuilder, work: NodeSpec, *, only_after_failure: bool = F
 
 
 def unless_dropped(builder: PlanBuilder, item: Thing, carry: NodeSpec, guards: tuple[NodeSpec, ...]) -> NodeSpec:
-    """Carrying; when the thing is lost on the way (one of the guards breaks) it is picked up again where it was lost.
+    """Carrying; when the object is lost on the way (one of the guards breaks) it is picked up again where it was lost.
 
     Only surfaces can be looked at: what lies on the floor is not found, and the sentence says so.
     """
@@ -113,7 +113,7 @@ def unless_dropped(builder: PlanBuilder, item: Thing, carry: NodeSpec, guards: t
 
 def _pick_up_again_plan(builder: PlanBuilder, item: Thing) -> NodeSpec:
     below = builder.at("again")
-    near, key = f"{below.path_id}/surfaces", f"{below.path_id}/sighting"
+    near, key = f"{below.path_id}/surfaces", f"{below.path_id}/detection"
     floor = f"the {item} lies on the floor by now, probably, where it cannot be looked for"
     nearby = below.node(
         "surfaces near",

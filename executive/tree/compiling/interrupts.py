@@ -8,15 +8,15 @@ from __future__ import annotations
 from typing import Final
 
 from executive.tree.behaviours.board import FromBoard
+from executive.tree.behaviours.conditions import BatteryForWork, KnowsPlace, NoStopButton, OwnLease
 from executive.tree.behaviours.recovery import Recovery
-from executive.tree.behaviours.requirements import BatteryForWork, KnowsPlace, NoStopButton, OwnLease
 from executive.tree.compiling.builder import PlanBuilder, after, pose_2d
 from executive.tree.node import NodeSpec
 from skills.api import Cause
 from skills.robot import Pose2D
 
 HANDLING: Final = frozenset({"grasp", "place", "hand_over", "stow"})
-"""Skills that an interrupt lets come to their end, since a thing is half held meanwhile."""
+"""Skills that an interrupt lets come to their end, since an object is half held meanwhile."""
 MOST_CHARGES: Final = 5
 MOST_RELOCALISATIONS: Final = 5
 LOST_PATIENCE_S: Final = 2.0
@@ -25,13 +25,12 @@ LOST_PATIENCE_S: Final = 2.0
 def watched(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
     """The mission under its watches, the last node below; `builder` is the mission's own.
 
-    Raises:
-        InputError: a skill that the watches need is not registered.
+    Raises InputError: a skill that the watches need is not registered.
     """
     below = builder.at("watch")
     watches = (
-        below.node("monitor", "stop button released", part="stop-button", requirement=NoStopButton()),
-        below.node("monitor", "lease held", part="lease", requirement=OwnLease()),
+        below.node("monitor", "stop button released", part="stop-button", condition=NoStopButton()),
+        below.node("monitor", "lease held", part="lease", condition=OwnLease()),
         _battery_plan(below.at("battery")),
         _lost_plan(below.at("lost")),
     )
@@ -55,7 +54,7 @@ def _battery_plan(builder: PlanBuilder) -> NodeSpec:
         _relocalising(builder.at("lost"), work),
         spares=HANDLING,
         uses=MOST_CHARGES,
-        requirement=BatteryForWork(facts.low, dock),
+        condition=BatteryForWork(facts.low, dock),
         urgent=BatteryForWork(0.5 * facts.low, dock),
     )
 
@@ -79,9 +78,9 @@ def _lost_plan(builder: PlanBuilder) -> NodeSpec:
     find_out = builder.at("find-out").sequence("find out where it is", settle, builder.skill("relocalise"))
     return builder.node(
         "interrupt",
-        "place lost: find out where it is",
+        "localisation lost: find out where it is",
         find_out,
         spares=HANDLING,
         uses=MOST_RELOCALISATIONS,
-        requirement=KnowsPlace(patience_s=LOST_PATIENCE_S),
+        condition=KnowsPlace(patience_s=LOST_PATIENCE_S),
     )

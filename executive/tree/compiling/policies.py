@@ -13,8 +13,8 @@ from typing import Final
 
 from executive.mission.file.model import OnFailure, StepGuards, StepPolicy
 from executive.tree.behaviours.board import FromBoard
+from executive.tree.behaviours.conditions import BatteryAtLeast, Condition, KnowsPlace, NotAfter
 from executive.tree.behaviours.policies import FINAL_CAUSES, RETRY, SKIP, STOP
-from executive.tree.behaviours.requirements import BatteryAtLeast, KnowsPlace, NotAfter, Requirement
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.node import NodeSpec
 from skills.api import Cause
@@ -42,8 +42,8 @@ def under_policy(body: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> Node
         attempts = policy.retries + 1
         name = f"up to {attempts} attempts"
         below = node("retry", name, below, part="retries", attempts=attempts, causes=RETRIED_CAUSES)
-    for part, name, requirement in _requirements(policy.guards):
-        below = node("guard", name, below, part=part, requirement=requirement)
+    for part, name, condition in _conditions(policy.guards):
+        below = node("guard", name, below, part=part, condition=condition)
     return _ON_FAILURE[policy.on_failure](below, policy, frame)
 
 
@@ -52,14 +52,18 @@ def needs_way_back(policy: StepPolicy) -> bool:
     return policy.on_failure is OnFailure.RETURN
 
 
-def _requirements(guards: StepGuards) -> Iterator[tuple[str, str, Requirement]]:
-    """Part of the path id, name and requirement of each guard; the outermost last."""
+def _conditions(guards: StepGuards) -> Iterator[tuple[str, str, Condition]]:
+    """Part of the path id, name and condition of each guard; the outermost last."""
     if guards.localised:
-        yield "guard-localised", "knows where it is", KnowsPlace(guards.stale)
+        yield "guard-localised", "knows where it is", KnowsPlace(stale=guards.stale)
     if guards.time_s is not None:
         yield "guard-time", f"not after {guards.time_s:g} s", NotAfter(guards.time_s)
     if guards.battery is not None:
-        yield "guard-battery", f"battery at {guards.battery:.0%} or more", BatteryAtLeast(guards.battery, guards.stale)
+        yield (
+            "guard-battery",
+            f"battery at {guards.battery:.0%} or more",
+            BatteryAtLeast(guards.battery, stale=guards.stale),
+        )
 
 
 def _skip(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:

@@ -1,4 +1,4 @@
-"""Looking for a thing: which surfaces, in which order, and the subtree that visits them."""
+"""Looking for an object: which surfaces, in which order, and the subtree that visits them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from executive.mission.errors import listing
 from executive.mission.geometry import inside
 from executive.mission.goal import surfaces_to_search
 from executive.mission.knowledge import Knowledge
-from executive.tree.behaviours.board import FromBoard, SurfaceOfSighting, beside
+from executive.tree.behaviours.board import FromBoard, SurfaceOfDetection, beside
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.node import NodeSpec
 from skills.api import Cause
@@ -27,7 +27,7 @@ ASIDE_M: Final = 0.45
 def surfaces_elsewhere(
     knowledge: Knowledge, thing: str, place: str | None, avoided: frozenset[str] = frozenset()
 ) -> tuple[str, ...]:
-    """The surfaces to look at when the thing is not in its place: where it usually is, then others of the same room,
+    """The surfaces to look at when the object is not in its place: where it usually is, then others of the same room,
     then any others; `MOST_ELSEWHERE` at most, and none that are `avoided`."""
     if place is None:
         return ()
@@ -47,7 +47,7 @@ def look_plans(
     *,
     tallied: bool = False,
 ) -> tuple[tuple[str, NodeSpec], ...]:
-    """For each surface and viewpoint: drive there and look. The sighting goes to `key`; `extra` are detect's.
+    """For each surface and viewpoint: drive there and look. The detection goes to `key`; `extra` are detect's.
 
     With `tallied`, all that a look saw goes to the key that `tally_key` gives for its leaf.
     """
@@ -82,7 +82,7 @@ def detect_plan(
     *,
     tallied: bool = False,
 ) -> NodeSpec:
-    """Look for the thing on some surfaces, by name or from the blackboard, from where the robot stands."""
+    """Look for the object on some surfaces, by name or from the blackboard, from where the robot stands."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(builder.surface, surfaces))
     ports = {"classes": builder.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
     tally = {"observations": tally_key(f"{builder.path_id}/detect")} if tallied else {}
@@ -91,19 +91,16 @@ def detect_plan(
 
 def find_again_plan(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodeSpec:
     """When it was seen before: look from here first, where it was seen. Else passed over."""
-    seen_on = SurfaceOfSighting(key, tuple(map(builder.surface, surfaces)))
+    seen_on = SurfaceOfDetection(key, tuple(map(builder.surface, surfaces)))
     look = detect_plan(builder, thing, seen_on, key)
     return builder.node("only if known", "look from here, if seen before", look, key=key)
 
 
 def search_plan(builder: PlanBuilder, thing: Thing, place: str | None, key: str, *, anywhere: bool = True) -> NodeSpec:
-    """Look from here when it was seen before, else at each surface in turn; the first sighting ends the search.
+    """Look from here when it was seen before, else at each surface in turn; the first detection ends the search.
 
     When it is nowhere in its place, look at some of its surfaces from aside, then, with `anywhere`, at surfaces
-    elsewhere.
-
-    Raises:
-        InputError: the place has no surfaces.
+    elsewhere. Raises InputError: the place has no surfaces.
     """
     surfaces = required_surfaces(builder, thing, place)
     name = builder.knowledge.thing(thing.name) or thing.name

@@ -29,8 +29,7 @@ def skill_plan(
 ) -> NodeSpec:
     """The leaf of a skill step. `names` are the outputs of earlier steps and their blackboard keys; its own are added.
 
-    Raises:
-        InputError: no such skill, a value that does not fit its port, an unknown port or name.
+    Raises InputError: no such skill, a value that does not fit its port, an unknown port or name.
     """
     skill = _registered(call, registry)
     inputs = _inputs(call, skill, knowledge, names)

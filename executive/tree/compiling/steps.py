@@ -10,7 +10,7 @@ from typing import Final
 from executive.mission.command import START, Task, Thing
 from executive.mission.geometry import inside
 from executive.tree.behaviours.board import FromBoard
-from executive.tree.behaviours.requirements import Holds
+from executive.tree.behaviours.conditions import Holds
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.compiling.handling import go_near_plan, pick_up_plan, tidied, tuck_plan, unless_dropped
 from executive.tree.compiling.search import (
@@ -29,8 +29,7 @@ from skills.robot import Pose2D
 def step_plan(builder: PlanBuilder) -> NodeSpec:
     """The subtree of the builder's command.
 
-    Raises:
-        InputError: an unknown place or thing, or a command that cannot be carried out.
+    Raises InputError: an unknown place or object, or a command that cannot be carried out.
     """
     return _BY_TASK[builder.command.task](builder)
 
@@ -43,14 +42,14 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     """
     thing = _required(builder, builder.command.object)
     if builder.command.item is not None:
-        raise builder.error("the one gripper cannot take hold of a second thing", "put the first one down before")
+        raise builder.error("the one gripper cannot take hold of a second object", "put the first one down before")
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
     surfaces = set(required_surfaces(builder, thing, place))
     if anywhere and builder.anywhere:
         name = builder.knowledge.thing(thing.name) or thing.name
         surfaces |= set(surfaces_elsewhere(builder.knowledge, name, place, builder.avoided))
     around = tuple(builder.surface(name) for name in builder.knowledge.surfaces if name in surfaces)
-    key = f"{builder.path_id}/sighting"
+    key = f"{builder.path_id}/detection"
     search = search_plan(builder.at("find"), thing, place, key, anywhere=anywhere)
     return builder.sequence(
         f"get {thing} {where(place)}",
@@ -62,7 +61,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
 def find_plan(builder: PlanBuilder) -> NodeSpec:
     """Look at the surfaces of the place and answer yes or no; where it is asked where or how many, tell that, too.
 
-    The first thing that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
+    The first object that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
     """
     thing, count = _required(builder, builder.command.object), builder.command.object_count
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
@@ -70,7 +69,7 @@ def find_plan(builder: PlanBuilder) -> NodeSpec:
     below, counting = builder.at("search"), count != 1
     whole_room = place is None or place in builder.knowledge.places
     extra = {"floor": whole_room, "count": 0 if counting else 1}
-    looks = look_plans(below, thing, surfaces, f"{builder.path_id}/sighting", extra, tallied=counting)
+    looks = look_plans(below, thing, surfaces, f"{builder.path_id}/detection", extra, tallied=counting)
     search = below.node("round" if counting else "selector", f"look for {thing}", *(look for _, look in looks))
     leaves = {s: tuple(f"{look.path_id}/detect" for name, look in looks if name == s) for s in surfaces}
     asked = _asked_for(str(thing), count)
@@ -116,7 +115,7 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
     if command.item is not None:
         return carry_plan(builder)
     if command.goal is None:
-        raise builder.error("the command asks for nothing", "name a place to go to, or a thing")
+        raise builder.error("the command asks for nothing", "name a place to go to, or an object")
     return builder.sequence(f"go to {command.goal}", go_near_plan(builder, _goal_pose(builder, command.goal)))
 
 
@@ -173,7 +172,7 @@ def _put_on_plan(builder: PlanBuilder, surface: str, carry: NodeSpec) -> NodeSpe
 
 def _holding(builder: PlanBuilder, item: Thing, below: NodeSpec) -> NodeSpec:
     """A guard: what is carried stays in the gripper."""
-    return builder.node("guard", f"holding {item}", below, requirement=Holds(str(item)))
+    return builder.node("guard", f"holding {item}", below, condition=Holds(str(item)))
 
 
 def _person_at_start(builder: PlanBuilder) -> str:
@@ -187,7 +186,7 @@ def _person_at_start(builder: PlanBuilder) -> str:
 
 def _required(builder: PlanBuilder, thing: Thing | None) -> Thing:
     if thing is None:
-        raise builder.error("the command names no thing", "say what it is about")
+        raise builder.error("the command names no object", "say what it is about")
     builder.classes(thing.name)
     return thing
 

@@ -1,4 +1,4 @@
-"""Several things at once: the robot carries one at a time, so it goes as often as there are things."""
+"""Several objects at once: the robot carries one at a time, so it goes as often as there are objects."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_TRIPS: Final = 20
 
 
 def are_trips(get: Command, bring: Command | None) -> bool:
-    """True when two commands in a row ask to get several things and to bring as many of them somewhere."""
+    """True when two commands in a row ask to get several objects and to bring as many of them somewhere."""
     if bring is None or get.task is not Task.GRASP or get.object is None or get.object_count < 2:
         return False
     carried, count = (bring.item, bring.item_count) if bring.task is None else (bring.object, bring.object_count)
@@ -27,9 +27,8 @@ def are_trips(get: Command, bring: Command | None) -> bool:
 def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     """Get one and bring it there, as often as was said; `builder` is that of the command to get them.
 
-    Raises:
-        InputError: too many; to a person, who does not take them from the gripper; no place to take them from, or one
-            where those that were brought would be found again.
+    Raises InputError: too many; to a person, who does not take them from the gripper; no place to take them from, or
+    one where those that were brought would be found again.
     """
     get, goal = builder.command, bring.goal
     count, thing = get.object_count, get.object
@@ -54,8 +53,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
 def refuse_several(builder: PlanBuilder) -> None:
     """Refuse a count that no trips are made of; in a question any count will do.
 
-    Raises:
-        InputError: more than one thing, or an open number of things.
+    Raises InputError: more than one object, or an open number of objects.
     """
     command = builder.command
     asked = 1 if command.task is Task.FIND else command.object_count
@@ -67,7 +65,7 @@ def refuse_several(builder: PlanBuilder) -> None:
 
 
 def _trip(builder: PlanBuilder, bring: Command, number: int) -> NodeSpec:
-    """Get one thing and bring it."""
+    """Get one object and bring it."""
     trip = builder.at(f"trip-{number}")
     get_one = replace(trip.at("get"), command=replace(builder.command, object_count=1))
     bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))

@@ -15,9 +15,8 @@ from executive.tree.types import assignable, conforms, describe_type, field_type
 def check_wiring(root: NodeSpec) -> None:
     """Check all ports of a tree.
 
-    Raises:
-        InputError: an input port without a value, an unknown port, a value of a wrong type, a blackboard key that no
-            earlier node writes, an output bound to a port that the skill does not have, or a path id used twice.
+    Raises InputError: an input port without a value, an unknown port, a value of a wrong type, a blackboard key that no
+    earlier node writes, an output bound to a port that the skill does not have, or a path id used twice.
     """
     written: dict[str, Any] = {}
     seen: set[str] = set()

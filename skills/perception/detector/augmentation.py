@@ -127,7 +127,7 @@ class DetectsClass(Protocol):
 
 @dataclass(frozen=True)
 class AugmentationOptions:
-    """The views, and when the first one is enough: when no score, also of a rival, lies between `low` and `high`."""
+    """The views, and when the first one is enough: no score, also of alternatives, lies between `low` and `high`."""
 
     views: tuple[View, ...] = VIEWS
     low: float = 0.3
@@ -163,7 +163,7 @@ class AugmentedDetector:
         options = self.detector.options
         threshold = options.threshold if least_score is None else least_score
         sensitive = OnnxDetector(
-            self.detector.model, replace(options, threshold=_LEAST_SCORE, rival_threshold=_LEAST_SCORE)
+            self.detector.model, replace(options, threshold=_LEAST_SCORE, alternative_threshold=_LEAST_SCORE)
         )
         views = self.options.views
         found = sensitive.detect([views[0].of(picture)])
@@ -173,12 +173,15 @@ class AugmentedDetector:
             found += sensitive.detect([view.of(picture) for view in views[1:]])
         fused = _fused(views, found, picture.shape, self.class_names)
         return detections_of(
-            fused.from_score(min(threshold, options.rival_threshold)), self.class_names, threshold, options.suppression
+            fused.from_score(min(threshold, options.alternative_threshold)),
+            self.class_names,
+            threshold,
+            options.suppression,
         )
 
     def _in_doubt(self, found: Sequence[Detection]) -> bool:
         """Whether one view finds what may or may not be there."""
-        scores = [score for one in found for score in (one.score, *(score for _, score in one.rivals))]
+        scores = [score for one in found for score in (one.score, *(score for _, score in one.alternatives))]
         return any(self.options.low < score < self.options.high for score in scores)
 
 
@@ -227,9 +230,9 @@ class _Group:
 
 
 def _numbered(found: Iterable[Sequence[Detection]]) -> Iterable[tuple[Detection, int]]:
-    """Detections and their rivals, each with its view's number."""
+    """Detections and their alternatives, each with its view's number."""
     for number, ones in enumerate(found):
         for one in ones:
             yield one, number
-            for name, score in one.rivals:
+            for name, score in one.alternatives:
                 yield Detection(name, score, one.box), number

@@ -33,14 +33,14 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class DetectorOptions:
-    """The least score of a detection, also of a rival class, and how boxes of one object become one.
+    """The least score of a detection, also of an alternative class, and how boxes of one object become one.
 
     `proposals` are judged by the refinement network, and of those the `classified` by the classifier network. A quick
     look for one class is content with the proposals that give that class at least `quick_score`.
     """
 
     threshold: float = 0.5
-    rival_threshold: float = 0.1
+    alternative_threshold: float = 0.1
     suppression: SuppressionOptions = field(default_factory=SuppressionOptions)
     proposals: ProposalOptions = field(default_factory=ProposalOptions)
     classified: ProposalOptions = CLASSIFIED
@@ -98,7 +98,7 @@ class OnnxDetector:
         if model.classifier is not None:
             boxes, scores = classified(model.classifier.session, scales, boxes, scores, self.options.classified)
         options = self.options
-        least = min(options.threshold, options.rival_threshold)
+        least = min(options.threshold, options.alternative_threshold)
         found = candidates_of(boxes, scores, least, options.suppression.most_candidates)
         in_picture = replace(found, boxes=placed.to_picture(found.boxes))
         return detections_of(in_picture, self.class_names, options.threshold, options.suppression)

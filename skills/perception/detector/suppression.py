@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skills.detection import Detection
 
-__all__ = ["Candidates", "SuppressionOptions", "apart", "candidates_of", "detections_of", "rivals_of", "suppress"]
+__all__ = ["Candidates", "SuppressionOptions", "alternatives_of", "apart", "candidates_of", "detections_of", "suppress"]
 
 Floats = NDArray[np.float32]
 
@@ -22,13 +22,13 @@ class SuppressionOptions:
     Boxes of one class that overlap by more than `same_class` (shared area / area of both) are one thing. So are boxes
     of two classes over `other_class`, when the surer of the two has at least `sure_score`. Of more than
     `most_candidates` boxes in a picture the surest are looked at, and `most_kept` of those that stay are told. What a
-    thing may be as well is told by boxes of other classes that overlap its own by more than `rival`.
+    thing may be as well is told by boxes of other classes that overlap its own by more than `alternative`.
     """
 
     same_class: float = 0.45
     other_class: float = 0.6
     sure_score: float = 0.5
-    rival: float = 0.55
+    alternative: float = 0.55
     most_candidates: int = 1000
     most_kept: int = 300
 
@@ -109,23 +109,25 @@ def detections_of(
         kept.classes.tolist(),
         kept.scores.tolist(),
         kept.boxes.astype(np.float64).tolist(),
-        rivals_of(kept, candidates, options),
+        alternatives_of(kept, candidates, options),
         strict=True,
     )
     return tuple(
-        Detection(class_names[which], score, (u0, v0, u1, v1), tuple((class_names[k], s) for k, s in rivals.items()))
-        for which, score, (u0, v0, u1, v1), rivals in rows
+        Detection(
+            class_names[which], score, (u0, v0, u1, v1), tuple((class_names[k], s) for k, s in alternatives.items())
+        )
+        for which, score, (u0, v0, u1, v1), alternatives in rows
     )
 
 
-def rivals_of(kept: Candidates, candidates: Candidates, options: SuppressionOptions) -> list[dict[int, float]]:
+def alternatives_of(kept: Candidates, candidates: Candidates, options: SuppressionOptions) -> list[dict[int, float]]:
     """For each of those kept, the other classes that it may be with their best scores on the same thing."""
-    alike = _overlaps(kept.boxes, candidates.boxes) > options.rival
+    alike = _overlaps(kept.boxes, candidates.boxes) > options.alternative
     alike &= kept.classes[:, None] != candidates.classes[None, :]
-    rivals: list[dict[int, float]] = [{} for _ in range(len(kept))]
+    alternatives: list[dict[int, float]] = [{} for _ in range(len(kept))]
     for row, column in np.argwhere(alike).tolist():
-        rivals[row].setdefault(int(candidates.classes[column]), float(candidates.scores[column]))
-    return rivals
+        alternatives[row].setdefault(int(candidates.classes[column]), float(candidates.scores[column]))
+    return alternatives
 
 
 def _overlaps(first: Floats, second: Floats) -> Floats:

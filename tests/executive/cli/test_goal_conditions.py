@@ -2,51 +2,51 @@
 
 import pytest
 
-from executive.cli.goal_conditions import promise_of, promises_of
+from executive.cli.goal_conditions import condition_of, conditions_of
 from executive.mission.command import parse_command
 from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from executive.mission.goal import command_goal
 from executive.tree.compiler import compile_mission
-from plant.referee import PromiseKind
+from plant.referee import GoalKind
 
 
-def promised(knowledge, *texts):
-    conditions = [command_goal(parse_command(text), knowledge) for text in texts]
-    return tuple(promise_of(condition, robot="Alice", answer=None) for condition in conditions)
+def conditions(knowledge, *texts):
+    goals = (command_goal(parse_command(text), knowledge) for text in texts)
+    return tuple(condition_of(goal, robot="Alice", answer=None) for goal in goals)
 
 
-def test_fetch_promises_a_grasp_in_the_kitchen_and_a_hand_over(knowledge, make):
-    grasp, hand_over = promised(knowledge, *make.FETCH)
-    assert (grasp.kind, grasp.classes, grasp.robot) == (PromiseKind.GRASPED, ("coke", "beer"), "Alice")
+def test_fetch_asks_for_a_grasp_in_the_kitchen_and_a_hand_over(knowledge, make):
+    grasp, hand_over = conditions(knowledge, *make.FETCH)
+    assert (grasp.kind, grasp.classes, grasp.robot) == (GoalKind.GRASPED, ("coke", "beer"), "Alice")
     assert {region.name for region in grasp.source} == {"counter", "shelf"}
-    assert (hand_over.kind, hand_over.classes, hand_over.person) == (PromiseKind.HANDED_OVER, ("coke", "beer"), None)
+    assert (hand_over.kind, hand_over.classes, hand_over.person) == (GoalKind.HANDED_OVER, ("coke", "beer"), None)
 
 
 def test_surface_regions_begin_at_the_top(knowledge, make):
-    grasp, _ = promised(knowledge, *make.FETCH)
+    grasp, _ = conditions(knowledge, *make.FETCH)
     counter = next(region for region in grasp.source if region.name == "counter")
     assert (round(counter.z_min_m, 3), round(counter.z_max_m, 3)) == (0.85, 1.2)
     assert counter.contains((5.8, -1.8, 0.95))
 
 
 def test_a_room_as_goal_means_any_surface_in_it(knowledge):
-    (placed,) = promised(knowledge, "Take [coke] to [kitchen] and do [Nothing] to [Nothing]")
-    assert (placed.kind, {region.name for region in placed.goal}) == (PromiseKind.PLACED, {"counter", "shelf"})
+    (placed,) = conditions(knowledge, "Take [coke] to [kitchen] and do [Nothing] to [Nothing]")
+    assert (placed.kind, {region.name for region in placed.goal}) == (GoalKind.PLACED, {"counter", "shelf"})
 
 
 def test_a_person_is_named(knowledge):
-    (promise,) = promised(knowledge, "Take [coke] to [Sam] and do [Nothing] to [Nothing]")
-    assert (promise.kind, promise.person) == (PromiseKind.HANDED_OVER, "Sam")
+    (condition,) = conditions(knowledge, "Take [coke] to [Sam] and do [Nothing] to [Nothing]")
+    assert (condition.kind, condition.person) == (GoalKind.HANDED_OVER, "Sam")
 
 
 @pytest.mark.parametrize(
     ("goal", "point"), [("kitchen", (5.9, -1.9, 0.5)), ("counter", (4.5, -1.0, 0.5)), ("start", (0, 0, 0.5))]
 )
-def test_going_promises_the_body_there(knowledge, goal, point):
-    (promise,) = promised(knowledge, f"Take [Nothing] to [{goal}] and do [Nothing] to [Nothing]")
-    assert promise.kind is PromiseKind.WENT
-    assert promise.goal[0].contains(point)
-    assert not promise.goal[0].contains((-9.0, 9.0, 0.5))
+def test_going_asks_for_the_body_there(knowledge, goal, point):
+    (condition,) = conditions(knowledge, f"Take [Nothing] to [{goal}] and do [Nothing] to [Nothing]")
+    assert condition.kind is GoalKind.WENT
+    assert condition.goal[0].contains(point)
+    assert not condition.goal[0].contains((-9.0, 9.0, 0.5))
 
 
 GET = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
@@ -55,13 +55,13 @@ SKIPPED = StepPolicy(on_failure=OnFailure.SKIP)
 
 
 @pytest.fixture
-def promised_by(knowledge, registry, run_tree):
-    """The promises of a mission's steps after it ran with the scripted robot."""
+def conditions_by(knowledge, registry, run_tree):
+    """The conditions of a mission's steps after it ran with the scripted robot."""
 
     def after_running(*steps):
         mission = Mission("m", "flat", "Alice", steps)
         tree = compile_mission(mission, knowledge=knowledge, registry=registry)
-        return promises_of(tree, run_tree(tree).robots[0])
+        return conditions_of(tree, run_tree(tree).robots[0])
 
     return after_running
 
@@ -70,35 +70,35 @@ def step(text, policy=SKIPPED):
     return MissionStep((parse_command(text),), policy=policy)
 
 
-def test_a_step_that_was_skipped_promises_nothing(promised_by, script):
+def test_a_step_that_was_skipped_has_no_condition(conditions_by, script):
     script.seen_on = ()
-    assert [promise.kind for promise in promised_by(step(GET), step(GO))] == [PromiseKind.WENT]
+    assert [condition.kind for condition in conditions_by(step(GET), step(GO))] == [GoalKind.WENT]
 
 
-def test_a_step_that_could_have_been_skipped_but_was_done_promises(promised_by):
-    assert [promise.kind for promise in promised_by(step(GET))] == [PromiseKind.GRASPED]
+def test_a_step_that_could_have_been_skipped_but_was_done_has_its_condition(conditions_by):
+    assert [condition.kind for condition in conditions_by(step(GET))] == [GoalKind.GRASPED]
 
 
-def test_steps_of_a_used_mission_that_was_skipped_promise_nothing(promised_by, script):
+def test_steps_of_a_used_mission_that_was_skipped_have_no_conditions(conditions_by, script):
     script.seen_on = ()
     used = Mission("inner", "flat", "Alice", (step(GO, StepPolicy()), step(GET, StepPolicy())))
     outer = MissionStep(policy=SKIPPED, used=used)
-    assert [promise.kind for promise in promised_by(outer, step(GO))] == [PromiseKind.WENT]
+    assert [condition.kind for condition in conditions_by(outer, step(GO))] == [GoalKind.WENT]
 
 
-def test_a_drive_to_a_pose_promises_the_body_there(promised_by):
-    (promise,) = promised_by(MissionStep(skill=SkillCall("navigate", {"x": 4.0, "y": -1.0})))
-    assert promise.kind is PromiseKind.WENT
-    assert promise.goal[0].contains((4.1, -0.9, 0.5))
-    assert not promise.goal[0].contains((4.5, -1.0, 0.5))
+def test_a_drive_to_a_pose_asks_for_the_body_there(conditions_by):
+    (condition,) = conditions_by(MissionStep(skill=SkillCall("navigate", {"x": 4.0, "y": -1.0})))
+    assert condition.kind is GoalKind.WENT
+    assert condition.goal[0].contains((4.1, -0.9, 0.5))
+    assert not condition.goal[0].contains((4.5, -1.0, 0.5))
 
 
-def test_a_thing_may_be_taken_from_where_else_it_was_looked_for(promised_by):
-    (promise,) = promised_by(step("Take [Nothing] to [bedroom] and do [grasp] to [coke]"))
-    assert {region.name for region in promise.source} == {"bedside table", "counter", "shelf"}
+def test_a_thing_may_be_taken_from_where_else_it_was_looked_for(conditions_by):
+    (condition,) = conditions_by(step("Take [Nothing] to [bedroom] and do [grasp] to [coke]"))
+    assert {region.name for region in condition.source} == {"bedside table", "counter", "shelf"}
 
 
-def test_an_answer_belongs_to_its_own_check(promised_by, script):
+def test_an_answer_belongs_to_its_own_check(conditions_by, script):
     find = "Take [Nothing] to [{}] and do [find] to [coke]"
-    kitchen, bedroom = promised_by(step(find.format("kitchen")), step(find.format("bedroom")))
+    kitchen, bedroom = conditions_by(step(find.format("kitchen")), step(find.format("bedroom")))
     assert (kitchen.answer, bedroom.answer) == (True, False)

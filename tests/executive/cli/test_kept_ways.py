@@ -4,9 +4,9 @@ import os
 
 import pytest
 
-from executive.cli.kept_ways import KeptWays, kept_ways_of
+from executive.cli.kept_ways import KeptRoutes, kept_routes_of
 from executive.cli.worlds import open_world
-from executive.tree.estimate import Way
+from executive.tree.estimate import Route
 from skills.robot import Pose2D
 
 HERE, THERE, NOWHERE = Pose2D(0.0, 0.0, 0.0), Pose2D(3.0, 4.0, 0.5), Pose2D(99.0, 0.0, 0.0)
@@ -18,11 +18,11 @@ class Planner:
     def __init__(self):
         self.asked = 0
 
-    def way(self, start, goal):
+    def route(self, start, goal):
         self.asked += 1
         if goal == NOWHERE:
             raise ValueError("There is no way.")
-        return Way(5.0, 5.25)
+        return Route(5.0, 5.25)
 
 
 @pytest.mark.parametrize("broken", ["", "[", '{"a": 1'])
@@ -31,19 +31,19 @@ def test_each_way_is_planned_once_in_all_processes(tmp_path, broken):
     file.parent.mkdir()
     file.write_text(broken)
     for process in range(2):
-        ways = KeptWays(file, planner)
-        assert ways.way(HERE, THERE) == Way(5.0, 5.25)
+        ways = KeptRoutes(file, planner)
+        assert ways.route(HERE, THERE) == Route(5.0, 5.25)
         with pytest.raises(ValueError, match=r"There is no way\."):
-            ways.way(HERE, NOWHERE)
+            ways.route(HERE, NOWHERE)
         assert planner.asked == 2, process
-    KeptWays(file, planner).way(THERE, HERE)
+    KeptRoutes(file, planner).route(THERE, HERE)
     assert planner.asked == 3
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_where_nothing_can_be_kept_ways_are_planned_all_the_same(tmp_path):
     tmp_path.chmod(0o500)
-    assert KeptWays(tmp_path / "ways" / "a.json", Planner()).way(HERE, THERE) == Way(5.0, 5.25)
+    assert KeptRoutes(tmp_path / "ways" / "a.json", Planner()).route(HERE, THERE) == Route(5.0, 5.25)
 
 
 def test_ways_are_planned_anew_when_a_file_that_they_depend_on_has_changed(tmp_path, monkeypatch):
@@ -51,5 +51,5 @@ def test_ways_are_planned_anew_when_a_file_that_they_depend_on_has_changed(tmp_p
     robot, planner = tmp_path / "robot.yaml", Planner()
     for text, asked in (("a", 1), ("a", 1), ("b", 2)):
         robot.write_text(text)
-        kept_ways_of(open_world("flat"), planner, robot).way(HERE, THERE)
+        kept_routes_of(open_world("flat"), planner, robot).route(HERE, THERE)
         assert planner.asked == asked

@@ -45,9 +45,9 @@ def test_space_pauses_and_goes_on(control):
 
 def test_s_steps_from_a_running_mission(control):
     assert pressed(control, "s").mode is Mode.PAUSED
-    assert control.heed().hold is None
+    assert control.poll().hold is None
     control.ticked(changed=True)
-    assert control.heed().hold == "stepping"
+    assert control.poll().hold == "stepping"
 
 
 def test_x_is_the_stop_button(control):
@@ -58,7 +58,7 @@ def test_x_is_the_stop_button(control):
 @pytest.mark.parametrize("key", ["c", "q"])
 def test_c_and_q_cancel(control, key):
     pressed(control, key)
-    assert control.heed().cancel == "cancelled at the terminal"
+    assert control.poll().cancel == "cancelled at the terminal"
 
 
 def test_other_keys_do_nothing(control):

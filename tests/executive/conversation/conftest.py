@@ -53,13 +53,13 @@ def given(control):
     """The commands of the missions that were given: first, instead, later."""
 
     def texts():
-        wishes = control.heed()
+        requests = control.poll()
         return {
             when: [[str(command) for command in tree.commands] for tree in trees]
             for when, trees in (
-                ("first", wishes.preempts),
-                ("instead", [wish.tree for wish in wishes.instead]),
-                ("later", wishes.later),
+                ("first", requests.preempts),
+                ("instead", [request.tree for request in requests.instead]),
+                ("later", requests.later),
             )
             if trees
         }

@@ -127,7 +127,7 @@ def test_go_on_releases_a_stop_that_was_told_but_not_a_pressed_button(talk, cont
 
 def test_cancel_ends_the_run(talk, control):
     talk().hear("never mind")
-    assert control.heed().cancel == "told to cancel"
+    assert control.poll().cancel == "told to cancel"
 
 
 def test_before_the_run_it_is_said_that_it_has_not_begun(talk):
@@ -293,7 +293,7 @@ def test_what_is_held_is_put_down_before_another_thing_is_fetched(speech, contro
 
     def observe(progress):
         conversation.observe(progress)
-        if not replies and progress.glances["Alice"].holding:
+        if not replies and progress.robots["Alice"].holding:
             replies.append(conversation.hear("no, the beer"))
 
     run_tree(tree, control=control, observer=observe)
@@ -312,7 +312,7 @@ def test_what_is_held_is_not_fetched_again(speech, control, run_tree):
 
     def observe(progress):
         conversation.observe(progress)
-        if not replies and progress.glances["Alice"].holding:
+        if not replies and progress.robots["Alice"].holding:
             replies.append(conversation.hear("no, to the bedroom"))
 
     run_tree(tree, control=control, observer=observe)

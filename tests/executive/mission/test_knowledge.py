@@ -120,10 +120,6 @@ def test_poses_are_those_of_the_file(knowledge):
     assert knowledge.place_pose("workbench").yaw == 1.57
 
 
-def test_class_ids_are_the_detectors(knowledge):
-    assert knowledge.class_ids("drink") == (2, 1)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "line", "says"),
     [

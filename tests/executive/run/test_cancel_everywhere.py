@@ -68,7 +68,7 @@ def run_until(mission, tick, act):
     """Run the mission, act on its control after a tick; the result, robot, clock, and how long each part moved on."""
     clock, control = VirtualClock(), Control(pace=None)
     robot = ScriptedRobot(clock, capabilities=CAPABILITIES)
-    robot.put_in_jaw(0.3)
+    robot.put_in_gripper(0.3)
     entry = RunEntry(mission, robot, KnownPlace(), BlockCostmap())
     result = run(
         [entry],
@@ -130,7 +130,7 @@ def test_holding_is_kept_through_a_pause(mission):
         if robot.holding and not forces:
             control.pause()
         if control.state.mode.value == "paused":
-            forces.append((robot.holding, robot.jaw_force_n))
+            forces.append((robot.holding, robot.clamp_force_n))
             if len(forces) == 30:
                 control.resume()
 

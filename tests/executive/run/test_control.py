@@ -317,7 +317,7 @@ def test_nobody_answers_and_the_default_counts(control, clock):
     asked = control.ask(QUESTION, clock)
     clock.advance(2.0)
     assert (asked.done(), asked.result(), control.state.questions) == (True, "skip", ())
-    events = control.heed().events
+    events = control.poll().events
     assert [event.what for event in events] == ["question", "question over"]
 
 
@@ -336,7 +336,7 @@ def test_wrong_answers_and_late_ones_are_refused(control, clock):
     assert nobody_to_ask(QUESTION).result() == "skip"
 
 
-def test_a_skill_asks_the_operator_in_the_midst_of_a_run(compiled, run_tree, make, control, script):
+def test_a_skill_asks_the_operator_while_running(compiled, run_tree, make, control, script):
     said = []
 
     def ask(skill):
@@ -533,12 +533,10 @@ def test_a_robot_that_is_not_in_the_run_gets_no_mission(compiled, control, make)
 
 
 def test_an_observer_sees_where_the_robot_is_and_what_it_holds(compiled, run_tree, make, control):
-    glances = []
-    run_tree(
-        compiled(*make.FETCH), control=control, observer=lambda progress: glances.append(progress.glances["Alice"])
-    )
-    assert (glances[0].pose.x_m, glances[0].pose.y_m, glances[0].holding) == (0.0, 0.0, False)
-    assert glances[-1].holding
+    robots = []
+    run_tree(compiled(*make.FETCH), control=control, observer=lambda progress: robots.append(progress.robots["Alice"]))
+    assert (robots[0].pose.x_m, robots[0].pose.y_m, robots[0].holding) == (0.0, 0.0, False)
+    assert robots[-1].holding
 
 
 @pytest.mark.parametrize("give", ["replace", "then"])

@@ -48,7 +48,7 @@ class Nothing:
 
 
 class UseAll(Skill):
-    """Uses every verb while base, body, arm and jaw move."""
+    """Uses every verb while base, body, arm and gripper move."""
 
     name = "use_all"
     Inputs: ClassVar[type] = Nothing

@@ -27,7 +27,7 @@ def test_fetch_succeeds_and_the_robot_is_left_in_order(compiled, run_tree, make,
     assert script.ended == script.begun
 
 
-def test_the_first_sighting_ends_the_search_and_others_are_tried_before(compiled, run_tree, make, script):
+def test_the_first_detection_ends_the_search_and_others_are_tried_before(compiled, run_tree, make, script):
     script.seen_on = ("shelf",)
     assert run_tree(compiled(*make.FETCH)).outcome is Outcome.SUCCESS
     assert script.begun[:6] == ["navigate", "detect"] * 3

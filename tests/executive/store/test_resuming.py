@@ -76,7 +76,7 @@ def handling(world, robot, script, registry):
             self.count = 4 if robot.holding else 0
 
         def undone(self, inputs):
-            return None if robot.holding else "the jaw is empty"
+            return None if robot.holding else "the gripper is empty"
 
     class Place(Handling):
         name, Inputs = "place", registry["place"].Inputs
@@ -207,7 +207,7 @@ def test_a_thing_lost_over_the_restart_is_taken_anew(live, robot, world):
     result, _, recollection = live(TIDY)
     assert result.outcome is Outcome.SUCCESS
     assert world.grasps == 2
-    assert any(told.endswith("/grasp: does it again, since the jaw is empty") for told in recollection.told)
+    assert any(told.endswith("/grasp: does it again, since the gripper is empty") for told in recollection.told)
 
 
 def test_a_failed_look_before_the_kill_is_not_looked_again(live, script):
@@ -231,7 +231,7 @@ def test_a_step_whose_output_could_not_be_kept_is_done_again(live, store, script
     memory = store.memory(1)
     seen = {path for path, step in memory.steps.items() if path.endswith("/detect") and step.status is Status.SUCCESS}
     assert seen
-    bare = dataclasses.replace(memory, board={k: v for k, v in memory.board.items() if not k.endswith("/sighting")})
+    bare = dataclasses.replace(memory, board={k: v for k, v in memory.board.items() if not k.endswith("/detection")})
     store.memory = lambda number: bare
     result, _, _ = live(TIDY)
     assert result.outcome is Outcome.SUCCESS

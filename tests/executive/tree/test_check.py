@@ -8,9 +8,9 @@ import pytest
 from executive.mission.command import parse_command
 from executive.mission.errors import SourceLine
 from executive.mission.file.model import Mission, MissionStep, SkillCall
-from executive.tree.check import Abilities, PlannedWays, check_tree
+from executive.tree.check import Abilities, PlannedRoutes, check_tree
 from executive.tree.compiler import compile_mission
-from executive.tree.estimate import Way, load_estimates
+from executive.tree.estimate import Route, load_estimates
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
 from skills.navigate.footprint import Footprint
@@ -24,18 +24,18 @@ GO = "Take [Nothing] to [{}] and do [Nothing] to [Nothing]"
 ONLY_COKE = {"classes": frozenset({"coke"})}
 
 
-class StraightWays:
+class StraightRoutes:
     """Ways as the crow flies; there is none to what lies beyond `far_m` in x."""
 
     def __init__(self, far_m=99.0):
         self.far_m, self.asked = far_m, []
 
-    def way(self, start, goal):
+    def route(self, start, goal):
         self.asked.append((start, goal))
         if goal.x_m > self.far_m:
             raise ValueError(f"There is no way to ({goal.x_m:.2f}, {goal.y_m:.2f}).")
         length_m = ((goal.x_m - start.x_m) ** 2 + (goal.y_m - start.y_m) ** 2) ** 0.5
-        return Way(length_m, length_m)
+        return Route(length_m, length_m)
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def check(knowledge, registry, tmp_path):
             knowledge=knowledge,
             start=START,
             abilities=abilities,
-            itinerary=ways or StraightWays(),
+            planner=ways or StraightRoutes(),
             estimates=load_estimates(),
         )
 
@@ -83,7 +83,7 @@ def test_time_and_charge_follow_from_the_way(check):
 
 
 def test_each_way_begins_where_the_last_one_ended(check):
-    ways = StraightWays()
+    ways = StraightRoutes()
     check(
         *(f"Take [Nothing] to [{room}] and do [Nothing] to [Nothing]" for room in ("kitchen", "bedroom", "start")),
         ways=ways,
@@ -92,28 +92,28 @@ def test_each_way_begins_where_the_last_one_ended(check):
 
 
 def test_a_place_out_of_reach_is_refused_at_its_line(check):
-    checked = check(GO.format("bedroom"), GO.format("kitchen"), ways=StraightWays(far_m=1.0))
+    checked = check(GO.format("bedroom"), GO.format("kitchen"), ways=StraightRoutes(far_m=1.0))
     ((line, message),) = told(checked)
     assert (line, "no way to" in message) == (2, True)
     assert checked.errors[0].mend
 
 
 def test_a_search_goes_on_when_one_surface_is_out_of_reach(check):
-    checked = check(GET.format("coke"), ways=StraightWays(far_m=4.6))
+    checked = check(GET.format("coke"), ways=StraightRoutes(far_m=4.6))
     assert checked.errors == ()
 
 
 def test_a_count_goes_to_all_surfaces_that_can_be_reached(check):
     asked = "Take [Nothing] to [kitchen] and do [find] to [{}coke]"
-    near, every = StraightWays(far_m=4.6), StraightWays()
+    near, every = StraightRoutes(far_m=4.6), StraightRoutes()
     assert check(asked.format("some "), ways=near).errors == ()
-    assert check(asked.format("some "), ways=every).errors == check(asked.format(""), ways=StraightWays()).errors
+    assert check(asked.format("some "), ways=every).errors == check(asked.format(""), ways=StraightRoutes()).errors
     assert len(every.asked) == 3
 
 
 def test_a_raw_pose_out_of_reach_is_refused(check):
     call = SkillCall("navigate", {"x": 50.0, "y": 0.0})
-    ((line, message),) = told(check(call, ways=StraightWays(far_m=9.0)))
+    ((line, message),) = told(check(call, ways=StraightRoutes(far_m=9.0)))
     assert (line, "50.00" in message) == (1, True)
 
 
@@ -163,11 +163,11 @@ def walled():
 
 
 def test_ways_are_planned_on_the_map_for_the_whole_body(walled):
-    ways = PlannedWays(walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]))
+    ways = PlannedRoutes(walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]))
     here = Pose2D(-1.0, -1.0, 0.0)
-    assert ways.way(here, Pose2D(-1.0, 1.0, 0.0)).length_m == pytest.approx(2.0, abs=0.3)
+    assert ways.route(here, Pose2D(-1.0, 1.0, 0.0)).length_m == pytest.approx(2.0, abs=0.3)
     for _ in range(2):
         with pytest.raises(ValueError, match="no way"):
-            ways.way(here, Pose2D(1.0, 1.0, 0.0))
+            ways.route(here, Pose2D(1.0, 1.0, 0.0))
     with pytest.raises(ValueError, match="blocked"):
-        ways.way(here, Pose2D(-1.9, 1.0, 0.0))
+        ways.route(here, Pose2D(-1.9, 1.0, 0.0))

@@ -19,7 +19,7 @@ from executive.record.event_log import EventLog
 from executive.record.history import read_history
 from executive.record.surroundings import map_message
 from executive.run.control import Control, Mode
-from executive.run.outcome import Glance
+from executive.run.outcome import RobotStatus
 from executive.run.runner import Progress
 from executive.tree.node_view import node_view
 from executive.view.actions import RefusedError, asked_json, control_actions
@@ -210,7 +210,7 @@ def test_buttons_and_keys_reach_the_control(page, live, control):
     playwright_api.expect(page.locator("#mode-text")).to_have_text("running")
     page.click("#cancel")
     page.wait_for_function("() => document.getElementById('announced').textContent === 'cancelling'")
-    assert control.heed().cancel == "cancelled from the page"
+    assert control.poll().cancel == "cancelled from the page"
 
 
 def test_keys_are_letters_while_a_sentence_is_typed(page, compiled, make):
@@ -236,8 +236,8 @@ def test_remarks_in_the_sentence_box_are_answered_and_act_at_once(page, compiled
     control.begin({"Alice": tree})
     watch = ControlWatch(control, feed)
     talk = Conversation(Speech(knowledge, "Alice", nothing_else, nothing_else), control)
-    glances = {"Alice": Glance(Pose2D(5.0, -0.9, 0.0), holding=False)}
-    talk.observe(Progress(1.0, 20, 0, {"Alice": {}}, {"Alice": tree}, glances))
+    robots = {"Alice": RobotStatus(Pose2D(5.0, -0.9, 0.0), holding=False)}
+    talk.observe(Progress(1.0, 20, 0, {"Alice": {}}, {"Alice": tree}, robots))
     feed("tree", 0.0, {"robot": "Alice", "root": node_view(tree.root).structure()})
     said = {"say": lambda values: talk.hear(values["text"]).text}
     with PageServer(PageContent(feed, {**control_actions(control), **said})) as server:

@@ -142,7 +142,7 @@ def test_actions_reach_the_control(server, control):
     assert control.state.mode is Mode.STOPPED
     act(server, "release")
     act(server, "cancel")
-    assert control.heed().cancel == "cancelled from the page"
+    assert control.poll().cancel == "cancelled from the page"
 
 
 @pytest.mark.parametrize(

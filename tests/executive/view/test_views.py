@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from executive.tree.node_view import NodeView, node_view, to_json
 from executive.tree.snapshot import NodeState
-from executive.view.looks import Looks, look_of
+from executive.view.styles import Styles, style_of
 from executive.view.svg import to_svg
 from executive.view.text import to_rich, to_text
 from skills.api import Cause, Failed
@@ -78,9 +78,9 @@ def test_a_tree_that_has_not_run_is_idle(compiled, make):
 
 
 def test_looks_are_told_apart_by_symbol_and_colour():
-    looks = [look.value for look in Looks]
+    styles = [style.value for style in Styles]
     for attribute in ("word", "symbol", "ascii", "line", "fill"):
-        assert len({getattr(look, attribute) for look in looks}) == len(looks)
+        assert len({getattr(style, attribute) for style in styles}) == len(styles)
 
 
 @pytest.mark.parametrize(
@@ -93,5 +93,5 @@ def test_looks_are_told_apart_by_symbol_and_colour():
         (NodeState(Status.FAILURE, Cause.PLANNING), "failure"),
     ],
 )
-def test_look_of_each_state(state, word):
-    assert look_of(state).word == word
+def test_style_of_each_state(state, word):
+    assert style_of(state).word == word

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from executive.mission.class_ids import CLASS_IDS
 from plant.dataset.coco import annotation, box_of, categories, counts, document, lost_in_the_dark, mask_of, run_lengths
 from plant.dataset.silhouette import Silhouette
+from skills.perception.class_forms import class_forms
 
 
 @given(arrays(bool, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=12)))
@@ -95,7 +95,7 @@ def test_what_fills_the_picture_is_ignored(rows: int, ignored: int) -> None:
 
 def test_categories_have_the_project_s_class_ids() -> None:
     assert {entry["name"]: entry["id"] for entry in categories()} == {
-        name: CLASS_IDS[name] for name in (entry["name"] for entry in categories())
+        name: form.id for name, form in class_forms().items()
     }
     assert len(categories()) == 9
 

@@ -58,8 +58,8 @@ def test_the_robot_stops_where_it_was_and_nobody_has_its_lease(kept, restored):
 
 
 def test_things_stay_where_they_were(kept, restored):
-    for name in restored.referee._stories:
-        was, now = (each.referee._stories[name].last.p_WO for each in (kept[0], restored))
+    for name in restored.referee._histories:
+        was, now = (each.referee._histories[name].last.p_WO for each in (kept[0], restored))
         assert np.linalg.norm(now - was) < 0.002
 
 

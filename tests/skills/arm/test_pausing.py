@@ -1,4 +1,4 @@
-"""A routine that is paused: it goes on in its midst when all is as it was, and else looks anew what is done."""
+"""A routine that is paused: it goes on where it was when all is as it was, and else looks anew what is done."""
 
 from typing import ClassVar
 
@@ -20,7 +20,7 @@ TICK_S = 0.05
 
 
 class Works(RoutineSkill):
-    """Stands higher, swings the arm, opens the jaw; `story` tells what was begun."""
+    """Stands higher, swings the arm, opens the gripper; `story` tells what was begun."""
 
     name = "works"
     Inputs: ClassVar[type] = type(None)
@@ -125,11 +125,11 @@ def test_when_the_robot_was_elsewhere_it_looks_anew(bench, robot):
 
 
 def test_when_the_thing_was_lost_it_looks_anew(bench, robot):
-    robot.put_in_jaw(0.3)
-    robot.opening_rad, robot.jaw_force_n = 0.3, 20.0
+    robot.put_in_gripper(0.3)
+    robot.opening_rad, robot.clamp_force_n = 0.3, 20.0
 
     def lose():
-        robot.in_jaw_rad = None
+        robot.in_gripper_rad = None
 
     assert run(Works(bench.context()), bench, {6}, between=lose) == Succeeded("done again")
 

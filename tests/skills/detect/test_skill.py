@@ -227,13 +227,13 @@ def test_what_may_be_meant_though_it_is_likelier_something_else_is_looked_at_fro
 
         def taken(self, one):
             small = one.box[3] - one.box[1] < 75.0
-            return replace(one, class_name="beer", score=0.6, rivals=(("coke", 0.4),)) if small else one
+            return replace(one, class_name="beer", score=0.6, alternatives=(("coke", 0.4),)) if small else one
 
     step, _ = found([COKE], DetectInputs(("coke",), (TABLE,)), detector=ConfusedFromAfar())
     assert step.outputs["observation"].thing.name == "coke"
 
 
-def test_the_jaw_is_opened_to_look_and_closed_again():
+def test_the_gripper_is_opened_to_look_and_closed_again():
     robot = ScriptedRobot(things=[])
     failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "no coke")
     assert robot.opening_rad == 0.0

@@ -33,9 +33,9 @@ def test_what_has_a_track_is_named():
 def test_what_may_be_meant_though_it_is_likelier_something_else_is_not_named():
     # what it was taken for, and how many clusters are left of the one that stands there
     rows = [("coke", (), 0), ("beer", (("coke", 0.4),), 1), ("beer", (("hammer", 0.4),), 0), ("beer", (), 0)]
-    for name, rivals, expected in rows:
-        tracks = track_at(COKE.x, COKE.y, name=name, score=0.76, rivals=rivals)
-        assert len(unnamed(clusters(COKE), tracks, ("coke",))) == expected, (name, rivals)
+    for name, alternatives, expected in rows:
+        tracks = track_at(COKE.x, COKE.y, name=name, score=0.76, alternatives=alternatives)
+        assert len(unnamed(clusters(COKE), tracks, ("coke",))) == expected, (name, alternatives)
 
 
 def test_what_is_too_large_or_small_for_the_class_is_passed_over():

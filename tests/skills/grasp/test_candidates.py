@@ -32,17 +32,17 @@ def _hammer(yaw):
 def test_a_can_is_taken_from_the_side_with_the_wrist_rolled():
     best = grasp_candidates(_target(0.066, 0.066, 0.115, is_round=True), MODEL.p_BS, GRIPPER)[0]
     R = best.X_BH.rotation().matrix()
-    assert abs(R[2, 2]) < 1e-9  # the jaw closes level
+    assert abs(R[2, 2]) < 1e-9  # the gripper closes level
     assert R[0, 0] > 0.9  # the fingers point ahead
     assert best.width_m == pytest.approx(0.066)
 
 
-def test_the_can_lies_between_palm_and_fingertips_and_clear_of_the_fixed_jaw():
-    jaw = GRIPPER
+def test_the_can_lies_between_palm_and_fingertips_and_clear_of_the_fixed_gripper():
+    gripper = GRIPPER
     best = grasp_candidates(_target(0.066, 0.066, 0.115, is_round=True), MODEL.p_BS, GRIPPER)[0]
     p_HT = best.X_BH.inverse() @ np.array([0.85, 0.0, 0.2 + 0.06])
-    assert jaw.palm_x_m + 0.033 < p_HT[0] < jaw.tip_x_m - 0.033
-    assert p_HT[2] - 0.033 > jaw.fixed_z_m + 0.005
+    assert gripper.palm_x_m + 0.033 < p_HT[0] < gripper.tip_x_m - 0.033
+    assert p_HT[2] - 0.033 > gripper.fixed_z_m + 0.005
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.8, 1.57, 2.5])
@@ -56,17 +56,17 @@ def test_a_hammer_is_taken_across_its_handle(yaw):
 
 
 def test_fingertips_keep_off_the_surface():
-    jaw = GRIPPER
+    gripper = GRIPPER
     for target in (_hammer(0.6), _target(0.05, 0.05, 0.05)):
         for candidate in grasp_candidates(target, MODEL.p_BS, GRIPPER):
             for y in (-0.03, 0.03):
-                assert (candidate.X_BH @ np.array([jaw.tip_x_m, y, jaw.fixed_z_m]))[2] > target.base_m + 0.002
+                assert (candidate.X_BH @ np.array([gripper.tip_x_m, y, gripper.fixed_z_m]))[2] > target.base_m + 0.002
 
 
 @pytest.mark.parametrize(("height_m", "room_m"), [(0.030, 0.009), (0.022, 0.006)])
 def test_fingertips_stay_further_off_the_surface_where_a_thing_is_high_enough(height_m, room_m):
     # a plain rod, straight from above: half of 30 mm leaves 9 mm and a grip, half of 22 mm less, but 6 mm at least
-    jaw, base = GRIPPER, 0.2
+    gripper, base = GRIPPER, 0.2
     straight = [
         candidate
         for candidate in grasp_candidates(_target(0.25, 0.02, height_m, base=base), MODEL.p_BS, GRIPPER)
@@ -74,11 +74,11 @@ def test_fingertips_stay_further_off_the_surface_where_a_thing_is_high_enough(he
     ]
     assert straight
     for candidate in straight:
-        tip = (candidate.X_BH @ np.array([jaw.tip_x_m, 0.0, jaw.fixed_z_m]))[2] - base
+        tip = (candidate.X_BH @ np.array([gripper.tip_x_m, 0.0, gripper.fixed_z_m]))[2] - base
         assert room_m - 1e-6 <= tip < room_m + 0.002
 
 
-def test_a_thing_wider_than_the_jaw_has_no_candidates():
+def test_a_thing_wider_than_the_gripper_has_no_candidates():
     assert grasp_candidates(_target(0.25, 0.2, 0.05), MODEL.p_BS, GRIPPER) == []
 
 

@@ -51,7 +51,7 @@ def test_a_grasp_is_known_again_from_where_the_body_stands_later():
     assert same_grasp(tried_grasp(first, CENTRE, X_WB), tried_grasp(moved, (float(centre[0]), float(centre[1])), X_WC))
 
 
-def test_a_jaw_that_is_turned_over_takes_the_same_grasp():
+def test_a_gripper_that_is_turned_over_takes_the_same_grasp():
     found = candidates()[0]
     over = dataclasses.replace(found, X_BH=found.X_BH @ RigidTransform(RollPitchYaw(np.pi, 0.0, 0.0), np.zeros(3)))
     assert same_grasp(tried_grasp(found, CENTRE, RigidTransform()), tried_grasp(over, CENTRE, RigidTransform()))

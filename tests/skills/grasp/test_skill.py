@@ -10,7 +10,7 @@ from skills.robot import CommandState, CommandStatus
 SEEN = GraspInputs(ObjectObservation(0.0, Thing("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table"))
 
 
-def test_a_full_jaw_is_a_failed_precondition():
+def test_a_full_gripper_is_a_failed_precondition():
     robot = ScriptedRobot(holding=True, opening_rad=0.3)
     failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "holds something already")
     assert robot.arm_commands == []
@@ -57,23 +57,23 @@ def resumed(skill, inputs):
 
 
 def test_a_thing_that_is_held_after_a_restart_is_not_taken_again():
-    robot = ScriptedRobot(holding=True, opening_rad=0.3, jaw_stops_rad=0.3)
+    robot = ScriptedRobot(holding=True, opening_rad=0.3, gripper_stops_rad=0.3)
     step = resumed(Grasp(context_of(robot)), SEEN)
     assert isinstance(step, Succeeded), step
-    assert step.message == "the coke was in the jaw already; holding it"
+    assert step.message == "the coke was in the gripper already; holding it"
     assert (robot.opening_rad, robot.holding) == (0.3, True)
 
 
-def test_after_a_restart_with_an_empty_jaw_the_robot_looks_before_it_takes():
+def test_after_a_restart_with_an_empty_gripper_the_robot_looks_before_it_takes():
     robot = ScriptedRobot()
     step = resumed(Grasp(context_of(robot)), SEEN)
     assert isinstance(step, Failed)
     assert "no longer where it was seen" in step.message
 
 
-def test_what_the_jaw_has_lost_is_undone():
+def test_what_the_gripper_has_lost_is_undone():
     robot = ScriptedRobot()
     skill = Grasp(context_of(robot))
-    assert skill.undone(SEEN) == "the coke is not in the jaw"
+    assert skill.undone(SEEN) == "the coke is not in the gripper"
     robot.holding = True
     assert skill.undone(SEEN) is None

@@ -25,8 +25,8 @@ def _holding(**scripted):
     return _Scanning(q=CARRYING.copy(), holding=True, opening_rad=0.3, **scripted)
 
 
-def test_an_empty_jaw_is_a_failed_precondition():
-    failed(HandOver(context_of(_Scanning())), HandOverInputs("Robin"), Cause.PRECONDITION, "nothing in the jaw")
+def test_an_empty_gripper_is_a_failed_precondition():
+    failed(HandOver(context_of(_Scanning())), HandOverInputs("Robin"), Cause.PRECONDITION, "nothing in the gripper")
 
 
 def test_nobody_in_sight_is_a_failed_precondition():

@@ -87,7 +87,7 @@ def test_class_belief_follows_the_scores_of_all_views():
 
 def test_a_class_that_was_only_likely_at_first_may_win():
     # wrench-like from afar, 0.6 to 0.35; plainly a hammer from near
-    far = detected_3d(name="coke", score=0.6, rivals=(("hammer", 0.35),))
+    far = detected_3d(name="coke", score=0.6, alternatives=(("hammer", 0.35),))
     (track,) = tracker_of([far]).snapshot()
     assert track.class_name == "coke"
     assert track.classes["hammer"] > track.classes["beer"]

@@ -22,7 +22,7 @@ def test_an_arm_that_is_out_is_stowed():
     assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
 
 
-def test_an_open_empty_jaw_is_closed_first():
+def test_an_open_empty_gripper_is_closed_first():
     robot = ScriptedRobot(q=OUT.copy(), opening_rad=1.4)
     outcome(Stow(context_of(robot)), StowInputs())
     assert robot.opening_rad == 0.0

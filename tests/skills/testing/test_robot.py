@@ -115,8 +115,8 @@ def test_an_unknown_camera_is_refused_with_those_that_there_are(robot):
         robot.image("tail")
 
 
-def test_the_jaw_stops_at_what_is_in_it(clock, spot):
-    robot = ScriptedRobot(clock, capabilities=spot, start=Start(in_jaw_rad=0.4))
+def test_the_gripper_stops_at_what_is_in_it(clock, spot):
+    robot = ScriptedRobot(clock, capabilities=spot, start=Start(in_gripper_rad=0.4))
     lease = robot.acquire_lease("test")
     robot.set_gripper(1.4, 20.0, until_s=9.0, lease=lease)
     clock.advance(1.0)
@@ -127,7 +127,7 @@ def test_the_jaw_stops_at_what_is_in_it(clock, spot):
     assert robot.gripper().opening_rad == 0.4
 
 
-def test_an_empty_jaw_closes_on_nothing(clock, spot):
+def test_an_empty_gripper_closes_on_nothing(clock, spot):
     robot = ScriptedRobot(clock, capabilities=spot)
     lease = robot.acquire_lease("test")
     robot.set_gripper(1.4, 20.0, until_s=9.0, lease=lease)

@@ -38,7 +38,7 @@ def answer_of(context, *causes: Cause | None, tells: bool = False) -> Answer:
     return root
 
 
-def test_a_sighting_is_a_yes(context):
+def test_a_detection_is_a_yes(context):
     root = answer_of(context, Cause.POSTCONDITION, None, Cause.POSTCONDITION)
     assert (root.status, root.answer, root.message) == (Status.SUCCESS, True, "yes: hammer in the workshop")
     assert context.board.get("alice/q/answer") is True

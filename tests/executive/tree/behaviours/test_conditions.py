@@ -8,18 +8,15 @@ from py_trees.common import Status
 
 from executive.mission.file.model import StaleData
 from executive.tree.behaviours.conditions import (
-    BatteryAbove,
-    BatteryReserve,
-    Fresh,
+    BatteryAtLeast,
+    BatteryForWork,
+    Condition,
     Freshness,
-    Holding,
-    LeaseHeld,
-    Localised,
-    StopReleased,
+    Holds,
+    KnowsPlace,
+    NoStopButton,
+    OwnLease,
     Waiting,
-    battery_reserve,
-    holding,
-    localised,
 )
 from executive.tree.behaviours.decorators import Guard
 from skills.api import Cause, Failed
@@ -28,20 +25,31 @@ from skills.robot import Lease, Pose2D
 R, S, F = Status.RUNNING, Status.SUCCESS, Status.FAILURE
 
 
-class Readings:
+class Readings(Condition):
     """A condition that counts how often it was asked, with readings whose age is set by hand."""
 
+    reading = "the sensor"
+
     def __init__(self):
-        self.stamp_s, self.asked, self.begun = 0.0, 0, 0
+        super().__init__()
+        self.taken_s, self.asked, self.begun = 0.0, 0, 0
+
+    def for_run(self, context):
+        return self
 
     def begin(self, context):
+        super().begin(context)
         self.begun += 1
 
-    def violated(self, context):
+    def stamp_s(self, context):
+        return self.taken_s
+
+    def judged(self, context):
         self.asked += 1
 
     def fresh(self, policy, patience_s=2.0):
-        return Fresh(self, "the sensor", lambda context: self.stamp_s, Freshness(1.0, policy, patience_s))
+        self.freshness = Freshness(1.0, policy, patience_s)
+        return self
 
 
 @pytest.fixture
@@ -74,10 +82,10 @@ def test_wait_waits_and_goes_on_with_a_new_reading(readings, context, clock):
     clock.advance(1.5)
     said = "waits for the sensor: the last reading of the sensor is 1.5 s old"
     assert condition.violated(context) == Waiting(said)
-    readings.stamp_s = 1.5
+    readings.taken_s = 1.5
     assert condition.violated(context) is None
     clock.advance(3.0)
-    readings.stamp_s = 4.5
+    readings.taken_s = 4.5
     assert condition.violated(context) is None
 
 
@@ -93,7 +101,7 @@ def test_wait_fails_when_the_patience_is_over_and_begins_anew_with_each_start(re
 
 
 def test_a_reading_that_never_came_is_named(readings, context):
-    readings.stamp_s = float("-inf")
+    readings.taken_s = float("-inf")
     assert readings.fresh(StaleData.FAIL).violated(context).message == "there is no reading of the sensor yet"
 
 
@@ -108,7 +116,7 @@ def test_a_guard_that_waits_ticks_nothing_below(readings, context, clock):
     guard, _ = guard_of(context, readings.fresh(StaleData.WAIT), R, S)
     said = []
     for stamp_s in (0.0, None, 2.0):
-        readings.stamp_s = readings.stamp_s if stamp_s is None else stamp_s
+        readings.taken_s = readings.taken_s if stamp_s is None else stamp_s
         guard.tick_once()
         said.append(guard.status)
         clock.advance(2.0 if stamp_s == 0.0 else 0.0)
@@ -120,14 +128,14 @@ def test_a_guard_may_wait_before_it_begins(readings, context, clock):
     guard, child = guard_of(context, readings.fresh(StaleData.WAIT), S)
     guard.tick_once()
     assert (guard.status, child.status) == (R, Status.INVALID)
-    readings.stamp_s = 5.0
+    readings.taken_s = 5.0
     guard.tick_once()
     assert (guard.status, readings.begun) == (S, 1)
 
 
 def test_holding_waits_while_the_gripper_tells_nothing_new(context, robot, clock):
     robot.holding = True
-    condition, old = holding("coke"), robot.gripper()
+    condition, old = Holds("coke"), robot.gripper()
     assert condition.violated(context) is None
     robot.gripper = lambda: old
     clock.advance(2.0)
@@ -137,7 +145,7 @@ def test_holding_waits_while_the_gripper_tells_nothing_new(context, robot, clock
 
 
 def test_holding_lets_a_short_loss_pass_and_tells_a_loss_from_never_held(context, robot, clock):
-    condition = Holding("coke", patience_s=0.5)
+    condition = Holds("coke")
     assert condition.violated(context).cause is Cause.PRECONDITION
     robot.holding = True
     assert condition.violated(context) is None
@@ -149,11 +157,11 @@ def test_holding_lets_a_short_loss_pass_and_tells_a_loss_from_never_held(context
 
 
 def test_localised_lets_a_short_loss_pass(context, clock):
-    condition = Localised(patience_s=2.0)
+    condition = KnowsPlace(patience_s=2.0)
     context.localiser.localised = False
     verdicts = []
     for _ in range(3):
-        verdicts.append(condition.violated(context))
+        verdicts.append(condition.judged(context))
         clock.advance(1.5)
     assert verdicts[:2] == [None, None]
     assert verdicts[2].cause is Cause.PRECONDITION
@@ -161,19 +169,19 @@ def test_localised_lets_a_short_loss_pass(context, clock):
 
 def test_localised_waits_for_scans(context, clock):
     clock.advance(3.0)
-    assert isinstance(localised().violated(context), Waiting)
+    assert isinstance(KnowsPlace().violated(context), Waiting)
 
 
 @pytest.mark.parametrize(("charge", "holds"), [(0.5, True), (0.3, True), (0.29, False)])
 def test_the_battery_is_above_a_level_or_not(context, robot, charge, holds):
     robot.charge = charge
-    assert (BatteryAbove(0.3).violated(context) is None) == holds
+    assert (BatteryAtLeast(0.3).violated(context) is None) == holds
 
 
 def test_the_reserve_grows_with_the_way_to_the_dock(context, robot):
     robot.charge = 0.2
-    assert BatteryReserve(0.15, Pose2D(5.0, 0.0, 0.0)).violated(context) is None
-    far = BatteryReserve(0.15, Pose2D(300.0, 0.0, 0.0)).violated(context)
+    assert BatteryForWork(0.15, Pose2D(5.0, 0.0, 0.0)).violated(context) is None
+    far = BatteryForWork(0.15, Pose2D(300.0, 0.0, 0.0)).violated(context)
     assert far == Failed(Cause.PRECONDITION, "the battery is at 20%, less than 48%")
 
 
@@ -181,18 +189,18 @@ def test_an_old_battery_reading_will_do(context, robot, clock):
     old = robot.battery()
     robot.battery = lambda: old
     clock.advance(100.0)
-    assert battery_reserve(0.15, Pose2D(0.0, 0.0, 0.0)).violated(context) is None
+    assert BatteryForWork(0.15, Pose2D(0.0, 0.0, 0.0)).violated(context) is None
 
 
 def test_the_mission_stands_while_the_stop_button_is_pressed(context):
-    assert StopReleased().violated(context) is None
+    assert NoStopButton().violated(context) is None
     pressed = dataclasses.replace(context, stop_pressed=lambda: "somebody pressed it")
-    assert StopReleased().violated(pressed) == Waiting("somebody pressed it")
+    assert NoStopButton().violated(pressed) == Waiting("somebody pressed it")
 
 
 def test_the_mission_stands_while_another_holds_the_lease(context, robot):
-    assert LeaseHeld().violated(context) is None
+    assert OwnLease().violated(context) is None
     robot.lease = Lease("Alice", context.lease.holder, 5)
-    assert LeaseHeld().violated(context) is None
+    assert OwnLease().violated(context) is None
     robot.lease = Lease("Alice", "the tablet", 6)
-    assert LeaseHeld().violated(context) == Waiting("the tablet holds the lease of Alice")
+    assert OwnLease().violated(context) == Waiting("the tablet holds the lease of Alice")

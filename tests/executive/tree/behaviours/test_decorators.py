@@ -5,7 +5,7 @@ from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
 from executive.tree.behaviours.composites import MemorySequence
-from executive.tree.behaviours.conditions import Holding
+from executive.tree.behaviours.conditions import Holds
 from executive.tree.behaviours.decorators import Guard, Retry, Timeout
 from executive.tree.behaviours.explained import Explained
 from skills.api import Cause, Failed
@@ -120,6 +120,9 @@ class Flag:
         self.bad = False
         self.begun = 0
 
+    def for_run(self, context):
+        return self
+
     def begin(self, context) -> None:
         self.begun += 1
 
@@ -160,7 +163,7 @@ def test_interrupted_decorators_say_so(context, clock):
 def test_holding_lets_short_losses_pass_and_tells_long_ones(context, clock, robot):
     # time  0.0   0.4        0.6        1.2
     # held  yes   no         yes        no ... since 0.6
-    condition = Holding("coke", patience_s=0.5)
+    condition = Holds("coke")
     condition.begin(context)
     robot.holding = True
     assert condition.violated(context) is None
@@ -176,7 +179,7 @@ def test_holding_lets_short_losses_pass_and_tells_long_ones(context, clock, robo
 
 
 def test_holding_nothing_at_the_start_is_a_precondition(context, robot):
-    condition = Holding("coke")
+    condition = Holds("coke")
     condition.begin(context)
     failure = condition.violated(context)
     assert failure is not None

@@ -7,7 +7,7 @@ from py_trees.common import Status
 from executive.tree.behaviours.composites import MemorySequence
 from executive.tree.behaviours.conditions import Waiting
 from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.interrupts import Call, Interrupt, Interrupts, Monitor
+from executive.tree.behaviours.interrupts import Interrupt, Interrupts, Monitor
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from skills.api import Cause, Failed
 
@@ -20,6 +20,9 @@ class Switch:
 
     def __init__(self):
         self.verdict, self.begun = None, 0
+
+    def for_run(self, context):
+        return self
 
     def begin(self, context):
         self.begun += 1
@@ -61,15 +64,15 @@ class Bench:
         self.mission = mission or Work("mission", ticks=5)
         watches = [
             Monitor(path_id="alice/stop", name="stop", condition=self.stop, context=context),
-            self._interrupt("battery", self.charge, Call(self.battery, self.urgent), spares, uses, context),
-            self._interrupt("lost", self.find_out, Call(self.lost), spares, uses, context),
+            self._interrupt("battery", self.charge, (self.battery, self.urgent), spares, uses, context),
+            self._interrupt("lost", self.find_out, (self.lost, None), spares, uses, context),
         ]
-        self.root = Interrupts(path_id="alice/watch", name="watch", watches=watches, mission=self.mission)
+        self.root = Interrupts(path_id="alice/watch", name="watch", children=[*watches, self.mission])
 
     def _interrupt(self, name, child, call, spares, uses, context):
         return Interrupt(
-            path_id=f"alice/{name}-call", name=name, child=child, call=call, spares=frozenset(spares), uses=uses,
-            context=context,
+            path_id=f"alice/{name}-call", name=name, child=child, condition=call[0], urgent=call[1],
+            spares=frozenset(spares), uses=uses, context=context,
         )  # fmt: skip
 
     def tick(self, ticks=1):

@@ -5,7 +5,7 @@ import math
 import pytest
 from py_trees.common import Status
 
-from executive.tree.behaviours.board import BesideBoard, Board, FromBoardOr, SurfaceOfSighting
+from executive.tree.behaviours.board import BesideBoard, Board, FromBoardOr, SurfaceOfDetection
 from executive.tree.behaviours.context import leaf_seed
 from executive.tree.behaviours.leaves import Pause, RememberPose, SurfacesNear
 from skills.api import Cause, Surface
@@ -84,12 +84,12 @@ def test_a_port_may_be_a_pose_beside_one_on_the_board():
     assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.75, 2.5, math.pi / 2))
 
 
-def test_a_port_may_be_the_surface_of_a_sighting(make):
+def test_a_port_may_be_the_surface_of_a_detection(make):
     board = Board("alice")
     board.put("alice/seen", make.COKE)
     tops = tuple(Surface(name, ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 0.9) for name in ("shelf", "counter"))
-    assert SurfaceOfSighting("alice/seen", tops).read(board) == tops[1:]
-    assert SurfaceOfSighting("alice/seen", tops[:1]).read(board) == tops[:1]
+    assert SurfaceOfDetection("alice/seen", tops).read(board) == tops[1:]
+    assert SurfaceOfDetection("alice/seen", tops[:1]).read(board) == tops[:1]
 
 
 @pytest.mark.parametrize("key", ["bob/x", "alice/a.b", "alice"])

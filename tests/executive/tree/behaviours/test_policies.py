@@ -16,7 +16,7 @@ R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 class Queue(Explained, StatusQueue):
     """A scripted leaf that says why it fails."""
 
-    def __init__(self, *statuses: Status, name: str = "deed", cause: Cause = Cause.EXECUTION) -> None:
+    def __init__(self, *statuses: Status, name: str = "action", cause: Cause = Cause.EXECUTION) -> None:
         super().__init__(name=name, queue=list(statuses), eventually=S)
         self.path_id, self.fails_with = f"a/{name}", cause
         self.clear_explanation()
@@ -132,30 +132,30 @@ def test_a_defect_is_not_asked_about(ask):
 
 @pytest.mark.parametrize(("back", "says"), [(S, "is back where it started"), (F, "could not go back: slipped")])
 def test_the_way_back_ends_in_the_first_failure(back, says):
-    # deed  R   F
+    # action  R   F
     # back          R   S or F
     # root  R   R   R   F
-    deed, way = Queue(R, F, cause=Cause.PLANNING), Queue(R, back, name="back")
-    root = GoBack(path_id="a/return", name="return", children=[deed, way])
+    action, way = Queue(R, F, cause=Cause.PLANNING), Queue(R, back, name="back")
+    root = GoBack(path_id="a/return", name="return", children=[action, way])
     assert ticked(root, 4) == [R, R, R, F]
     assert (root.cause, root.message) == (Cause.PLANNING, f"slipped; the robot {says}")
 
 
 def test_there_is_no_way_back_after_success():
-    deed, way = Queue(R, S), Queue(S, name="back")
-    assert ticked(GoBack(path_id="a/return", name="return", children=[deed, way]), 2) == [R, S]
+    action, way = Queue(R, S), Queue(S, name="back")
+    assert ticked(GoBack(path_id="a/return", name="return", children=[action, way]), 2) == [R, S]
     assert way.status == N
 
 
 def test_there_is_no_way_back_after_a_defect():
-    deed, way = Queue(F, cause=Cause.ERROR), Queue(S, name="back")
-    assert ticked(GoBack(path_id="a/return", name="return", children=[deed, way]), 1) == [F]
+    action, way = Queue(F, cause=Cause.ERROR), Queue(S, name="back")
+    assert ticked(GoBack(path_id="a/return", name="return", children=[action, way]), 1) == [F]
     assert way.status == N
 
 
 def test_the_way_back_begins_with_the_deed_when_it_starts_anew():
-    deed, way = Queue(F, S), Queue(S, name="back")
-    assert ticked(GoBack(path_id="a/return", name="return", children=[deed, way]), 3) == [R, F, S]
+    action, way = Queue(F, S), Queue(S, name="back")
+    assert ticked(GoBack(path_id="a/return", name="return", children=[action, way]), 3) == [R, F, S]
 
 
 @pytest.mark.parametrize(

@@ -174,7 +174,7 @@ def test_a_failure_to_tidy_up_is_told_but_changes_nothing():
 
 
 def only_if_known(child, board):
-    return OnlyIfKnown(path_id="alice/again", name="again", child=child, key="alice/seen", board=board)
+    return OnlyIfKnown(path_id="alice/again", name="again", children=[child], key="alice/seen", board=board)
 
 
 def test_what_does_not_apply_is_passed_over_and_stays_idle():
@@ -196,7 +196,7 @@ def test_a_selector_of_which_nothing_applies_fails():
 @pytest.mark.parametrize(("holding", "status"), [(True, S), (False, F)])
 def test_a_way_may_apply_only_while_something_is_held(robot, holding, status):
     robot.holding = holding
-    anyway = OnlyIfHolding(path_id="alice/h", name="h", child=Leaf("stow", S), robot=robot)
+    anyway = OnlyIfHolding(path_id="alice/h", name="h", children=[Leaf("stow", S)], robot=robot)
     root = MemorySelector(path_id="alice/f", name="f", children=[Leaf("grasp", PLANNING), anyway])
     root.tick_once()
     assert (root.status, root.cause) == (status, None if holding else PLANNING)

@@ -201,7 +201,7 @@ def test_things_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, scrip
             "Take [Nothing] to [kichen] and do [grasp] to [coke]",
             "the place 'kichen' is not known.*did you mean 'kitchen'",
         ),
-        ("Take [Nothing] to [kitchen] and do [grasp] to [unicorn]", "the thing 'unicorn' is not known.*known are"),
+        ("Take [Nothing] to [kitchen] and do [grasp] to [unicorn]", "'unicorn' is not known.*known are"),
         ("Take [Nothing] to [bathroom] and do [grasp] to [coke]", "no surface to look at"),
         ("Take [coke] to [bathroom] and do [Nothing] to [Nothing]", "no surface to put the coke on"),
         ("Take [Nothing] to [Nothing] and do [Nothing] to [Nothing]", "asks for nothing"),

@@ -297,6 +297,6 @@ def lost_runs(clock, robot, script, make, run_tree):
 
 
 def test_thresholds_come_from_the_knowledge(compiled, knowledge, registry):
-    battery, lost = (node.options["requirement"] for node in compiled(GO).root.walk() if node.kind == "interrupt")
-    assert (battery.low, battery.dock) == (0.15, Pose2D(0.0, -1.0, 0.0))
+    battery, lost = (node.options["condition"] for node in compiled(GO).root.walk() if node.kind == "interrupt")
+    assert (battery.charge, battery.dock) == (0.15, Pose2D(0.0, -1.0, 0.0))
     assert lost.patience_s < RunSettings().time_limit_s

@@ -2,11 +2,11 @@
 
 import pytest
 
-from executive.cli.goal_conditions import promises_of
+from executive.cli.goal_conditions import conditions_of
 from executive.mission.errors import InputError
 from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import Constant
-from plant.referee import PromiseKind
+from plant.referee import GoalKind
 from skills.api import Succeeded
 
 TWO = (
@@ -40,10 +40,10 @@ def test_each_trip_grasps_and_puts_down(compiled, run_tree, script, robot):
     assert (script.begun.count("grasp"), script.begun.count("place")) == (2, 2)
 
 
-def test_the_promise_is_one_of_two_things(compiled, run_tree, knowledge, script):
+def test_the_condition_is_one_of_two_things(compiled, run_tree, knowledge, script):
     tree = compiled(*TWO)
-    grasped, placed = promises_of(tree, run_tree(tree).robots[0])
-    assert (grasped.kind, grasped.count, placed.kind, placed.count) == (PromiseKind.GRASPED, 2, PromiseKind.PLACED, 2)
+    grasped, placed = conditions_of(tree, run_tree(tree).robots[0])
+    assert (grasped.kind, grasped.count, placed.kind, placed.count) == (GoalKind.GRASPED, 2, GoalKind.PLACED, 2)
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,7 @@ def test_what_most_views_take_for_something_else_is_that(seen_in):
     both = [Detection("coke", 0.9, BOX, (("hammer", 0.6),))]
     (found,) = seen_in(both, [Detection("hammer", 0.9, MIRRORED, (("coke", 0.3),))], [Detection("hammer", 0.9, SMALL)])
     assert (found.class_name, found.score) == ("hammer", pytest.approx(0.8))
-    assert found.rivals == (("coke", pytest.approx(0.4)),)
+    assert found.alternatives == (("coke", pytest.approx(0.4)),)
 
 
 def test_what_one_view_alone_tells_is_not_sure(seen_in):
@@ -98,14 +98,14 @@ def test_what_a_part_cuts_off_is_judged_by_the_other_looks(seen_in):
     # from 280 to 360 across, of which the part from 320 on shows the right half only
     whole, half = [Detection("beer", 0.8, (280.0, 300.0, 360.0, 340.0))], [Detection("hammer", 0.9, (0, 60, 40, 100))]
     (found,) = seen_in(whole, half, views=(View(), View(part=(0.5, 0.5, 1.0, 1.0))))
-    assert (found.class_name, found.score, found.rivals) == ("beer", pytest.approx(0.8), ())
+    assert (found.class_name, found.score, found.alternatives) == ("beer", pytest.approx(0.8), ())
 
 
 def test_what_would_be_very_large_in_a_part_is_judged_by_the_other_looks(seen_in):
     # 200 pixels long, and 400 in the quarter
     whole, part = [Detection("beer", 0.8, (400.0, 300.0, 600.0, 360.0))], [Detection("hammer", 0.9, (80, 60, 280, 120))]
     (found,) = seen_in(whole, part, views=(View(), View(part=(0.5, 0.5, 1.0, 1.0))))
-    assert (found.class_name, found.score, found.rivals) == ("beer", pytest.approx(0.8), ())
+    assert (found.class_name, found.score, found.alternatives) == ("beer", pytest.approx(0.8), ())
 
 
 # first view                               views taken

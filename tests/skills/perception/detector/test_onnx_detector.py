@@ -49,7 +49,7 @@ def test_what_a_thing_may_be_as_well_is_told_with_it(detector):
         ("beer", 0.05, (0, 0, 9, 9)),
     ]
     (found,) = detector.detect([picture_of(*things)])
-    assert [one.rivals for one in found] == [(("beer", pytest.approx(0.4)), ("coke", pytest.approx(0.3)))]
+    assert [one.alternatives for one in found] == [(("beer", pytest.approx(0.4)), ("coke", pytest.approx(0.3)))]
 
 
 def test_two_boxes_on_one_thing_become_one(detector):

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from skills.perception.detector.suppression import Candidates, SuppressionOptions, candidates_of, rivals_of, suppress
+from skills.perception.detector.suppression import (
+    Candidates,
+    SuppressionOptions,
+    alternatives_of,
+    candidates_of,
+    suppress,
+)
 
 OPTIONS = SuppressionOptions(same_class=0.6, other_class=0.8, sure_score=0.5)
 
@@ -57,10 +63,10 @@ def test_no_more_than_asked_for_are_kept():
         ([(WHOLE, 0.9, 1), (MOST, 0.4, 1)], {}),
         ([(WHOLE, 0.9, 1), (HALF, 0.4, 2), (BESIDE, 0.4, 2)], {}),
     ],
-    ids=["two rivals", "the surer box of one", "its own class", "too little shared"],
+    ids=["two alternatives", "the surer box of one", "its own class", "too little shared"],
 )
 def test_what_a_thing_may_be_as_well(rows, expected):
-    (found,) = rivals_of(suppress(candidates(rows[0]), OPTIONS), candidates(*rows), OPTIONS)
+    (found,) = alternatives_of(suppress(candidates(rows[0]), OPTIONS), candidates(*rows), OPTIONS)
     assert found == pytest.approx(expected)
 
 

@@ -1,4 +1,4 @@
-"""What was promised, and the verdict on it: plain data, so that the plant needs to know nothing of missions."""
+"""Goal conditions and the verdict on them: plain data, so that the plant needs to know nothing of missions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 
-class PromiseKind(enum.Enum):
+class GoalKind(enum.Enum):
     """What is to have happened, or to be so at the end."""
 
     GRASPED = "grasped"  # taken from a source region and lifted, at some time
@@ -50,8 +50,8 @@ def _inside(polygon: tuple[tuple[float, float], ...], x: float, y: float) -> boo
 
 
 @dataclass(frozen=True)
-class Promise:
-    """One thing promised.
+class GoalCondition:
+    """One goal condition.
 
     `classes` are the object classes that fulfil it and `count` how many objects (0 counts as 1); `source` is where
     they were to be taken from (empty: anywhere) or, for an answer, where was to be looked; `goal` where they or the
@@ -59,7 +59,7 @@ class Promise:
     `robot` who was to do it (None: any).
     """
 
-    kind: PromiseKind
+    kind: GoalKind
     classes: tuple[str, ...] = ()
     count: int = 1
     source: tuple[Region, ...] = ()
@@ -76,7 +76,7 @@ class Promise:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the referee saw: whether all promises hold, a plain sentence on each, and the counts of the whole run."""
+    """What the referee saw: whether all goal conditions hold, a sentence on each, and the counts of the whole run."""
 
     success: bool
     why: str

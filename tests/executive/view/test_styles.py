@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from executive.view.looks import Looks
+from executive.view.styles import Styles
 
 # Linear RGB as seen with one kind of cone missing (Machado and others, 2009, severity 1).
 CONES = {
@@ -30,20 +30,20 @@ def lab(rgb: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("cones", CONES)
 def test_line_colours_stay_apart_for_every_kind_of_colour_vision(cones):
-    seen = {look.name: lab(np.array(CONES[cones]) @ linear(look.value.line)) for look in Looks}
+    seen = {style.name: lab(np.array(CONES[cones]) @ linear(style.value.line)) for style in Styles}
     distances = {(a, b): np.linalg.norm(seen[a] - seen[b]) for a, b in combinations(seen, 2)}
     assert min(distances.values()) > 15, distances
 
 
-@pytest.mark.parametrize("look", Looks)
-def test_words_are_readable_on_their_fill(look):
-    ink, fill = (XYZ[1] @ linear(colour) for colour in (look.value.ink, look.value.fill))
+@pytest.mark.parametrize("style", Styles)
+def test_words_are_readable_on_their_fill(style):
+    ink, fill = (XYZ[1] @ linear(colour) for colour in (style.value.ink, style.value.fill))
     assert (fill + 0.05) / (ink + 0.05) > 4.5
 
 
 def test_every_state_has_its_own_symbol_and_kind_of_line():
     for attribute in ("word", "symbol", "ascii", "line", "dashes"):
-        values = [getattr(look.value, attribute) for look in Looks]
+        values = [getattr(style.value, attribute) for style in Styles]
         if attribute == "dashes":
-            values = [(look.value.dashes, look is Looks.FAILURE) for look in Looks]  # a failure's line is thicker
+            values = [(style.value.dashes, style is Styles.FAILURE) for style in Styles]  # a failure's line is thicker
         assert len(set(values)) == len(values)

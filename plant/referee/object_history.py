@@ -1,4 +1,4 @@
-"""What befell one loose object: where it rested, who lifted it, whether it was dropped."""
+"""The history of one loose object: where it rested, who lifted it, whether it was dropped."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _PLAIN = (
 
 
 @dataclass(frozen=True)
-class Look:
-    """One look at an object: its place, what touches it.
+class ObjectSample:
+    """An object at one moment: its place, what touches it.
 
     `gripper` names the robot whose gripper touches it, `X_WH` is that hand's pose; `supported` tells contact with
     anything that is no part of a robot, `on_floor` that the floor is among it.
@@ -40,15 +40,15 @@ class Look:
     on_floor: bool
 
     def state(self) -> list[Any]:
-        """The look as plain values."""
+        """The sample as plain values."""
         X_WH = transform_state(self.X_WH)
         return [self.time_s, self.p_WO.tolist(), self.gripper, X_WH, self.supported, self.on_floor]
 
     @staticmethod
-    def of(state: list[Any]) -> Look:
-        """The look of such values."""
+    def of(state: list[Any]) -> ObjectSample:
+        """The sample of such values."""
         time_s, p_WO, gripper, X_WH, supported, on_floor = state
-        return Look(time_s, array_of(p_WO), gripper, transform_of(X_WH), supported, on_floor)
+        return ObjectSample(time_s, array_of(p_WO), gripper, transform_of(X_WH), supported, on_floor)
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ class Lift:
 
 
 @dataclass
-class ObjectStory:
-    """The record of one object; `take` is called with every look."""
+class ObjectHistory:
+    """The record of one object; `take` is called with every sample."""
 
     name: str
     class_name: str
@@ -72,7 +72,7 @@ class ObjectStory:
     drops: int = 0
     touches: int = 0
     speed_m_s: float = 0.0
-    _last: Look | None = None
+    _last: ObjectSample | None = None
     _grip_s: float = float("-inf")
     _grip_robot: str | None = None
     _grip_z_m: float = 0.0
@@ -83,8 +83,8 @@ class ObjectStory:
     _dropped: bool = False
 
     @property
-    def last(self) -> Look:
-        """The latest look. Raises ValueError before the first."""
+    def last(self) -> ObjectSample:
+        """The latest sample. Raises ValueError before the first."""
         if self._last is None:
             raise ValueError("the referee has not observed anything yet")
         return self._last
@@ -109,25 +109,25 @@ class ObjectStory:
         """On something, now or a moment ago."""
         return self.last.time_s - self._supported_s <= FLICKER_S
 
-    def take(self, look: Look) -> None:
-        """Go on with the story."""
-        with_hand = self._moves_with_hand(look)
-        self._measure_speed(look)
-        if look.gripper is not None:
-            self.touches += self._last is None or look.time_s - self._grip_s > 0.5
-            self._grip_s, self._grip_robot = look.time_s, look.gripper
-        if look.supported:
-            self._supported_s = look.time_s
-        self._last = look
+    def take(self, sample: ObjectSample) -> None:
+        """Take in one more sample."""
+        with_hand = self._moves_with_hand(sample)
+        self._measure_speed(sample)
+        if sample.gripper is not None:
+            self.touches += self._last is None or sample.time_s - self._grip_s > 0.5
+            self._grip_s, self._grip_robot = sample.time_s, sample.gripper
+        if sample.supported:
+            self._supported_s = sample.time_s
+        self._last = sample
         if not self.rests_W:
-            self.rests_W.append(look.p_WO)
-        self._note_lift(look, with_hand)
-        self._note_leaving(look, with_hand)
-        self._note_fall(look)
-        self._note_rest(look)
+            self.rests_W.append(sample.p_WO)
+        self._note_lift(sample, with_hand)
+        self._note_leaving(sample, with_hand)
+        self._note_fall(sample)
+        self._note_rest(sample)
 
     def state(self) -> State:
-        """The story so far."""
+        """The history so far."""
         return {
             "lifts": [[lift.time_s, lift.robot, lift.from_W.tolist()] for lift in self.lifts],
             "rests_W": [p_W.tolist() for p_W in self.rests_W],
@@ -136,74 +136,74 @@ class ObjectStory:
         }
 
     def restore(self, state: State) -> None:
-        """Go on with such a story."""
+        """Go on from such a state."""
         self.lifts = [Lift(time_s, robot, array_of(from_W)) for time_s, robot, from_W in state["lifts"]]
         self.rests_W = [array_of(p_W) for p_W in state["rests_W"]]
-        self._last = None if state["last"] is None else Look.of(state["last"])
+        self._last = None if state["last"] is None else ObjectSample.of(state["last"])
         for name in _PLAIN:
             setattr(self, name, state[name])
 
     def forget_past(self) -> None:
-        """Begin a new chapter: what is held keeps how it came there, all else counts from where it is."""
+        """Start over for another mission: what is held keeps how it came there, all else counts from where it is."""
         if self._last is not None and self.held_by is None:
             self.lifts, self.rests_W = [], [self._last.p_WO]
         self.events, self.drops, self.touches = [], 0, 0
 
-    def _measure_speed(self, look: Look) -> None:
-        if self._last is None or look.time_s <= self._last.time_s:
+    def _measure_speed(self, sample: ObjectSample) -> None:
+        if self._last is None or sample.time_s <= self._last.time_s:
             return
-        self.speed_m_s = float(np.linalg.norm(look.p_WO - self._last.p_WO)) / (look.time_s - self._last.time_s)
+        self.speed_m_s = float(np.linalg.norm(sample.p_WO - self._last.p_WO)) / (sample.time_s - self._last.time_s)
 
-    def _moves_with_hand(self, look: Look) -> bool:
-        """Whether it keeps its place in the hand since the last look."""
+    def _moves_with_hand(self, sample: ObjectSample) -> bool:
+        """Whether it keeps its place in the hand since the last sample."""
         last = self._last
-        if last is None or look.X_WH is None or last.X_WH is None or look.time_s <= last.time_s:
+        if last is None or sample.X_WH is None or last.X_WH is None or sample.time_s <= last.time_s:
             return False
-        slip = look.X_WH.inverse() @ look.p_WO - last.X_WH.inverse() @ last.p_WO
-        return float(np.linalg.norm(slip)) / (look.time_s - last.time_s) < WITH_HAND_M_S
+        slip = sample.X_WH.inverse() @ sample.p_WO - last.X_WH.inverse() @ last.p_WO
+        return float(np.linalg.norm(slip)) / (sample.time_s - last.time_s) < WITH_HAND_M_S
 
-    def _note_lift(self, look: Look, with_hand: bool) -> None:
+    def _note_lift(self, sample: ObjectSample, with_hand: bool) -> None:
         """Begin a carry once the gripper has raised it clear of its place, or borne it well away from there."""
-        if look.gripper is None or look.supported or not with_hand:
+        if sample.gripper is None or sample.supported or not with_hand:
             return
-        way_W = look.p_WO - self.rests_W[-1]
+        way_W = sample.p_WO - self.rests_W[-1]
         if not self._carried and (way_W[2] >= LIFT_M or float(np.linalg.norm(way_W[:2])) >= AWAY_M):
-            self.lifts.append(Lift(look.time_s, look.gripper, self.rests_W[-1]))
-            self.events.append(f"{look.gripper} lifted the {self.name} at {look.time_s:.2f} s.")
+            self.lifts.append(Lift(sample.time_s, sample.gripper, self.rests_W[-1]))
+            self.events.append(f"{sample.gripper} lifted the {self.name} at {sample.time_s:.2f} s.")
             self._carried = True
 
-    def _note_leaving(self, look: Look, with_hand: bool) -> None:
+    def _note_leaving(self, sample: ObjectSample, with_hand: bool) -> None:
         """Remember the height at which a carried object left the gripper."""
-        if look.gripper is not None and with_hand:
+        if sample.gripper is not None and with_hand:
             self._left_z_m, self._dropped = None, False
-            self._grip_z_m = float(look.p_WO[2])
+            self._grip_z_m = float(sample.p_WO[2])
         elif self._carried and self._left_z_m is None:
             self._left_z_m = self._grip_z_m
 
-    def _note_fall(self, look: Look) -> None:
+    def _note_fall(self, sample: ObjectSample) -> None:
         """Count a drop once it is clear that it falls, or lies on the floor."""
         if self._left_z_m is None or self._dropped:
             return
-        if self._left_z_m - look.p_WO[2] > FALL_M or look.on_floor:
+        if self._left_z_m - sample.p_WO[2] > FALL_M or sample.on_floor:
             self._dropped = True
             self.drops += 1
-            self.events.append(f"{self._grip_robot} dropped the {self.name} at {look.time_s:.2f} s.")
+            self.events.append(f"{self._grip_robot} dropped the {self.name} at {sample.time_s:.2f} s.")
 
-    def _note_rest(self, look: Look) -> None:
+    def _note_rest(self, sample: ObjectSample) -> None:
         """End a carry, and remember the place, once it has lain still and let go for a while."""
         if not self.resting:
             self._still_since_s = None
             return
         if self._still_since_s is None:
-            self._still_since_s = look.time_s
-        if look.time_s - self._still_since_s < REST_S:
+            self._still_since_s = sample.time_s
+        if sample.time_s - self._still_since_s < REST_S:
             return
-        self._note_knock(look)
-        if self._carried or float(np.linalg.norm(look.p_WO - self.rests_W[-1])) > 0.02:
-            self.rests_W.append(look.p_WO)
+        self._note_knock(sample)
+        if self._carried or float(np.linalg.norm(sample.p_WO - self.rests_W[-1])) > 0.02:
+            self.rests_W.append(sample.p_WO)
         self._carried, self._left_z_m, self._dropped = False, None, False
 
-    def _note_knock(self, look: Look) -> None:
+    def _note_knock(self, sample: ObjectSample) -> None:
         """Tell of an object that came to lie lower without having been carried."""
-        if not self._carried and self.rests_W[-1][2] - look.p_WO[2] > FALL_M:
-            self.events.append(f"The {self.name} was knocked down before {look.time_s:.2f} s.")
+        if not self._carried and self.rests_W[-1][2] - sample.p_WO[2] > FALL_M:
+            self.events.append(f"The {self.name} was knocked down before {sample.time_s:.2f} s.")

@@ -41,7 +41,7 @@ ROBOT_KINDS = frozenset({Kind.BODY, Kind.LEG, Kind.ARM, Kind.GRIPPER})
 
 
 @dataclass(frozen=True)
-class Actor:
+class Entity:
     """One body's role: the model instance that owns it, and a name to be used in sentences."""
 
     kind: Kind
@@ -69,14 +69,14 @@ class LinkNames:
 
 
 @dataclass(frozen=True)
-class Cast:
-    """All actors by number, the actor of each collision shape, and the bodies whose motion is watched.
+class Entities:
+    """All entities by number, the entity of each collision shape, and the bodies whose motion is watched.
 
-    A body's actor has its index; pieces of the scenery have the numbers after those.
+    A body's entity has its index; pieces of the scenery have the numbers after those.
     """
 
-    actors: Mapping[int, Actor]
-    actor_of_geometry: Mapping[GeometryId, int]
+    all: Mapping[int, Entity]
+    of_geometry: Mapping[GeometryId, int]
     objects: Mapping[str, RigidBody]
     classes: Mapping[str, str]
     persons: Mapping[str, RigidBody]
@@ -91,26 +91,26 @@ class Cast:
         persons: Sequence[str],
         links: LinkNames,
         scenery: Mapping[GeometryId, str],
-    ) -> Cast:
-        """Read the cast off a finalized plant. Raises ValueError that names what is not there.
+    ) -> Entities:
+        """Read the entities off a finalized plant. Raises ValueError that names what is not there.
 
         `scenery` names the pieces of furniture whose shapes belong to the world body.
         """
         things = [placed for placed in placements if placed.name not in persons]
         objects = {placed.name: _first_body(plant, placed.name) for placed in things}
-        roles = {int(body.index()): Actor(Kind.OBJECT, name, f"the {name}") for name, body in objects.items()}
-        actors = {int(body.index()): _scenery(plant, body) for body in _all_bodies(plant)} | roles
+        roles = {int(body.index()): Entity(Kind.OBJECT, name, f"the {name}") for name, body in objects.items()}
+        entities = {int(body.index()): _scenery(plant, body) for body in _all_bodies(plant)} | roles
         for name in persons:
-            actors |= {int(body.index()): Actor(Kind.PERSON, name, name) for body in _bodies(plant, name)}
+            entities |= {int(body.index()): Entity(Kind.PERSON, name, name) for body in _bodies(plant, name)}
         for name in robots:
             for body in _bodies(plant, name):
                 kind = links.kind(body.name())
-                actors[int(body.index())] = Actor(kind, name, f"{name}'s {kind.value} ({body.name()})")
+                entities[int(body.index())] = Entity(kind, name, f"{name}'s {kind.value} ({body.name()})")
         pieces = {name: plant.num_bodies() + number for number, name in enumerate(sorted({*scenery.values()}))}
-        actors |= {number: Actor(Kind.SCENERY, name, f"the {name}") for name, number in pieces.items()}
-        return Cast(
-            actors=actors,
-            actor_of_geometry=_geometry_owners(plant) | {each: pieces[name] for each, name in scenery.items()},
+        entities |= {number: Entity(Kind.SCENERY, name, f"the {name}") for name, number in pieces.items()}
+        return Entities(
+            all=entities,
+            of_geometry=_geometry_owners(plant) | {each: pieces[name] for each, name in scenery.items()},
             objects=objects,
             classes={placed.name: placed.class_name for placed in things},
             persons={name: _first_body(plant, name) for name in persons},
@@ -125,11 +125,11 @@ def _geometry_owners(plant: MultibodyPlant) -> dict[GeometryId, int]:
     return {geometry: int(body.index()) for body, geometries in owned for geometry in geometries}
 
 
-def _scenery(plant: MultibodyPlant, body: RigidBody) -> Actor:
+def _scenery(plant: MultibodyPlant, body: RigidBody) -> Entity:
     """A part of the world, called by its model's name."""
     instance = plant.GetModelInstanceName(body.model_instance())
     name = body.name() if instance in _NAMELESS_INSTANCES else instance
-    return Actor(Kind.SCENERY, name, f"the {name}")
+    return Entity(Kind.SCENERY, name, f"the {name}")
 
 
 def _all_bodies(plant: MultibodyPlant) -> list[RigidBody]:

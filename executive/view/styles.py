@@ -1,0 +1,53 @@
+"""The style of a node's state: one word, one symbol, one colour; told apart without colour vision.
+
+Lines are drawn in the colours of Okabe and Ito, which stay apart for all common kinds of colour vision; each state also
+has its own symbol and its own kind of line. Text stands in a darker ink of the same hue, readable on white and on the
+fill.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from py_trees.common import Status
+
+from executive.tree.snapshot import NodeState
+from skills.api import Cause
+
+
+@dataclass(frozen=True)
+class NodeStyle:
+    """A state's word, symbols (Unicode and ASCII), hex colours (line, text, fill), rich style, and SVG line dashes."""
+
+    word: str
+    symbol: str
+    ascii: str
+    line: str
+    ink: str
+    fill: str
+    rich: str
+    dashes: str = ""
+
+
+class Styles(enum.Enum):
+    """The styles of all states."""
+
+    IDLE = NodeStyle("not run", "○", "[ ]", "#c4cad1", "#57606a", "#ffffff", "dim", "2 3")
+    RUNNING = NodeStyle("running", "▶", "[>]", "#0072b2", "#00537f", "#e5f3fb", "bold blue", "7 3")
+    SUCCESS = NodeStyle("success", "✓", "[+]", "#009e73", "#00573f", "#e6f6f1", "green")
+    FAILURE = NodeStyle("failure", "✗", "[x]", "#d55e00", "#8f3f00", "#fdeee3", "bold red")
+    CANCELLED = NodeStyle("cancelled", "⊘", "[/]", "#cc79a7", "#84305d", "#faeef5", "magenta", "9 3 2 3")
+
+
+def style_of(state: NodeState) -> NodeStyle:
+    """The style of a state."""
+    if state.status is Status.INVALID:
+        styles = Styles.CANCELLED if state.cause is Cause.CANCELLED else Styles.IDLE
+    else:
+        styles = _BY_STATUS[state.status]
+    style: NodeStyle = styles.value
+    return style
+
+
+_BY_STATUS = {Status.RUNNING: Styles.RUNNING, Status.SUCCESS: Styles.SUCCESS, Status.FAILURE: Styles.FAILURE}

@@ -27,6 +27,24 @@ HOMES = (
     ("executive.cli",),
 )
 """The lowest first; what both the language and the missions speak of stands below both."""
+TRAINING = (
+    "plant.dataset",
+    "plant.models.builder",
+    "plant.worlds.builder",
+    "skills.perception.training",
+    "executive.speech.training",
+)
+"""What makes pictures, models and networks; nothing at run time imports it."""
+TRAINS = (
+    "dataset_command",
+    "learning",
+    "refine_command",
+    "score_command",
+    "score_report",
+    "train_command",
+    "worst_sheet",
+)
+"""The modules of executive.cli that serve it."""
 
 
 def modules(package: str) -> list[Path]:
@@ -123,3 +141,37 @@ def test_the_root_of_executive_holds_no_modules() -> None:
 )
 def test_the_check_finds_imports_upward(path: str, source: str, expected: list[str]) -> None:
     assert upward(ROOT / path, source) == expected
+
+
+def training_imports(path: Path, source: str) -> list[str]:
+    """What a module that is needed at run time imports of the packages for training."""
+    own = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    if within(own, *TRAINING, *(f"executive.cli.{name}" for name in TRAINS)):
+        return []
+    serving = tuple(f"executive.cli.{name}" for name in TRAINS)
+    at_run_time = (*TRAINING, *serving) if not within(own, "executive.cli") else TRAINING
+    return [name for name in imported(source) if within(name, *at_run_time)]
+
+
+def test_nothing_at_run_time_imports_what_makes_pictures_or_trains() -> None:
+    paths = [path for package in OURS for path in modules(package)]
+    found = {str(path.relative_to(ROOT)): training_imports(path, path.read_text()) for path in paths}
+    assert {path: names for path, names in found.items() if names} == {}
+
+
+@pytest.mark.parametrize(
+    ("path", "source", "expected"),
+    [
+        ("plant/simulation.py", "from plant.dataset import coco", ["plant.dataset.coco"]),
+        (
+            "skills/detect/skill.py",
+            "def f():\n    import skills.perception.training.learner",
+            ["skills.perception.training.learner"],
+        ),
+        ("executive/cli/assembly.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
+        ("executive/cli/train_command.py", "import skills.perception.training.train", []),
+        ("plant/dataset/render.py", "from plant.models.builder import gltf", []),
+    ],
+)
+def test_the_check_finds_imports_of_training(path: str, source: str, expected: list[str]) -> None:
+    assert training_imports(ROOT / path, source) == expected

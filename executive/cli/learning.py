@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -13,10 +13,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from executive.cli.output import print_json
 from executive.mission.errors import InputError
 from skills.perception.training.labels import TrainingDataError, read_split
-from skills.perception.training.schedule import Budget
-
-if TYPE_CHECKING:
-    from skills.perception.training.parallel import Report, Told
+from skills.perception.training.schedule import Budget, Report
 
 __all__ = ["budget_of", "check_folders", "check_libraries", "check_time", "learnt", "tell_learnt"]
 
@@ -56,7 +53,9 @@ def budget_of(data: Path, minutes: float | None, epochs: int | None, *, unless_s
         raise InputError(error.message, mend=error.mend) from error
 
 
-def learnt(work: Callable[[Told], Path], out: Path, console: Console) -> tuple[Path, dict[str, float]]:
+def learnt(
+    work: Callable[[Callable[[Report], None]], Path], out: Path, console: Console
+) -> tuple[Path, dict[str, float]]:
     """The ONNX file that some work makes, and its last figures, with a bar of progress. Raises InputError."""
     figures = dict[str, float]()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())

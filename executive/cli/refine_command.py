@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
@@ -14,8 +13,7 @@ from executive.cli.learning import budget_of, check_folders, check_libraries, ch
 from executive.cli.output import console_for, refusals
 from executive.mission.errors import InputError
 from skills.perception.detector.cascade_files import MODEL_FILE
-from skills.perception.training.options import RefineOptions
-from skills.perception.training.schedule import REFINEMENT_RATE, Schedule
+from skills.perception.training.schedule import REFINEMENT_RATE, RefineOptions, Schedule
 
 __all__ = ["refine_command"]
 
@@ -39,7 +37,6 @@ def refine_command(
     epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how many crops for each picture.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all that is drawn by chance.")] = 1,
     rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = REFINEMENT_RATE,
-    jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
     start: Annotated[
         Path | None,
@@ -53,15 +50,13 @@ def refine_command(
         check_folders(data, out, resume)
         check_time(minutes, epochs)
         check_libraries()
-        first = _first(model)
         options = RefineOptions(
             data,
-            first,
             out,
             budget_of(data, minutes, epochs, unless_said_minutes=UNLESS_SAID_MINUTES),
+            model=_first(model),
             classifier=classifier,
             seed=seed,
-            processes=jobs or os.cpu_count() or 1,
             resume=resume,
             start=start,
             schedule=Schedule(rate),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
@@ -12,8 +11,7 @@ from rich.console import Console
 
 from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, learnt, tell_learnt
 from executive.cli.output import console_for, refusals
-from skills.perception.training.options import TrainOptions
-from skills.perception.training.schedule import HIGHEST_RATE, REFINING_RATE, Schedule
+from skills.perception.training.schedule import HIGHEST_RATE, REFINING_RATE, Schedule, TrainOptions
 
 __all__ = ["train_command"]
 
@@ -37,7 +35,6 @@ def train_command(
             show_default=False,
         ),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="How many processes; all cores unless said.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
     start: Annotated[
         Path | None,
@@ -56,7 +53,6 @@ def train_command(
             out,
             budget_of(data, minutes, epochs, unless_said_minutes=UNLESS_SAID_MINUTES),
             seed=seed,
-            processes=jobs or os.cpu_count() or 1,
             resume=resume,
             start=start,
             schedule=Schedule.refining(rate or REFINING_RATE) if start else Schedule(rate or HIGHEST_RATE),

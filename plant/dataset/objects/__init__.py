@@ -1,28 +1,20 @@
-"""Families of things: nine classes and many distractors, each instance made from its number.
+"""Procedural objects: nine classes and many distractors, each instance made from its number.
 
 `instance("hammer", 17)` gives an `ObjectModel`; the same category, number and sources give the same files.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from plant.dataset.objects.blocks import cube, cylinder
 from plant.dataset.objects.cache import cache_folder, kept_folder, sources_digest
-from plant.dataset.objects.distractors import DISTRACTOR_MAKERS
 from plant.dataset.objects.draft import Draft, Finished
-from plant.dataset.objects.drinks import beer, coke
-from plant.dataset.objects.extinguishers import extinguisher
-from plant.dataset.objects.hammers import hammer
 from plant.dataset.objects.model import ObjectModel, Surface, held_out, read_model, write_model
-from plant.dataset.objects.people import person
+from plant.dataset.objects.recipes import build, load_recipes
 from plant.dataset.objects.repainting import in_one_colour, plainly_painted
-from plant.dataset.objects.screwdrivers import screwdriver
-from plant.dataset.objects.untextured import UNTEXTURED_MAKERS
-from plant.dataset.objects.wrenches import wrench
 from plant.models.catalogue import load_catalogue
 
 __all__ = [
@@ -39,8 +31,6 @@ __all__ = [
     "sources_digest",
 ]
 
-Maker = Callable[[Draft], tuple[Finished, str, str]]
-
 INSTANCES = 960
 """How many instances of each class there are for the data set, but of people."""
 PEOPLE = 72
@@ -55,36 +45,8 @@ REPAINTED_OF_FIVE = 4
 """Of those of some classes, the ones whose number leaves this are detailed in form and plain in colour."""
 _ONE_COLOUR: Mapping[str, float] = {"extinguisher": 0.0, "hammer": 0.4, "screwdriver": 0.4, "wrench": 0.4}
 """Those classes, and how often they are of a single colour: not what is told by its colours."""
-_PLAIN_AS_A_CLASS = frozenset(
-    {
-        "battery",
-        "candle",
-        "food_can",
-        "jar",
-        "paint_tin",
-        "pipe",
-        "sauce_bottle",
-        "soda_can",
-        "spray_can",
-        "tissue_box",
-        "wine_bottle",
-    }
-)
-"""What would pass for a cylinder, a cube or a bottle of beer without its picture."""
-
-_CLASS_MAKERS: Mapping[str, Maker] = {
-    "beer": beer,
-    "coke": coke,
-    "extinguisher": extinguisher,
-    "hammer": hammer,
-    "screwdriver": screwdriver,
-    "wrench": wrench,
-    "person": person,
-    "cylinder": cylinder,
-    "cube": cube,
-}
-CLASSES: tuple[str, ...] = tuple(_CLASS_MAKERS)
-DISTRACTORS: tuple[str, ...] = tuple(sorted(DISTRACTOR_MAKERS))
+CLASSES: tuple[str, ...] = tuple(load_recipes("classes"))
+DISTRACTORS: tuple[str, ...] = tuple(sorted(load_recipes("distractors")))
 
 
 def numbers(category: str, *, for_training: bool) -> list[int]:
@@ -93,9 +55,9 @@ def numbers(category: str, *, for_training: bool) -> list[int]:
     Every fourth number is kept from training.
     """
     if not for_training:
-        below = VALIDATION_BELOW if category in _CLASS_MAKERS else DISTRACTOR_VALIDATION_BELOW
+        below = VALIDATION_BELOW if category in CLASSES else DISTRACTOR_VALIDATION_BELOW
         return [number for number in range(below) if held_out(number)]
-    count = PEOPLE if category == "person" else INSTANCES if category in _CLASS_MAKERS else DISTRACTOR_INSTANCES
+    count = PEOPLE if category == "person" else INSTANCES if category in CLASSES else DISTRACTOR_INSTANCES
     return [number for number in range(count) if not held_out(number)]
 
 
@@ -104,8 +66,8 @@ def is_untextured(category: str, seed: int) -> bool:
 
     So are all people from number 48 on.
     """
-    below = VALIDATION_BELOW if category in _CLASS_MAKERS else DISTRACTOR_VALIDATION_BELOW
-    if seed < below or category in _PLAIN_AS_A_CLASS:
+    below = VALIDATION_BELOW if category in CLASSES else DISTRACTOR_VALIDATION_BELOW
+    if seed < below or (category in DISTRACTORS and not load_recipes("distractors")[category].may_be_plain):
         return False
     return category == "person" or seed % 5 in UNTEXTURED_OF_FIVE
 
@@ -118,15 +80,15 @@ def repainted(category: str, seed: int) -> bool:
 def make(category: str, seed: int) -> tuple[Finished, str, str]:
     """Make an instance without writing it: the model, its kind and its main colour. Raises KeyError, ValueError."""
     plain = is_untextured(category, seed)
-    makers = UNTEXTURED_MAKERS if plain else _CLASS_MAKERS
-    maker = makers.get(category) or DISTRACTOR_MAKERS.get(category)
-    if maker is None:
+    basic = load_recipes("untextured") if plain else {}
+    recipe = basic.get(category) or {**load_recipes("classes"), **load_recipes("distractors")}.get(category)
+    if recipe is None:
         raise KeyError(f"no category {category!r}; there are {', '.join((*CLASSES, *DISTRACTORS))}")
     if seed < 0:
         raise ValueError(f"an instance's number is 0 or more, not {seed}")
     draft = Draft(np.random.default_rng([seed, *category.encode()]))
-    made, kind, colour = maker(draft)
-    if plain and category in DISTRACTOR_MAKERS:
+    made, kind, colour = build(category, recipe, draft)
+    if plain and category not in basic:
         made = plainly_painted(made, draft.rng)
     if repainted(category, seed):
         if draft.rng.random() < _ONE_COLOUR[category]:
@@ -142,7 +104,7 @@ def instance(category: str, seed: int) -> ObjectModel:
     def fill(folder: Path) -> None:
         made, kind, colour = make(category, seed)
         x, y, z = (float(v) for v in made.mass.com)
-        class_id = load_catalogue()[category].id if category in _CLASS_MAKERS else 0
+        class_id = load_catalogue()[category].id if category in CLASSES else 0
         model = ObjectModel(folder, category, seed, class_id, kind, colour, made.mass.mass_kg, (x, y, z), made.size_m)
         write_model(folder, model, made)
 

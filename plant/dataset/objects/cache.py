@@ -18,7 +18,9 @@ def sources_digest() -> str:
     """Ten hexadecimal digits that change whenever a source of the models does."""
     plant = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
-    for path in sorted(path for folder in _SOURCES for path in (plant / folder).rglob("*.py")):
+    for path in sorted(
+        path for folder in _SOURCES for path in (plant / folder).rglob("*") if path.suffix in (".py", ".yaml")
+    ):
         digest.update(path.relative_to(plant).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:10]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -23,7 +24,6 @@ _FACES = (
     "DejaVuSansMono-Bold.ttf",
     "cmb10.ttf",
 )
-SCRIPT_FACES = (3, 4, 5)
 _STARTS = ("Al", "Bro", "Cas", "Dun", "El", "Far", "Gol", "Hal", "Kra", "Lor", "Mon", "Nor", "Ost", "Pel", "Rav", "Sol")
 _MIDDLES = ("", "a", "de", "en", "i", "ko", "lo", "ma", "ri", "ta", "ve")
 _ENDS = (
@@ -96,16 +96,6 @@ def write_word(
     blend(image, word_mask(text, (max(bottom - top, 2), max(right - left, 2)), face=face), colour, (top, left))
 
 
-def write_tall(
-    image: FloatArray, text: str, box: tuple[float, float, float, float], colour: ArrayLike, face: int
-) -> None:
-    """Write a word that runs from the bottom up."""
-    h, w = image.shape[:2]
-    top, left, bottom, right = (round(v * s) for v, s in zip(box, (h, w, h, w), strict=True))
-    mask = word_mask(text, (max(right - left, 2), max(bottom - top, 2)), face=face)
-    blend(image, np.rot90(mask), colour, (top, left))
-
-
 def small_print(
     image: FloatArray, rng: np.random.Generator, box: tuple[float, float, float, float], colour: ArrayLike
 ) -> None:
@@ -131,50 +121,57 @@ def bar_code(image: FloatArray, rng: np.random.Generator, box: tuple[float, floa
     image[top + 2 : bottom - 2, left : left + len(bars)][:, bars] = 0.08
 
 
-def emblem(shape: tuple[int, int], kind: int, rng: np.random.Generator) -> FloatArray:
-    """A simple figure's coverage (0..1): disc, ring, shield, star, crown, leaf, drop, ears of grain, or a mountain."""
-    height, width = shape
-    canvas = np.zeros((height * 4, width * 4), np.uint8)
-    for outline, value in _figure(kind % 9, rng):
-        points = np.round(np.array(outline) * [width * 4, height * 4]).astype(np.int32)
-        cv2.fillPoly(canvas, [points], value)
-    return np.asarray(cv2.resize(canvas, (width, height), interpolation=cv2.INTER_AREA) / 255.0)
+def emblem(size: int, rng: np.random.Generator) -> FloatArray:
+    """A simple figure's coverage (0..1) of a square: a disc, a star, a shield, a crown, a leaf or a mountain."""
+    points = int(rng.integers(5, 9))
+    angle = np.arange(2 * points) * np.pi / points - np.pi / 2
+    radius = np.where(np.arange(2 * points) % 2 == 0, 0.48, rng.choice([0.22, 0.48]))
+    figures = (*_FIGURES, np.column_stack([0.5 + radius * np.cos(angle), 0.5 + radius * np.sin(angle)]))
+    canvas = np.zeros((size * 4, size * 4), np.uint8)
+    outline = np.array(figures[int(rng.integers(len(figures)))])
+    cv2.fillPoly(canvas, [np.round(outline * size * 4).astype(np.int32)], 255)
+    return np.asarray(cv2.resize(canvas, (size, size), interpolation=cv2.INTER_AREA) / 255.0)
 
 
-Outline = list[tuple[float, float]]
+_FIGURES = (
+    ((0.1, 0.08), (0.9, 0.08), (0.9, 0.5), (0.75, 0.8), (0.5, 0.97), (0.25, 0.8), (0.1, 0.5)),
+    ((0.1, 0.85), (0.05, 0.3), (0.3, 0.55), (0.5, 0.12), (0.7, 0.55), (0.95, 0.3), (0.9, 0.85)),
+    ((0.05, 0.9), (0.1, 0.4), (0.5, 0.08), (0.95, 0.05), (0.9, 0.5), (0.55, 0.85)),
+    ((0.02, 0.92), (0.36, 0.2), (0.52, 0.5), (0.68, 0.3), (0.98, 0.92)),
+)
+"""A shield, a crown, a leaf and a mountain."""
 
 
-def _circle(x: float, y: float, rx: float, ry: float, n: int = 40) -> Outline:
-    a = np.linspace(0, 2 * np.pi, n)
-    return [(float(x + rx * np.cos(t)), float(y + ry * np.sin(t))) for t in a]
+def printed_label(
+    rng: np.random.Generator,
+    ground: FloatArray,
+    accent: FloatArray,
+    *,
+    words: Sequence[str],
+    brands: Sequence[str] = (),
+    repeats: int = 2,
+) -> FloatArray:
+    """A label (256, 512): a name (one of `brands`, else invented), what is inside, an emblem, fine print, a bar code.
 
-
-def _star(points: int, inner: float) -> Outline:
-    a = np.arange(2 * points) * np.pi / points - np.pi / 2
-    r = np.where(np.arange(2 * points) % 2 == 0, 0.48, inner)
-    return [(float(0.5 + q * np.cos(t)), float(0.5 + q * np.sin(t))) for q, t in zip(r, a, strict=True)]
-
-
-def _figure(kind: int, rng: np.random.Generator) -> list[tuple[Outline, int]]:
-    if kind == 0:
-        return [(_circle(0.5, 0.5, 0.48, 0.48), 255)]
-    if kind == 1:
-        return [(_circle(0.5, 0.5, 0.48, 0.48), 255), (_circle(0.5, 0.5, 0.38, 0.38), 0), (_star(5, 0.2), 255)]
-    if kind == 2:
-        shield = [(0.1, 0.08), (0.9, 0.08), (0.9, 0.5), (0.75, 0.8), (0.5, 0.97), (0.25, 0.8), (0.1, 0.5)]
-        return [(shield, 255), ([(0.44, 0.1), (0.56, 0.1), (0.56, 0.9), (0.44, 0.9)], 0)]
-    if kind == 3:
-        return [(_star(int(rng.integers(5, 9)), 0.22), 255)]
-    if kind == 4:
-        crown = [(0.1, 0.85), (0.05, 0.3), (0.3, 0.55), (0.5, 0.12), (0.7, 0.55), (0.95, 0.3), (0.9, 0.85)]
-        return [(crown, 255)]
-    if kind == 5:
-        return [([(0.05, 0.9), (0.1, 0.4), (0.5, 0.08), (0.95, 0.05), (0.9, 0.5), (0.55, 0.85)], 255)]
-    if kind == 6:
-        return [([(0.5, 0.03), (0.8, 0.5), (0.82, 0.7), (0.65, 0.93), (0.35, 0.93), (0.18, 0.7), (0.2, 0.5)], 255)]
-    if kind == 7:
-        grain = [
-            (_circle(0.5 + s * 0.14 * (1 + k % 2), 0.12 + 0.11 * k, 0.1, 0.06), 255) for k in range(7) for s in (-1, 1)
-        ]
-        return [*grain, ([(0.48, 0.1), (0.52, 0.1), (0.52, 0.98), (0.48, 0.98)], 255)]
-    return [([(0.02, 0.92), (0.36, 0.2), (0.52, 0.5), (0.68, 0.3), (0.98, 0.92)], 255)]
+    All of it stands `repeats` times beside each other, over a band, a wave, or nothing.
+    """
+    image = np.zeros((256, 512, 3)) + ground
+    ink = np.array((0.95, 0.95, 0.93) if float(np.mean(ground)) < 0.55 else (0.1, 0.1, 0.12))
+    if rng.random() < 0.65:
+        rows, columns = np.indices((256, 512))
+        swing = float(rng.choice([0.0, rng.uniform(8, 40)]))
+        middle = rng.uniform(90, 230) + swing * np.sin(columns * 4 * np.pi / 512)
+        blend(image, np.clip(rng.uniform(6, 40) - np.abs(rows - middle), 0, 1), accent)
+    name = str(rng.choice(brands)) if brands else brand(rng)
+    word = str(rng.choice(words)) if words else ""
+    face, size, step = int(rng.integers(9)), int(rng.integers(50, 90)), 1.0 / repeats
+    figure = emblem(size, rng)
+    for left in np.arange(repeats) * step:
+        low, high = left + 0.05 * step, left + 0.87 * step
+        write_word(image, name, (0.08, low, 0.38, high), ink, face=face)
+        if word:
+            write_word(image, word, (0.40, low, 0.58, high), ink, face=face + 1)
+        blend(image, figure, accent * 0.8, (158, int(512 * (low + high) / 2) - size // 2))
+        small_print(image, rng, (0.92, low, 0.98, high), ink)
+    bar_code(image, rng, (0.7, 1 - 0.11 * step, 0.9, 0.99))
+    return image

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from plant.dataset.objects.draft import Finished, pick, varied
-from plant.dataset.objects.solids import GREYS, any_plain
+from plant.dataset.objects.finishes import COLOURS, GREYS
 from plant.models.builder.mesh import Material, Mesh
 
 __all__ = ["in_one_colour", "plainly_painted"]
@@ -20,7 +20,7 @@ def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: fl
     for name, material in made.mesh.materials.items():
         picture = made.pictures.get(material.texture or "")
         mean = None if picture is None else np.asarray(picture, dtype=float).reshape(-1, 3).mean(axis=0) / 255.0
-        colour = np.array(any_plain(rng)[1]) if mean is None or not own else mean
+        colour = np.array(COLOURS[str(rng.choice(list(COLOURS)))]) if mean is None or not own else mean
         keep = picture is None and (own or rng.random() < 0.5)
         painted[name] = material if keep else Material(varied(rng, colour), None, None, material.shine, 0.0)
     mesh = Mesh(painted)
@@ -30,7 +30,8 @@ def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: fl
 
 def in_one_colour(made: Finished, rng: np.random.Generator) -> tuple[Finished, str]:
     """The same thing in a single plain colour, as it comes from a drawing; what one would call that."""
-    word, colour = any_plain(rng)
+    word = str(rng.choice(list(COLOURS)))
+    colour = COLOURS[word]
     if rng.random() < 0.6:
         word, colour = "grey", pick(rng, *GREYS)
     paint = Material(varied(rng, colour, 0.04), None, None, float(rng.uniform(0.0, 0.6)), 0.0)

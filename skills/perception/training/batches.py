@@ -27,19 +27,16 @@ class Batch:
 
 @dataclass(frozen=True)
 class Feed:
-    """Gives each of several processes its share of an endless sequence of canvases, the same for the same seed."""
+    """An endless sequence of canvases, the same for the same seed."""
 
     maker: CanvasMaker
     seed: int
-    rank: int
-    processes: int
 
     def batch(self, taken: int, phase: Phase) -> Batch:
-        """The next batch of this process, when all have `taken` so many canvases together."""
-        first = taken + self.rank * phase.batch
-        chosen = shuffled(self.seed, first, phase.batch, len(self.maker.pictures))
+        """The next batch when so many canvases are `taken`."""
+        chosen = shuffled(self.seed, taken, phase.batch, len(self.maker.pictures))
         canvases = [
-            self.maker.make(int(index), phase.canvas, np.random.default_rng([self.seed, first + k]))
+            self.maker.make(int(index), phase.canvas, np.random.default_rng([self.seed, taken + k]))
             for k, index in enumerate(chosen)
         ]
         return batch_of(canvases)

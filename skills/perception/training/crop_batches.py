@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from skills.perception.detector.proposals import CROP_PX, crop_map, mapped
-from skills.perception.training.crop_store import CropStore
 from skills.perception.training.photometry import as_seen_otherwise
 from skills.perception.training.placing import turning
 from skills.perception.training.proposal_table import ProposalTable
 from skills.perception.training.schedule import shuffled
+from skills.perception.training.store import PictureStore
 
 __all__ = ["CropBatch", "CropFeed", "changed_map"]
 
@@ -46,22 +46,16 @@ class CropBatch:
 
 @dataclass(frozen=True)
 class CropFeed:
-    """Gives each of several processes its share of an endless sequence of crops, the same for the same seed.
-
-    Half of them are about things, however seldom things are.
-    """
+    """An endless sequence of crops, the same for the same seed. Half of them are about objects."""
 
     table: ProposalTable
-    surroundings: CropStore
+    store: PictureStore
     seed: int
-    rank: int
-    processes: int
 
     def batch(self, taken: int, count: int) -> CropBatch:
-        """The next batch of this process, when all have `taken` so many crops together."""
-        first = taken + self.rank * count
-        rows = self._rows(first, count)
-        made = [self._crop(int(row), np.random.default_rng([self.seed, first + k])) for k, row in enumerate(rows)]
+        """The next batch when so many crops are `taken`."""
+        rows = self._rows(taken, count)
+        made = [self._crop(int(row), np.random.default_rng([self.seed, taken + k])) for k, row in enumerate(rows)]
         pictures = torch.from_numpy(np.stack([picture for picture, _ in made])).permute(0, 3, 1, 2)
         boxes = torch.from_numpy(np.stack([both for _, both in made]))
         return CropBatch(
@@ -88,17 +82,14 @@ class CropFeed:
         """A crop, and (2, 4) the region's box and the thing's in it."""
         table = self.table
         affine, region = changed_map(table.boxes[row], random)
-        crop = self.surroundings.cut(row, affine)
+        crop = self.store.scales(int(table.pictures[row])).cut(affine.astype(np.float64), (CROP_PX, CROP_PX))
         if random.random() < _CHANGED:
             crop = as_seen_otherwise(crop, random)
         return crop, mapped(np.stack([region, table.wanted[row]]), affine)
 
 
 def changed_map(box: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
-    """The map (2, 3) to the crop of a box (4,) that fits a little otherwise, changed; and that box.
-
-    It shows nothing farther off than `REACH_PX`.
-    """
+    """The map (2, 3) to the crop of a box (4,) that fits a little otherwise, changed; and that box."""
     region = _spread(box, random)
     return _changed(crop_map(region), region, random), region
 

@@ -6,18 +6,12 @@ on processor cores.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from skills.estimate.compiled import compiled
-
 __all__ = ["before_first", "filtered", "padded"]
-
-_LARGE: Final = 5
 
 
 def padded(x: Tensor, kernel: int, stride: int) -> Tensor:
@@ -41,7 +35,7 @@ def filtered(x: Tensor, weight: Tensor, stride: int) -> Tensor:
 
 
 class _Filtering(torch.autograd.Function):
-    """The library's convolution, with gradients of the input by a convolution of stride 1, and of weights by a loop."""
+    """The library's convolution, with gradients of the input by a convolution of stride 1, and of weights by sums."""
 
     @staticmethod
     def forward(context: Any, x: Tensor, weight: Tensor, stride: int) -> Tensor:
@@ -77,35 +71,12 @@ def _of_input(gradient: Tensor, weight: Tensor, stride: int, size: torch.Size) -
 
 
 def _of_weight(around: Tensor, gradient: Tensor, kernel: int, stride: int) -> Tensor:
-    given, wanted = _channels_last(around), _channels_last(gradient)
-    found = np.zeros((kernel, kernel, given.shape[-1]), dtype=given.dtype)
-    _add_products(given, wanted, stride, found)
-    return torch.from_numpy(found).permute(2, 0, 1).unsqueeze(1)
-
-
-def _channels_last(x: Tensor) -> NDArray[Any]:
-    """(N, C, H, W) as an array (N, H, W, C), of 32 bits at least."""
-    moved = x.detach().permute(0, 2, 3, 1)
-    found: NDArray[Any] = (moved if moved.dtype == torch.float64 else moved.float()).contiguous().numpy()
-    return found
-
-
-@compiled
-def _add_products(x: NDArray[Any], gradient: NDArray[Any], stride: int, sums: NDArray[Any]) -> None:
-    """Add to sums (k, k, C) the products of gradients (N, h, w, C) with the inputs (N, H, W, C) that they are of."""
-    count, height, width, channels = gradient.shape
-    kernel = sums.shape[0]
-    for n in range(count):
-        for i in range(height):
-            for a in range(kernel):
-                row = i * stride + a
-                for j in range(width):
-                    column = j * stride
-                    for c in range(channels):
-                        by = gradient[n, i, j, c]
-                        sums[a, 0, c] += x[n, row, column, c] * by
-                        sums[a, 1, c] += x[n, row, column + 1, c] * by
-                        sums[a, 2, c] += x[n, row, column + 2, c] * by
-                        if kernel == _LARGE:
-                            sums[a, 3, c] += x[n, row, column + 3, c] * by
-                            sums[a, 4, c] += x[n, row, column + 4, c] * by
+    """Sums, in 32 bits, of the products of the gradient with the input, shifted by each of the kernel's places."""
+    gradient = gradient if gradient.dtype == torch.float64 else gradient.float()
+    height, width = gradient.shape[2:]
+    sums = [
+        (around[:, :, a : a + stride * height : stride, b : b + stride * width : stride] * gradient).sum((0, 2, 3))
+        for a in range(kernel)
+        for b in range(kernel)
+    ]
+    return torch.stack(sums, dim=1).reshape(-1, 1, kernel, kernel)

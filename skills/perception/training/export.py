@@ -1,4 +1,4 @@
-"""The network as an ONNX file that takes pictures as bytes and gives boxes and scores in the letterbox's pixels."""
+"""Networks as ONNX files that take pictures or crops as bytes and give boxes and scores in their pixels."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ from torch import Tensor, nn
 
 from skills.perception.detector.cascade_files import FORMAT
 from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX
+from skills.perception.detector.proposals import CROP_PX
 from skills.perception.training import onnx_files
+from skills.perception.training.crop_network import CropNetwork
 from skills.perception.training.network import DetectorNetwork
 from skills.perception.training.onnx_files import shorten_names, write_sealed
 
-__all__ = ["Exportable", "export", "fused", "normalised_layers", "write_onnx"]
+__all__ = ["Exportable", "export", "export_crops", "fused", "normalised_layers", "write_onnx"]
 
 _OPSET = 17
 Network = TypeVar("Network", bound=nn.Module)
@@ -88,6 +90,48 @@ def export(
     model = Exportable(network, score_offsets).eval()
     example = {"images": torch.zeros((1, HEIGHT_PX, WIDTH_PX, 3), dtype=torch.uint8)}
     write_onnx(model, example, file, {"format": FORMAT, "class_names": json.dumps(list(class_names)), **facts})
+
+
+class ExportableCrops(nn.Module):
+    """Crops (N, 128, 128, 3) of bytes, regions (N, 4) in them and logits (N, K) to boxes (N, 4) and scores."""
+
+    def __init__(self, network: CropNetwork, score_offsets: Sequence[float] | None = None) -> None:
+        super().__init__()
+        self.network = fused(network)
+        self.network.stop_learning()
+        self.network.take_bytes()
+        if score_offsets is not None:
+            with torch.no_grad():
+                self.network.scores.bias.add_(torch.tensor(score_offsets))
+
+    def forward(self, crops: Tensor, regions: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
+        """Boxes and scores."""
+        found, boxes = self.network(crops.permute(0, 3, 1, 2).float(), regions, logits)
+        return boxes, found.sigmoid()
+
+
+def export_crops(
+    network: CropNetwork,
+    file: Path,
+    *,
+    form: str,
+    class_names: Sequence[str],
+    facts: Mapping[str, str],
+    score_offsets: Sequence[float] | None = None,
+) -> None:
+    """Write the ONNX file of a crop network in a format; whole or not at all.
+
+    `score_offsets` are added to the logits of each class. `facts` must hold the digest of the file of the network
+    before it: as `first` that of the proposal network, as `second` that of the refinement network.
+    """
+    model = ExportableCrops(network, score_offsets).eval()
+    example = {
+        "chips": torch.zeros((2, CROP_PX, CROP_PX, 3), dtype=torch.uint8),
+        "regions": torch.full((2, 4), float(CROP_PX)) * torch.tensor([0.2, 0.2, 0.8, 0.8]),
+        "logits": torch.zeros((2, len(class_names))),
+    }
+    facts = {"format": form, "class_names": json.dumps(list(class_names)), **facts}
+    write_onnx(model, example, file, facts, compact=True)
 
 
 def write_onnx(

@@ -11,9 +11,10 @@ from torch import Tensor
 from skills.perception.training.assign import Assigned, AssignOptions, assign
 from skills.perception.training.overlaps import overlap, sizes
 
-__all__ = ["LossOptions", "Losses", "TruthBatch", "complete_overlap", "losses"]
+__all__ = ["LossOptions", "Losses", "TruthBatch", "complete_overlap", "crop_losses", "losses"]
 
 _TINY = 1e-7
+_CROP_BOX_WEIGHT = 2.0
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,18 @@ def losses(logits: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch, op
     targets = truth.boxes.gather(1, assigned.things.clamp(min=0)[..., None].expand(-1, -1, 4))[answering]
     box_each = (1.0 - complete_overlap(boxes[answering], targets)) * assigned.quality[answering]
     return Losses(score_loss, options.box_weight * box_each.sum() / total)
+
+
+def crop_losses(logits: Tensor, boxes: Tensor, wanted: Tensor, classes: Tensor) -> Losses:
+    """The losses of crops' logits (N, K) and boxes (N, 4), by boxes `wanted` (N, 4) and `classes` (N,), -1 for none."""
+    logits, boxes = logits.float(), boxes.float()
+    near = classes >= 0
+    scores = torch.zeros_like(logits)
+    found, right = boxes[near], wanted[near]
+    scores[near, classes[near]] = overlap(found.detach(), right)
+    each = torch.nn.functional.binary_cross_entropy_with_logits(logits, scores, reduction="none").sum(dim=1)
+    apart = (1.0 - complete_overlap(found, right)).sum() / near.sum().clamp(min=1)
+    return Losses(each.mean(), _CROP_BOX_WEIGHT * apart)
 
 
 def _wanted_scores(logits: Tensor, truth: TruthBatch, assigned: Assigned) -> Tensor:

@@ -1,4 +1,4 @@
-"""What a network takes for things in the pictures that are learnt from, and what is really there."""
+"""What a network proposes in the training pictures, and what is really there."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from pycocotools import mask as coco_mask
 
 from skills.perception.detector.cascade_files import DetectorModel
+from skills.perception.detector.crops import refined
 from skills.perception.detector.proposals import ProposalOptions, Proposals, proposals_of
 from skills.perception.detector.scales import Scales
-from skills.perception.training.crop_store import CropWriter
 from skills.perception.training.labels import Labels
-from skills.perception.training.stages import proposed, refined_by
 
-__all__ = ["NEAR", "Look", "ProposalTable", "proposals_in", "refined_in", "table_of"]
+__all__ = ["NEAR", "ProposalTable", "proposals_in", "proposed", "refined_by", "refined_in", "table_of"]
 
 NEAR: Final = 0.3
 _WITHIN_IGNORED: Final = 0.6
@@ -58,8 +57,17 @@ class ProposalTable:
             return ProposalTable(**{name: kept[name] for name in ProposalTable.__dataclass_fields__})
 
 
-Look = Callable[[Scales], Proposals]
-"""Where a network sees something in a picture in the letterbox, and what."""
+def proposed(model: DetectorModel, scales: Scales) -> tuple[Floats, Floats]:
+    """Boxes (A, 4) and scores (A, K) of the proposal network in a picture's letterbox."""
+    boxes, scores = model.proposal.session.run(["boxes", "scores"], {"images": scales.full[None]})
+    return boxes[0], scores[0]
+
+
+def refined_by(model: DetectorModel, scales: Scales) -> tuple[Floats, Floats]:
+    """Boxes (R, 4) and scores (R, K) of the refinement network, as in use. Raises ValueError without one."""
+    if model.refinement is None:
+        raise ValueError("there is no refinement network")
+    return refined(model.refinement.session, scales, *proposed(model, scales), ProposalOptions())
 
 
 def proposals_in(model: DetectorModel, scales: Scales) -> Proposals:
@@ -72,12 +80,9 @@ def refined_in(model: DetectorModel, scales: Scales) -> Proposals:
     return proposals_of(*refined_by(model, scales), _SEEN)
 
 
-def table_of(look: Look, pictures: Iterable[tuple[Scales, Labels]], kept: CropWriter) -> ProposalTable:
-    """The regions of all pictures, of which what is about them is kept. Those on what is to be ignored are left out."""
-    tables: list[ProposalTable] = []
-    for number, (scales, labels) in enumerate(pictures):
-        tables.append(_rows(look(scales), number, labels))
-        kept.add(scales, tables[-1].boxes)
+def table_of(look: Callable[[Scales], Proposals], pictures: Iterable[tuple[Scales, Labels]]) -> ProposalTable:
+    """The regions that a network finds in all pictures. Those on what is to be ignored are left out."""
+    tables = [_rows(look(scales), number, labels) for number, (scales, labels) in enumerate(pictures)]
     names = ProposalTable.__dataclass_fields__
     return ProposalTable(**{name: np.concatenate([vars(table)[name] for table in tables]) for name in names})
 

@@ -15,6 +15,7 @@ import argparse
 import contextlib
 import hashlib
 import io
+import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -33,7 +34,6 @@ from skills.perception.detector.letterbox import letterbox
 from skills.perception.detector.network_file import ModelFileError, Network
 from skills.perception.detector.proposals import CLASSIFIED, ProposalOptions, Proposals, proposals_of
 from skills.perception.detector.scales import Scales, halved
-from skills.perception.training.command import exit_code_of
 from skills.perception.training.labels import TrainingDataError
 from skills.perception.training.onnx_files import (
     QUANTISED,
@@ -43,7 +43,7 @@ from skills.perception.training.onnx_files import (
     with_float32_weights,
     write_sealed,
 )
-from skills.perception.training.stages import proposed, refined_by
+from skills.perception.training.proposal_table import proposed, refined_by
 from skills.perception.training.store import read_picture
 from skills.perception.training.validate import examination
 
@@ -239,7 +239,12 @@ def main() -> int:
     parser.add_argument("--data", type=Path, required=True, help="the data set's folder")
     parser.add_argument("--out", type=Path, required=True, help="the folder to write to")
     given = parser.parse_args()
-    return exit_code_of(lambda: quantised_detector(given.file, given.data, given.out))
+    try:
+        quantised_detector(given.file, given.data, given.out)
+    except (TrainingDataError, OSError) as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 2
+    return 0
 
 
 if __name__ == "__main__":

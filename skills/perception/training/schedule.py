@@ -1,10 +1,11 @@
-"""How long to learn, how fast, and on what canvases at what time. Pure."""
+"""What a training is given: how long, how fast, and on what canvases at what time. Needs no torch."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -12,7 +13,18 @@ from numpy.typing import NDArray
 
 from skills.perception.training.canvases import CanvasOptions
 
-__all__ = ["HIGHEST_RATE", "REFINEMENT_RATE", "REFINING_RATE", "Budget", "Phase", "Schedule", "shuffled"]
+__all__ = [
+    "HIGHEST_RATE",
+    "REFINEMENT_RATE",
+    "REFINING_RATE",
+    "Budget",
+    "Phase",
+    "RefineOptions",
+    "Report",
+    "Schedule",
+    "TrainOptions",
+    "shuffled",
+]
 
 HIGHEST_RATE: Final = 3e-3
 REFINING_RATE: Final = 8e-4
@@ -79,6 +91,47 @@ class Schedule:
     def phase(self, progress: float) -> Phase:
         """The phase at some share of the time."""
         return [phase for phase in self.phases if phase.begins <= progress][-1]
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """What to train on, where to write, and how long.
+
+    `start` names a checkpoint or a detector's ONNX file of which the weights are taken over. With `resume`, training
+    goes on where `out` stands.
+    """
+
+    data: Path
+    out: Path
+    budget: Budget
+    seed: int = 1
+    resume: bool = False
+    start: Path | None = None
+    examined: int = 320
+    schedule: Schedule = field(default_factory=Schedule)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RefineOptions(TrainOptions):
+    """The same for the refinement network behind the proposal network's file `model`, or the `classifier` network.
+
+    `start` names a checkpoint of such a training, or such a network's ONNX file, of which the weights are taken over.
+    """
+
+    model: Path
+    classifier: bool = False
+    batch: int = 64
+
+
+@dataclass(frozen=True)
+class Report:
+    """How far training has come; `figures` of the held-out pictures when they were just taken."""
+
+    progress: float
+    steps: int
+    pictures_per_s: float
+    losses: tuple[float, float]
+    figures: dict[str, float] | None = None
 
 
 def shuffled(seed: int, first: int, count: int, of: int) -> NDArray[np.int64]:

@@ -8,6 +8,13 @@ from pathlib import Path
 import pytest
 
 MISSIONS = Path(__file__).parents[3] / "missions"
+TRAINING = (
+    "plant.dataset",
+    "plant.models.builder",
+    "plant.worlds.builder",
+    "skills.perception.training",
+    "executive.speech.training",
+)
 HEAVY = {"pydrake", "spacy", "onnxruntime", "cv2", "numba", "scipy"}
 
 # Command, and which of the heavy libraries it imports.
@@ -16,6 +23,8 @@ IMPORTS = [
     (["parse", "--open", "fetch me a drink"], {"spacy"}),
     (["parse", "Hey Alice, fetch me a drink"], {"spacy"}),
     (["check", str(MISSIONS / "fetch_drink.yaml")], {"cv2", "pydrake"}),
+    (["run", "--help"], {"cv2", "numba", "pydrake", "scipy"}),
+    (["evaluate", "--help"], {"cv2", "numba", "pydrake", "scipy"}),
     (["queue", "--help"], {"pydrake"}),
     (["log", "--help"], {"cv2"}),
     (["new-skill", "--help"], set()),
@@ -29,6 +38,7 @@ def test_a_command_imports_no_heavy_library_that_it_does_not_use(arguments, expe
         f"sys.argv = ['errand', *{arguments!r}]\n"
         "try: main()\n"
         "except SystemExit as end: assert not end.code, end.code\n"
+        f"assert not [name for name in sys.modules if name.startswith({TRAINING!r})]\n"
         f"print(*sorted({{name.split('.')[0] for name in sys.modules}} & {HEAVY!r}))"
     )
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}

@@ -1,4 +1,4 @@
-"""Surfaces and fields: closed, outward, and of the volume of the book."""
+"""Surfaces: closed, outward, and of the volume of the book."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from plant.models.builder.gltf import gltf_text
-from plant.models.builder.implicit import ball, cut, half_space, join, limb, surface
 from plant.models.builder.inertia import shell_mass, solid_mass, together
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.outlines import area, inset, triangles_of
@@ -62,23 +61,6 @@ def test_a_rounded_box_is_a_little_lighter_than_the_box() -> None:
     mass = solid_mass(body, 1.0)
     assert 5.95 < mass.mass_kg < 6.0
     np.testing.assert_allclose(mass.com, (0.5, 1.0, 1.5), atol=1e-6)
-
-
-def test_the_surface_of_a_field_lies_on_it_and_looks_outward() -> None:
-    points, normals = surface(ball((0, 0, 0), 0.1), (-0.1,) * 3, (0.1,) * 3, 0.01)
-    np.testing.assert_allclose(np.linalg.norm(points, axis=1), 0.1, atol=5e-4)
-    assert np.min(np.sum(points * normals, axis=1)) > 0.09
-    body = mesh()
-    body.add_triangles("red", points, normals, points[:, :2])
-    assert shell_mass(body, 1.0).mass_kg == pytest.approx(4 * np.pi * 0.01, rel=0.02)
-
-
-def test_joined_and_cut_fields_hold_what_they_should() -> None:
-    both = join([limb((0, 0, 0), (0, 0, 1), 0.1, 0.1), ball((0, 0, 1), 0.3)], 0.05)
-    halved = cut(both, half_space((0, 0, 0.5), (0, 0, 1)))
-    points = np.array([(0.0, 0.0, 0.1), (0.0, 0.0, 1.0), (0.25, 0.0, 1.0), (0.25, 0.0, 0.2)])
-    assert [bool(v < 0) for v in both(points)] == [True, True, True, False]
-    assert [bool(v < 0) for v in halved(points)] == [False, True, True, False]
 
 
 def test_two_bodies_together_obey_the_parallel_axes() -> None:

@@ -15,17 +15,19 @@ from skills.perception.detector.proposals import CROP_PX  # noqa: E402
 from skills.perception.detector.scales import Scales, halved  # noqa: E402
 from skills.perception.training.classifier_network import USED, ClassifierNetwork  # noqa: E402
 from skills.perception.training.crop_batches import CropBatch  # noqa: E402
-from skills.perception.training.crop_export import export_crops  # noqa: E402
-from skills.perception.training.crop_learner import ClassifierLearner  # noqa: E402
-from skills.perception.training.export import fused  # noqa: E402
+from skills.perception.training.crop_learner import CropLearner  # noqa: E402
+from skills.perception.training.export import export_crops, fused  # noqa: E402
 from skills.perception.training.labels import TrainingDataError  # noqa: E402
 from skills.perception.training.proposal_table import refined_in  # noqa: E402
 from skills.perception.training.quantisation import quantised  # noqa: E402
-from skills.perception.training.workers import Workers  # noqa: E402
 
 onnx = pytest.importorskip("onnx")
-ALONE, CPU, NAMES = Workers(0, 1), torch.device("cpu"), ("beer", "coke", "cube")
+CPU, NAMES = torch.device("cpu"), ("beer", "coke", "cube")
 Given = tuple["torch.Tensor", "torch.Tensor", "torch.Tensor"]
+
+
+def new_learner(seed: int) -> CropLearner:
+    return CropLearner.new(len(NAMES), seed, CPU, classifier=True)
 
 
 def given(count: int) -> Given:
@@ -64,13 +66,13 @@ def test_a_fresh_network_says_what_the_refinement_network_said() -> None:
 
 
 def test_it_begins_with_imagenets_weights_and_learns_all_but_the_early_layers() -> None:
-    learner = ClassifierLearner.new(len(NAMES), 1, CPU)
+    learner = new_learner(1)
     learner.begin(Path("none"), [])
     learner.keep_early()
     before = {name: value.clone() for name, value in learner.network.state_dict().items()}
     assert float(before["backbone.stem.0.0.weight"].abs().max()) > 0.5
-    for step in range(2):  # what it adds is nothing at first, and so are the first gradients of what is before
-        learner.step(batch_of(4), 1e-3, ALONE, float(step))
+    for _ in range(2):  # what it adds is nothing at first, and so are the first gradients of what is before
+        learner.step(batch_of(4), 1e-3)
     after = learner.network.state_dict()
     still = {name for name in before if name.startswith(("backbone.stem.", "backbone.stage8."))}
     assert all(torch.equal(before[name], after[name]) for name in still)
@@ -81,10 +83,10 @@ def test_it_begins_with_imagenets_weights_and_learns_all_but_the_early_layers() 
 
 
 def test_crops_are_learnt_by_heart() -> None:
-    learner, batch = ClassifierLearner.new(len(NAMES), 1, CPU), batch_of(8)
+    learner, batch = new_learner(1), batch_of(8)
     learner.begin(Path("none"), [])
     learner.keep_early()
-    found = [learner.step(batch, 2e-3, ALONE, float(k))[0] for k in range(30)]
+    found = [learner.step(batch, 2e-3)[0] for k in range(30)]
     assert np.mean(found[-5:]) < 0.6 * np.mean(found[:3])
 
 
@@ -112,7 +114,7 @@ def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_
         expected, expected_boxes = in_use(as_bytes / 255, boxes, logits)
     assert np.abs(found - expected_boxes.numpy()).max() < 0.05
     assert np.abs(scores - (expected + torch.tensor(shift)).sigmoid().numpy()).max() < 5e-3
-    learner = ClassifierLearner.new(len(NAMES), 2, CPU)
+    learner = new_learner(2)
     learner.start_from(file, [batch_of(4)])
     with torch.no_grad():
         again, boxes_again = learner.network.eval()(as_bytes / 255, boxes, logits)
@@ -176,4 +178,4 @@ def test_without_a_refinement_network_there_is_nothing_to_learn_from(tmp_path: P
 def test_learning_goes_on_from_no_refinement_networks_file(tmp_path: Path) -> None:
     write_pair(tmp_path / "m.onnx")
     with pytest.raises(TrainingDataError, match=r"m_refinement\.onnx.*begin anew without it"):
-        ClassifierLearner.new(len(NAMES), 2, CPU).start_from(tmp_path / "m_refinement.onnx", [])
+        new_learner(2).start_from(tmp_path / "m_refinement.onnx", [])

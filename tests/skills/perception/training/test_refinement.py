@@ -16,22 +16,23 @@ from skills.perception.detector.cascade_files import REFINEMENT_FORMAT, load_mod
 from skills.perception.detector.proposals import CROP_PX  # noqa: E402
 from skills.perception.detector.scales import Scales, halved  # noqa: E402
 from skills.perception.training.crop_batches import CropFeed  # noqa: E402
-from skills.perception.training.crop_export import export_crops  # noqa: E402
-from skills.perception.training.crop_learner import RefinementLearner  # noqa: E402
-from skills.perception.training.crop_losses import crop_losses  # noqa: E402
+from skills.perception.training.crop_learner import CropLearner  # noqa: E402
 from skills.perception.training.crop_network import covered, moved  # noqa: E402
-from skills.perception.training.crop_store import CropStore, written_crops  # noqa: E402
-from skills.perception.training.export import export  # noqa: E402
+from skills.perception.training.export import export, export_crops  # noqa: E402
 from skills.perception.training.labels import Labels, LearningPicture, TrainingDataError  # noqa: E402
-from skills.perception.training.learner import Learner  # noqa: E402
+from skills.perception.training.learner import ProposalLearner  # noqa: E402
+from skills.perception.training.losses import crop_losses  # noqa: E402
 from skills.perception.training.network import Residual  # noqa: E402
 from skills.perception.training.proposal_table import ProposalTable, proposals_in, table_of  # noqa: E402
 from skills.perception.training.refinement_network import RefinementNetwork, surest_about  # noqa: E402
-from skills.perception.training.workers import Workers  # noqa: E402
+from skills.perception.training.store import PictureStore  # noqa: E402
 
-ALONE = Workers(0, 1)
 CPU = torch.device("cpu")
 THING, FAR = (100, 100, 200, 200), (300, 300, 400, 400)
+
+
+def new_learner(seed: int) -> CropLearner:
+    return CropLearner.new(len(CLASSES), seed, CPU, classifier=False)
 
 
 def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> LearningPicture:
@@ -44,8 +45,7 @@ def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> Learni
 def table(file: Path, picture: LearningPicture, *things: tuple[str, float, tuple[float, ...]]) -> ProposalTable:
     look = partial(proposals_in, load_model(write_model(file)))
     seen = picture_of(*things)
-    with written_crops(file.parent) as kept:
-        return table_of(look, [(Scales(seen, halved(seen)), picture.labels)], kept)
+    return table_of(look, [(Scales(seen, halved(seen)), picture.labels)])
 
 
 def test_a_place_on_a_thing_wants_its_class_and_box_and_another_nothing(tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def feed(tmp_path: Path) -> CropFeed:
+def feed() -> CropFeed:
     """A bright thing in one of two dark pictures, and as many places on it as elsewhere."""
     dark = np.full((480, 640, 3), 40, np.uint8)
     bright = dark.copy()
@@ -87,11 +87,9 @@ def feed(tmp_path: Path) -> CropFeed:
     boxes = np.where(on[:, None], THING, FAR).astype(np.float32)
     logits = np.zeros((rows, len(CLASSES)), np.float32)
     classes = np.where(on, 1, -1)
-    with written_crops(tmp_path) as kept:
-        for seen, box in zip([bright, dark] * (rows // 2), boxes, strict=True):
-            kept.add(Scales(seen, halved(seen)), box[None])
     told = ProposalTable(np.where(on, 0, 1), boxes, logits, boxes, classes)
-    return CropFeed(told, CropStore.read(tmp_path), 5, 0, 1)
+    store = PictureStore(np.stack([bright, dark]), np.stack([halved(bright), halved(dark)]))
+    return CropFeed(told, store, 5)
 
 
 def test_half_of_a_batch_is_about_things(feed: CropFeed) -> None:
@@ -110,11 +108,9 @@ def test_the_boxes_of_a_crop_are_where_the_thing_is_however_it_was_turned(feed: 
             assert crop.mean(0)[inside].mean() > crop.mean(0)[~inside].mean() + 0.1
 
 
-def test_the_same_seed_gives_the_same_crops_and_each_process_others(feed: CropFeed) -> None:
-    again = CropFeed(feed.table, feed.surroundings, 5, 0, 1).batch(8, 8)
-    other = CropFeed(feed.table, feed.surroundings, 5, 1, 2).batch(0, 8)
+def test_the_same_seed_gives_the_same_crops(feed: CropFeed) -> None:
+    again = CropFeed(feed.table, feed.store, 5).batch(8, 8)
     assert torch.equal(feed.batch(8, 8).crops, again.crops)
-    assert torch.equal(again.crops, other.crops)
     assert not torch.equal(feed.batch(0, 8).crops, again.crops)
 
 
@@ -181,9 +177,9 @@ def test_nothing_at_a_place_wants_low_scores_and_no_box() -> None:
 
 
 def test_crops_are_learnt_by_heart(feed: CropFeed) -> None:
-    learner = RefinementLearner.new(len(CLASSES), 1, CPU)
+    learner = new_learner(1)
     batch = feed.batch(0, 8)
-    found = [learner.step(batch, 2e-3, ALONE, float(k))[0] for k in range(40)]
+    found = [learner.step(batch, 2e-3)[0] for k in range(40)]
     assert np.mean(found[-5:]) < 0.5 * np.mean(found[:5])
 
 
@@ -237,14 +233,14 @@ def test_learning_begins_with_the_proposal_networks_weights_and_keeps_its_early_
 ) -> None:
     first, file = random_network(1, len(CLASSES)), tmp_path / "m.onnx"
     export(first, file, class_names=CLASSES, facts={})
-    batch, learner = feed.batch(0, 8), RefinementLearner.new(len(CLASSES), 2, CPU)
+    batch, learner = feed.batch(0, 8), new_learner(2)
     learner.begin(file, [batch])
     with torch.no_grad():
         for mine, theirs in zip(learner.network.detector.eval()(batch.crops), first(batch.crops), strict=True):
             assert torch.allclose(mine, theirs, atol=1e-2)
     learner.keep_early()
     before = {name: value.clone() for name, value in learner.network.state_dict().items()}
-    learner.step(batch, 1e-3, ALONE, 0.0)
+    learner.step(batch, 1e-3)
     after, kept = learner.network.state_dict(), ("detector.backbone.stem.", "detector.backbone.stage8.")
     assert all(torch.equal(before[name], after[name]) for name in before if name.startswith(kept))
     assert not torch.equal(before["detector.neck.down8.mix.0.weight"], after["detector.neck.down8.mix.0.weight"])
@@ -268,9 +264,9 @@ def test_learning_goes_on_from_a_refinement_networks_file(tmp_path: Path, feed: 
         facts={"score_offsets": str(list(shift))},
         score_offsets=shift,
     )
-    learner = RefinementLearner.new(len(CLASSES), 2, CPU)
+    learner = new_learner(2)
     learner.start_from(file, [batch])
-    for mine in (learner.network.eval(), learner.average.network.eval()):
+    for mine in (learner.network.eval(), learner.average.eval()):
         with torch.no_grad():
             given = batch.crops, batch.boxes, batch.logits
             (logits, boxes), (expected, expected_boxes) = mine(*given), network(*given)
@@ -286,13 +282,11 @@ def test_learning_goes_on_from_a_refinement_networks_file(tmp_path: Path, feed: 
 def test_learning_goes_on_from_no_proposal_networks_file(tmp_path: Path, feed: CropFeed) -> None:
     export(random_network(1, len(CLASSES)), tmp_path / "m.onnx", class_names=CLASSES, facts={})
     with pytest.raises(TrainingDataError, match=r"m\.onnx.*begin anew without it"):
-        RefinementLearner.new(len(CLASSES), 2, CPU).start_from(tmp_path / "m.onnx", [feed.batch(0, 8)])
+        new_learner(2).start_from(tmp_path / "m.onnx", [feed.batch(0, 8)])
 
 
-@pytest.mark.parametrize("go_on", [RefinementLearner.restore, RefinementLearner.start_from_checkpoint])
-def test_a_checkpoint_of_the_other_network_is_named(
-    tmp_path: Path, go_on: Callable[[RefinementLearner, Path], None]
-) -> None:
-    Learner.new(len(CLASSES), 1, CPU).save(tmp_path / "checkpoint.pt")
+@pytest.mark.parametrize("go_on", [CropLearner.restore, CropLearner.start_from_checkpoint])
+def test_a_checkpoint_of_the_other_network_is_named(tmp_path: Path, go_on: Callable[[CropLearner, Path], None]) -> None:
+    ProposalLearner.new(len(CLASSES), 1, CPU).save(tmp_path / "checkpoint.pt")
     with pytest.raises(TrainingDataError, match="another network"):
-        go_on(RefinementLearner.new(len(CLASSES), 1, CPU), tmp_path / "checkpoint.pt")
+        go_on(new_learner(1), tmp_path / "checkpoint.pt")

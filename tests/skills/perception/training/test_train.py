@@ -1,11 +1,6 @@
 """From a folder of pictures to the ONNX file; skipped without torch."""
 
 import json
-import multiprocessing
-import os
-import select
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,64 +46,14 @@ def options(tmp_path: Path) -> TrainOptions:
     return TrainOptions(data, tmp_path / "out", Budget(pictures=8), examined=2, schedule=SMALL)
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_a_data_set_becomes_a_detectors_file(options: TrainOptions, processes: int) -> None:
+def test_a_data_set_becomes_a_detectors_file(options: TrainOptions) -> None:
     told = list[Report]()
-    file = train(replace(options, processes=processes), told.append)
+    file = train(options, told.append)
     assert file == options.out / MODEL
     assert load_model(file).class_names == NAMES
     assert told[-1].progress == 1.0
     assert told[-1].figures is not None
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, "training.jsonl", "pictures"}
-
-
-def test_an_interrupted_training_leaves_no_process_behind(options: TrainOptions) -> None:
-    def interrupted(_report: Report) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        train(replace(options, processes=2, budget=Budget(seconds=3600.0)), interrupted)
-    assert multiprocessing.active_children() == []
-
-
-def test_processes_end_when_the_one_that_began_them_was_killed(options: TrainOptions) -> None:
-    command = f"""
-from pathlib import Path
-from skills.perception.training.schedule import Budget
-from skills.perception.training.train import TrainOptions, train
-if __name__ == "__main__":
-    chosen = TrainOptions(Path({str(options.data)!r}), Path({str(options.out)!r}), Budget(seconds=3600.0), processes=2)
-    train(chosen, lambda report: print(report.steps, flush=True))
-"""
-    script = options.data / "learn.py"
-    script.write_text(command)
-    with subprocess.Popen(
-        ["sh", "-c", f"trap '' INT; exec {sys.executable} {script}"],  # deaf to interrupts, as in a script's background
-        stdout=subprocess.PIPE,
-        cwd=Path.cwd(),
-        env=environment(),
-    ) as began:
-        assert began.stdout is not None
-        assert int(began.stdout.readline()) > 0
-        children = Path(f"/proc/{began.pid}/task/{began.pid}/children").read_text().split()
-        learning = [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
-        began.kill()
-    assert len(learning) == 2
-    assert all(ends(pid, within_s=60.0) for pid in learning)
-
-
-def ends(pid: int, within_s: float) -> bool:
-    """Whether a process is over, or is in time."""
-    try:
-        handle = os.pidfd_open(pid)
-    except ProcessLookupError:
-        return True
-    return bool(select.select([handle], [], [], within_s)[0])
-
-
-def environment() -> dict[str, str]:
-    """That of this process, with the sources in the path."""
-    return {**os.environ, "PYTHONPATH": str(Path.cwd())}
 
 
 def test_a_resumed_training_counts_what_it_has_seen(options: TrainOptions) -> None:
@@ -126,9 +71,8 @@ def test_a_training_that_is_over_writes_its_file_anew(options: TrainOptions) -> 
     assert file.read_bytes() == content
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_weights_that_are_not_there_are_named(options: TrainOptions, tmp_path: Path, processes: int) -> None:
-    chosen = replace(options, start=tmp_path / "none.pt", processes=processes)
+def test_weights_that_are_not_there_are_named(options: TrainOptions, tmp_path: Path) -> None:
+    chosen = replace(options, start=tmp_path / "none.pt")
     with pytest.raises(TrainingDataError, match=r"none\.pt"):
         train(chosen, lambda _report: None)
 

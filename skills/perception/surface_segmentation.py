@@ -24,6 +24,7 @@ _LOWEST_M = 0.008
 _HIGHEST_M = 0.4
 _FEWEST_POINTS = 40
 _PLANE_BAND_M = 0.05
+_PLANE_POINTS = 6000
 _SAME_THING_M = 0.06
 _LEAST_OVERLAP = 0.2
 _LEAST_PART = 0.15
@@ -89,6 +90,7 @@ def fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:
     near = points_W[np.abs(points_W[:, 2] - height_m) < _PLANE_BAND_M]
     if len(near) < 80:
         return None
+    near = near[:: max(1, len(near) // _PLANE_POINTS)]
     counts, edges = np.histogram(near[:, 2], bins=np.arange(height_m - _PLANE_BAND_M, height_m + _PLANE_BAND_M, 0.004))
     smooth = np.convolve(counts, [1, 2, 1], mode="same")
     level = float(edges[int(np.argmax(smooth))] + 0.002)

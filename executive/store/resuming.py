@@ -22,7 +22,7 @@ from executive.store.records import Memory, StepRecord
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decorators import Guard
 from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.freshness import Remembered
+from executive.tree.behaviours.skill_leaf import Remembered
 from executive.tree.compiler import CompiledTree
 from executive.tree.kinds import Changes, build, writes
 from executive.tree.node import NodeSpec

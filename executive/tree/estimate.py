@@ -9,7 +9,6 @@ import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Final, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -206,21 +205,17 @@ def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
     return binding.value if isinstance(binding, Constant) and isinstance(binding.value, Pose2D) else None
 
 
-_VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = MappingProxyType(
-    {
-        "skill": _skill,
-        "remember": _remember,
-        "selector": _first_of,
-        "round": _all_that_can,
-        "only if known": _if_known,
-    }
-)
-_EXPECTED: Final[Mapping[str, Callable[[NodeSpec], tuple[NodeSpec, ...]]]] = MappingProxyType(
-    {
-        "recover": lambda node: node.children[:1],
-        "go back": lambda node: node.children[:1],
-        "afterwards": lambda node: node.children[:1] if node.options["only_after_failure"] else node.children,
-        "interrupts": lambda node: node.children[-1:],
-        "only if holding": lambda node: (),
-    }
-)
+_VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
+    "skill": _skill,
+    "remember": _remember,
+    "selector": _first_of,
+    "round": _all_that_can,
+    "only if known": _if_known,
+}
+_EXPECTED: Final[Mapping[str, Callable[[NodeSpec], tuple[NodeSpec, ...]]]] = {
+    "recover": lambda node: node.children[:1],
+    "go back": lambda node: node.children[:1],
+    "afterwards": lambda node: node.children[:1] if node.options["only_after_failure"] else node.children,
+    "interrupts": lambda node: node.children[-1:],
+    "only if holding": lambda node: (),
+}

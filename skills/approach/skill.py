@@ -18,8 +18,7 @@ from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.candidates import GraspCandidate, Target
-from skills.grasp.planning import within_reach
-from skills.grasp.posture import body_height_m
+from skills.grasp.planning import body_height_m, within_reach
 from skills.navigate.skill import NavigateInputs
 from skills.robot import Pose2D
 

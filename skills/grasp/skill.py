@@ -18,8 +18,7 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
-from skills.grasp.posture import body_height_m
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, body_height_m, lifts
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.perception.surface_segmentation import Cluster, SurfaceView, cluster_of, parted, view_surface

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import ClassVar, Final, Protocol, runtime_checkable
 
 from py_trees.behaviour import Behaviour
@@ -151,10 +150,8 @@ class MemoryRound(MemorySelector):
         self.message = "; ".join(dict.fromkeys(map(message_of, done)))
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
-    {
-        "sequence": NodeKind(MemorySequence, ("children",)),
-        "selector": NodeKind(MemorySelector, ("children",)),
-        "round": NodeKind(MemoryRound, ("children",)),
-    }
-)
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "sequence": NodeKind(MemorySequence, ("children",)),
+    "selector": NodeKind(MemorySelector, ("children",)),
+    "round": NodeKind(MemoryRound, ("children",)),
+}

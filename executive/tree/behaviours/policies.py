@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Final
 
 from py_trees.behaviour import Behaviour
@@ -169,11 +168,9 @@ class Summary(ExplainedDecorator):
         return status
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
-    {
-        "skip": NodeKind(Skip, ("child",)),
-        "ask": NodeKind(AskOperator, ("child", "context")),
-        "go back": NodeKind(GoBack, ("children",)),
-        "summary": NodeKind(Summary, ("child",)),
-    }
-)
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "skip": NodeKind(Skip, ("child",)),
+    "ask": NodeKind(AskOperator, ("child", "context")),
+    "go back": NodeKind(GoBack, ("children",)),
+    "summary": NodeKind(Summary, ("child",)),
+}

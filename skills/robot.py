@@ -327,7 +327,7 @@ class Clock(Protocol):
 
 
 class Robot(Protocol):
-    """One robot. Motion verbs return at once with a command id; `command_status` tells what became of it."""
+    """One robot. Motion verbs return at once with a command id; `command_status` says what became of it."""
 
     @property
     def name(self) -> str:

@@ -56,7 +56,7 @@ def _nothing_more(reading: Any) -> str | None:
 
 
 def _reading(kind: type[Any], more: Check = _nothing_more) -> Check:
-    """The type, a stamp, finite numbers in all fields whose annotation tells of numbers, and what `more` looks at."""
+    """The type, a stamp, finite numbers in all fields that are annotated as numbers, and what `more` looks at."""
     fields = [(each.name, _GOOD[str(each.type)]) for each in dataclasses.fields(kind) if str(each.type) in _GOOD]
 
     def check(reading: Any) -> str | None:

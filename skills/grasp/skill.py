@@ -86,7 +86,7 @@ class Grasp(ArmSkill[GraspInputs]):
     changes_world = True
 
     def undone(self, inputs: GraspInputs) -> str | None:
-        """The gripper tells."""
+        """Judged by the gripper."""
         return None if self.context.robot.gripper().holding else f"the {inputs.observation.thing} is not in the gripper"
 
     def run(self, inputs: GraspInputs) -> Routine[Succeeded]:
@@ -113,7 +113,7 @@ class Grasp(ArmSkill[GraspInputs]):
         return Succeeded(f"holding the {thing}", {"tried": self._tried})
 
     def begin(self, inputs: GraspInputs) -> None:
-        """Forget an earlier attempt, but not what `inputs` tells of it."""
+        """Forget an earlier attempt, but not the grasps that `inputs` names."""
         self._tried = inputs.avoid
         super().begin(inputs)
 
@@ -123,7 +123,7 @@ class Grasp(ArmSkill[GraspInputs]):
         super().resume(inputs)
 
     def _telling(self, failure: SkillFailure) -> SkillFailure:
-        """A failure that tells which grasps were tried."""
+        """A failure that says which grasps were tried."""
         return SkillFailure(failure.cause, failure.message, {"tried": self._tried})
 
     def run_again(self, inputs: GraspInputs) -> Routine[Succeeded]:

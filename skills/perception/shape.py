@@ -15,7 +15,7 @@ from skills.robot import FloatArray
 class SeenShape:
     """A box about an object: centre (x, y) in W, length >= width, height above its surface (m), yaw of the length.
 
-    `round` tells that its outline from above fits a circle.
+    `round` says that its outline from above fits a circle.
     """
 
     centre: tuple[float, float]

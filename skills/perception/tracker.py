@@ -41,7 +41,7 @@ _MOST_BELIEF, _LEAST_BELIEF = 0.999, 0.05
 class Track:
     """One object. `position_W` with `covariance` (3, 3) from the views, without the localisation's error.
 
-    `classes` tells how likely each class is, `belief` how likely it is that something is there at all. `views` counts
+    `classes` says how likely each class is, `belief` how likely it is that something is there at all. `views` counts
     the places that it was seen from; `latest` is its last detection, `best` its surest one.
     """
 

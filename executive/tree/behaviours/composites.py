@@ -100,7 +100,7 @@ class MemorySequence(MemoryComposite):
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class MemorySelector(MemoryComposite):
-    """One way after the other until one works.
+    """One child after the other until one works.
 
     Child that does not apply (`Conditional`): passed over, it stays idle. Child RUNNING: RUNNING. Child SUCCESS:
     SUCCESS. Child FAILURE: on to the next in the same tick; after the last: FAILURE with the sentences of all that
@@ -133,7 +133,7 @@ class MemorySelector(MemoryComposite):
 
 
 class MemoryRound(MemorySelector):
-    """All ways, one after the other, whatever becomes of each.
+    """All children, one after the other, whatever becomes of each.
 
     Child that does not apply: passed over. Child RUNNING: RUNNING. Child SUCCESS or FAILURE: on to the next in the same
     tick. After the last: SUCCESS with the sentences of those that worked when any did, else FAILURE as a selector.

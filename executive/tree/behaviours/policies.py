@@ -109,14 +109,14 @@ class AskOperator(Skip):
 
 
 class GoBack(MemorySequence):
-    """A way back after a failure: two children, the first what is to be done, the second the way back.
+    """A route back after a failure: two children, the first what is to be done, the second the route back.
 
     First child RUNNING or SUCCESS: the same. First child FAILURE: the second is ticked, RUNNING while it runs; at its
     end FAILURE with the first's cause and sentence, and whether the robot is back.
     """
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick what is to be done, or the way back."""
+        """Tick what is to be done, or the route back."""
         if self.status != Status.RUNNING:
             self._restart()
         action, way_back = self.children

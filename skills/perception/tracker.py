@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Protocol
 
 import numpy as np
 
@@ -77,15 +76,8 @@ class Track:
         return self.views >= 2 and believed and self.latest.class_name == self.class_name
 
 
-class Tracks(Protocol):
-    """Gives what is known of the objects around."""
-
-    def snapshot(self) -> tuple[Track, ...]:
-        """All tracks, the surest first; immutable."""
-
-
 class Tracker:
-    """Keeps tracks up to date with the detections of each picture. Implements `Tracks`."""
+    """Keeps tracks up to date with the detections of each picture."""
 
     def __init__(self, class_names: Sequence[str]) -> None:
         self._names = tuple(class_names)

@@ -71,7 +71,7 @@ def run_until(mission, tick, act):
     """Run the mission, act on its control after a tick; the result, robot, clock, and how long each part moved on."""
     clock, control = VirtualClock(), Control(pace=None)
     robot = ScriptedRobot(clock, capabilities=CAPABILITIES)
-    robot.put_in_gripper(0.3)
+    robot.in_gripper_rad = 0.3
     entry = RunEntry(mission, robot, KnownPlace(), BlockCostmap())
     result = run(
         [entry],

@@ -172,7 +172,7 @@ class ForgettingCostmap(Protocol):
 
 @runtime_checkable
 class LayeredView(Protocol):
-    """A costmap that tells what is seen and not surveyed."""
+    """A costmap that says what is seen and not surveyed."""
 
     def seen_m(self) -> NDArray[np.float64]:
         """Centres (N, 2) of the cells that are blocked by something seen that the map does not explain."""

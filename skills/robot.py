@@ -81,7 +81,7 @@ class GripperCapabilities:
 
     Geometry in the hand frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, fingertips at
     `tip_x_m`, the inner face of the fixed finger at `fixed_z_m`; tips are 2 `half_breadth_m` wide and `tip_thickness_m`
-    thick. What it grips has its middle about `grip_x_m` ahead of H, is up to `max_grasp_m` wide, and ends by `length_m`.
+    thick. What it grips has its middle about `grip_x_m` ahead of H, is up to `max_grasp_m` wide and ends by `length_m`.
     """
 
     joint_name: str
@@ -327,7 +327,7 @@ class Clock(Protocol):
 
 
 class Robot(Protocol):
-    """One robot. Motion verbs return at once with a command id; `command_status` tells what became of it."""
+    """One robot. Motion verbs return at once with a command id; `command_status` says what became of it."""
 
     @property
     def name(self) -> str:

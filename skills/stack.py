@@ -45,18 +45,16 @@ __all__ = [
     "stack_schema",
 ]
 
-SLOTS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "localiser": "errand.localisers",
-        "costmap": "errand.costmaps",
-        "planner": "errand.planners",
-        "controller": "errand.controllers",
-        "arm_planner": "errand.arm_planners",
-        "grasp_planner": "errand.grasp_planners",
-        "detector": "errand.detectors",
-        "locomotion": "errand.locomotions",
-    }
-)
+SLOTS: Final[Mapping[str, str]] = {
+    "localiser": "errand.localisers",
+    "costmap": "errand.costmaps",
+    "planner": "errand.planners",
+    "controller": "errand.controllers",
+    "arm_planner": "errand.arm_planners",
+    "grasp_planner": "errand.grasp_planners",
+    "detector": "errand.detectors",
+    "locomotion": "errand.locomotions",
+}
 """The slots of a stack file, and the entry-point group of each."""
 SKILLS: Final = "skills"
 SKILL_GROUP: Final = "errand.skills"

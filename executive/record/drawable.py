@@ -89,4 +89,4 @@ def stamp(time_s: float) -> dict[str, int]:
     return {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9}
 
 
-_FORMS: Final[Mapping[str, Callable[[Message, float], Message]]] = MappingProxyType({PATH: _path})
+_FORMS: Final[Mapping[str, Callable[[Message, float], Message]]] = {PATH: _path}

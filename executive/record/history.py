@@ -1,4 +1,4 @@
-"""What an event log tells of a run: its trees in their state at any time, and its transitions."""
+"""What an event log says about a run: its trees in their state at any time, and its transitions."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class Profile:
         self._began_s = time.process_time()
 
     def table(self) -> Mapping[str, float]:
-        """CPU-seconds by subsystem, the dearest first, then what was used before the run and what no call tells of."""
+        """CPU-seconds by subsystem, the dearest first, then what was used before the run and outside of all calls."""
         spent = dict(sorted(self._spent.items(), key=lambda item: -item[1]))
         began_s = self._began_s or 0.0
         other_s = time.process_time() - began_s - sum(spent.values())

@@ -14,7 +14,6 @@ from mcap.reader import NonSeekingReader
 from zstandard import ZstdError
 
 from executive.mission.errors import InputError
-from executive.record.schemas import WALL
 
 _DAMAGE = (McapError, struct.error, ZstdError, ValueError)
 
@@ -40,11 +39,6 @@ def read_events(path: Path) -> tuple[Event, ...]:
         raise InputError(f"cannot read it ({error.strerror})", mend="name a log that exists", file=path) from error
     except _DAMAGE as error:
         raise InputError("it is no event log", mend="name a log.mcap that a run has written", file=path) from error
-
-
-def comparable_events(path: Path) -> tuple[Event, ...]:
-    """The events without wall times: equal for two runs of the same command and seed."""
-    return tuple(event for event in read_events(path) if event.topic != WALL)
 
 
 def _events(reader: NonSeekingReader) -> Iterator[Event]:

@@ -9,7 +9,6 @@ import base64
 import json
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final
 
 from mcap_ros2.writer import Writer
@@ -29,17 +28,15 @@ _POSE: Final = (
     f"{_RULE}\nMSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
 )
 _POSE_STAMPED: Final = "std_msgs/Header header\ngeometry_msgs/Pose pose\n"
-DEFINITIONS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "std_msgs/msg/String": "string data\n",
-        "geometry_msgs/msg/PoseStamped": f"{_POSE_STAMPED}{_HEADER}{_POSE}",
-        "nav_msgs/msg/Path": (
-            "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n"
-            f"{_RULE}\nMSG: geometry_msgs/PoseStamped\n{_POSE_STAMPED}{_HEADER}{_POSE}"
-        ),
-        "sensor_msgs/msg/CompressedImage": f"std_msgs/Header header\nstring format\nuint8[] data\n{_HEADER}",
-    }
-)
+DEFINITIONS: Final[Mapping[str, str]] = {
+    "std_msgs/msg/String": "string data\n",
+    "geometry_msgs/msg/PoseStamped": f"{_POSE_STAMPED}{_HEADER}{_POSE}",
+    "nav_msgs/msg/Path": (
+        "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n"
+        f"{_RULE}\nMSG: geometry_msgs/PoseStamped\n{_POSE_STAMPED}{_HEADER}{_POSE}"
+    ),
+    "sensor_msgs/msg/CompressedImage": f"std_msgs/Header header\nstring format\nuint8[] data\n{_HEADER}",
+}
 
 Data = Mapping[str, Any]
 
@@ -98,10 +95,8 @@ def _picture(data: Data, stamp_s: float) -> Data:
     return {"header": _header(data, stamp_s), "format": data["format"], "data": base64.b64decode(data["data"])}
 
 
-_FORMS: Final[Mapping[str, tuple[str, Callable[[Data, float], Data]]]] = MappingProxyType(
-    {
-        POSE: ("geometry_msgs/msg/PoseStamped", _pose),
-        PATH: ("nav_msgs/msg/Path", _path),
-        DETECTIONS: ("sensor_msgs/msg/CompressedImage", _picture),
-    }
-)
+_FORMS: Final[Mapping[str, tuple[str, Callable[[Data, float], Data]]]] = {
+    POSE: ("geometry_msgs/msg/PoseStamped", _pose),
+    PATH: ("nav_msgs/msg/Path", _path),
+    DETECTIONS: ("sensor_msgs/msg/CompressedImage", _picture),
+}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, Final
 
 from executive.record.history import logged_activity, logged_state
@@ -92,14 +91,12 @@ def _ticks(data: Mapping[str, Any]) -> str:
     return f"{len(late)} ticks overran; {longest}" if late else ""
 
 
-_TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = MappingProxyType(
-    {
-        RUN: _run,
-        OUTCOME: _outcome,
-        CONTROL: lambda data: f"{data.get('what')}: {data.get('message')}",
-        DETECT_TOPIC: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
-        DESTINATION_TOPIC: _seen,
-        ERRORS: lambda data: str(data.get("traceback", "")).strip().splitlines()[-1:][0] if data else "",
-        WALL: _ticks,
-    }
-)
+_TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
+    RUN: _run,
+    OUTCOME: _outcome,
+    CONTROL: lambda data: f"{data.get('what')}: {data.get('message')}",
+    DETECT_TOPIC: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
+    DESTINATION_TOPIC: _seen,
+    ERRORS: lambda data: str(data.get("traceback", "")).strip().splitlines()[-1:][0] if data else "",
+    WALL: _ticks,
+}

@@ -1,4 +1,4 @@
-"""What a run tells of itself while it goes on, so that another process can go on from there."""
+"""What a run reports about itself, so that another process can go on from there."""
 
 from __future__ import annotations
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterable, Mapping
-from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -57,7 +56,7 @@ def _nothing_more(reading: Any) -> str | None:
 
 
 def _reading(kind: type[Any], more: Check = _nothing_more) -> Check:
-    """The type, a stamp, finite numbers in all fields whose annotation tells of numbers, and what `more` looks at."""
+    """The type, a stamp, finite numbers in all fields that are annotated as numbers, and what `more` looks at."""
     fields = [(each.name, _GOOD[str(each.type)]) for each in dataclasses.fields(kind) if str(each.type) in _GOOD]
 
     def check(reading: Any) -> str | None:
@@ -74,15 +73,13 @@ def _finite(values: Iterable[float]) -> bool:
     return all(map(math.isfinite, values))
 
 
-_GOOD: Final[Mapping[str, Callable[[Any], bool]]] = MappingProxyType(
-    {
-        "float": math.isfinite,
-        "bool": lambda value: isinstance(value, bool | np.bool_),
-        "tuple[float, float, float]": lambda values: len(values) == 3 and _finite(values),
-        "Mapping[str, float]": lambda values: _finite(values.values()),
-        "RigidTransform": lambda X: bool(np.isfinite(X.GetAsMatrix34()).all()),
-    }
-)
+_GOOD: Final[Mapping[str, Callable[[Any], bool]]] = {
+    "float": math.isfinite,
+    "bool": lambda value: isinstance(value, bool | np.bool_),
+    "tuple[float, float, float]": lambda values: len(values) == 3 and _finite(values),
+    "Mapping[str, float]": lambda values: _finite(values.values()),
+    "RigidTransform": lambda X: bool(np.isfinite(X.GetAsMatrix34()).all()),
+}
 """Whether a value is as it should be, by the annotation of its field."""
 
 
@@ -116,21 +113,19 @@ def _status(it: CommandStatus) -> str | None:
 
 _COMMAND: Final = _of(int)
 _LEASE: Final = _of(Lease)
-_CHECKS: Final[Mapping[str, Check]] = MappingProxyType(
-    {
-        "capabilities": _of(Capabilities),
-        "odometry": _reading(Odometry),
-        "imu": _reading(Imu),
-        "scan": _or_none(_reading(Scan, _scan)),
-        "image": _reading(Image, _image),
-        "joints": _reading(Joints),
-        "gripper": _reading(Gripper),
-        "battery": _reading(Battery, _battery),
-        "faults": _of(tuple, _faults),
-        **dict.fromkeys(("drive", "stand", "sit", "move_arm", "set_gripper", "stop"), _COMMAND),
-        "command_status": _of(CommandStatus, _status),
-        "lease_holder": _or_none(_LEASE),
-        "acquire_lease": _LEASE,
-        "take_lease": _LEASE,
-    }
-)
+_CHECKS: Final[Mapping[str, Check]] = {
+    "capabilities": _of(Capabilities),
+    "odometry": _reading(Odometry),
+    "imu": _reading(Imu),
+    "scan": _or_none(_reading(Scan, _scan)),
+    "image": _reading(Image, _image),
+    "joints": _reading(Joints),
+    "gripper": _reading(Gripper),
+    "battery": _reading(Battery, _battery),
+    "faults": _of(tuple, _faults),
+    **dict.fromkeys(("drive", "stand", "sit", "move_arm", "set_gripper", "stop"), _COMMAND),
+    "command_status": _of(CommandStatus, _status),
+    "lease_holder": _or_none(_LEASE),
+    "acquire_lease": _LEASE,
+    "take_lease": _LEASE,
+}

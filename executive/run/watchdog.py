@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any, Final, TypeVar
 
+from executive.run.worker import fulfil
+
 ResultT = TypeVar("ResultT")
 
 VERB_LIMIT_S: Final = 2.0
@@ -103,17 +105,10 @@ def done_aside(call: Callable[[], ResultT], verb: str, limit_s: float) -> Result
     VerbHung: it took longer than the limit.
     """
     future: Future[ResultT] = Future()
-    threading.Thread(target=_do, args=(call, future), name=f"errand-{verb}", daemon=True).start()
+    threading.Thread(target=fulfil, args=(future, call), name=f"errand-{verb}", daemon=True).start()
     try:
         return future.result(timeout=limit_s)
     except TimeoutError:
         if future.done():
             raise
         raise VerbHung(hung(verb, limit_s)) from None
-
-
-def _do(call: Callable[[], ResultT], future: Future[ResultT]) -> None:
-    try:
-        future.set_result(call())
-    except BaseException as defect:
-        future.set_exception(defect)

@@ -64,35 +64,50 @@ class _Thread:
 
 def _work_off(given: SimpleQueue[_Work | None]) -> None:
     for work, future in iter(given.get, None):
-        if not future.set_running_or_notify_cancel():
-            continue
-        try:
-            future.set_result(work())
-        except BaseException as defect:
-            future.set_exception(defect)
+        if future.set_running_or_notify_cancel():
+            fulfil(future, work)
         del work, future
 
 
+def fulfil(future: Future[ResultT], work: Callable[[], ResultT]) -> None:
+    """Do the work; the future gets its result, or what it raised."""
+    try:
+        future.set_result(work())
+    except BaseException as defect:
+        future.set_exception(defect)
+
+
 @dataclass(frozen=True)
-class _LockStepJob(Generic[ResultT]):
-    """Work under way, whose result shows itself when its time has come."""
+class _ThreadJob(Generic[ResultT]):
+    """Work in the thread."""
+
+    future: Future[ResultT]
+
+    def done(self) -> bool:
+        """True once the result may be read."""
+        return self.future.done()
+
+    def result(self) -> ResultT:
+        """The result, or what the work raised. Raises RuntimeError before it is done."""
+        if not self.done():
+            raise RuntimeError("the work is not done yet")
+        return self.future.result()
+
+    def withdraw(self) -> None:
+        """Nobody waits for the result any more; work that has not begun is dropped."""
+        self.future.cancel()
+
+
+@dataclass(frozen=True)
+class _LockStepJob(_ThreadJob[ResultT]):
+    """Work whose result shows itself when its time has come; who reads it waits for work that takes longer."""
 
     clock: Clock
     ready_s: float
-    future: Future[ResultT]
 
     def done(self) -> bool:
         """True once the declared latency has passed on the robot's clock."""
         return self.clock.now() >= self.ready_s - 1e-9
-
-    def result(self) -> ResultT:
-        """The result, or what the work raised; waits for work that takes longer than its latency.
-
-        Raises RuntimeError: it is not due yet.
-        """
-        if not self.done():
-            raise RuntimeError(f"the result is due at {self.ready_s:.3f} s")
-        return self.future.result()
 
     def withdraw(self) -> None:
         """Nobody waits for the result any more; returns when the work is done, so that what it uses is free."""
@@ -113,7 +128,7 @@ class LockStepWorker:
         """Start `work`. What it raises is raised by `result`. Raises ValueError for a negative latency."""
         if latency_s < 0.0:
             raise ValueError(f"{name}: a latency of {latency_s} s")
-        return _LockStepJob(self._clock, self._clock.now() + latency_s, self._thread.do(work))
+        return _LockStepJob(self._thread.do(work), self._clock, self._clock.now() + latency_s)
 
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
@@ -141,25 +156,6 @@ def _raising(defect: Exception) -> Callable[[], Any]:
         raise defect
 
     return work
-
-
-@dataclass(frozen=True)
-class _ThreadJob(Generic[ResultT]):
-    future: Future[ResultT]
-
-    def done(self) -> bool:
-        """True once the work is done."""
-        return self.future.done()
-
-    def result(self) -> ResultT:
-        """The result, or what the work raised. Raises RuntimeError before it is done."""
-        if not self.future.done():
-            raise RuntimeError("the work is not done yet")
-        return self.future.result()
-
-    def withdraw(self) -> None:
-        """Nobody waits for the result any more; work that has not begun is dropped."""
-        self.future.cancel()
 
 
 class ThreadWorker:

@@ -1,4 +1,4 @@
-"""Opens the store's SQLite file, and turns every way in which that may fail into one error with a mend."""
+"""Opens the store's SQLite file, and turns every failure to do so into one error with a hint."""
 
 from __future__ import annotations
 

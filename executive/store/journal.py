@@ -16,6 +16,7 @@ from executive.store.records import row_of
 from executive.store.values import to_text
 from executive.tree.compiler import CompiledTree
 from executive.tree.snapshot import Change
+from skills.geometry import wrap
 from skills.robot import Pose2D
 
 MOVED_M: Final = 0.02
@@ -30,7 +31,7 @@ class StoreJournal:
     """Implements `executive.run.journal.Journal`.
 
     What cannot be written now, since another program holds the store, is written with a later tick: the robot's work
-    does not wait for it. `troubles` tells of what could not be kept.
+    does not wait for it. `troubles` lists what could not be kept.
     `keep_world` is called before what a tick brought is written, for a simulated world must not lag behind it.
     """
 
@@ -142,5 +143,5 @@ def _no_world() -> None:
 def _apart(before: Pose2D | None, now: Pose2D) -> bool:
     if before is None:
         return True
-    turned = math.remainder(now.yaw_rad - before.yaw_rad, 2 * math.pi)
+    turned = wrap(now.yaw_rad - before.yaw_rad)
     return math.hypot(now.x_m - before.x_m, now.y_m - before.y_m) > MOVED_M or abs(turned) > TURNED_RAD

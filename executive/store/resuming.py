@@ -22,7 +22,7 @@ from executive.store.records import Memory, StepRecord
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decorators import Guard
 from executive.tree.behaviours.explained import Explained
-from executive.tree.behaviours.freshness import Remembered
+from executive.tree.behaviours.skill_leaf import Remembered
 from executive.tree.compiler import CompiledTree
 from executive.tree.kinds import Changes, build, writes
 from executive.tree.node import NodeSpec
@@ -111,7 +111,7 @@ class _Change:
         return step is not None and step.status is Status.FAILURE
 
     def _was_reached(self, path_id: str) -> bool:
-        """Whether a way of a selector was gone or passed over, which a later one that was begun tells."""
+        """Whether a branch of a selector was taken or passed over, as a later one shows that was begun."""
         parent = self.parents[path_id]
         if parent.kind != "selector":
             return False
@@ -170,7 +170,7 @@ class _Unguarded:
 
 
 def _applies_as_before(node: Any, applied: bool) -> None:
-    """Let a way of a selector say at first whether it was gone before the restart: the blackboard knows more by now."""
+    """Let a branch of a selector say at first what it said before the restart: the blackboard knows more by now."""
     answers = [applied]
     asked: Callable[[], bool] = node.applies
     vars(node)["applies"] = lambda: answers.pop() if answers else asked()
@@ -212,7 +212,7 @@ class _Resumed(Skill[Any]):
         self._working = False
 
     def begin(self, inputs: Any) -> None:
-        """Nothing yet: the first step tells whether there is a result already."""
+        """Nothing yet: the first step says whether there is a result already."""
         self._inputs, self._working = inputs, False
         self.checkpoint = self._recollection.checkpoint(self._path)
 

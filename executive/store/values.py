@@ -11,7 +11,6 @@ import enum
 import json
 import sys
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -99,44 +98,42 @@ def _is_kept_dataclass(value: Any) -> bool:
 
 
 _Kind = tuple[Callable[[Any], bool], Callable[[Any], dict[str, Any]], Callable[[Mapping[str, Any]], Any]]
-_KINDS: Final[Mapping[str, _Kind]] = MappingProxyType(
-    {
-        "enum": (
-            lambda v: isinstance(v, enum.Enum),
-            lambda v: {"class": _class_name(v), "name": v.name},
-            _unpack_enum,
-        ),
-        "number": (lambda v: isinstance(v, np.generic), lambda v: {"item": v.item()}, lambda p: p["item"]),
-        "array": (
-            lambda v: isinstance(v, np.ndarray) and v.dtype.kind in "biuf",
-            _pack_array,
-            lambda p: np.array(p["items"], dtype=p["dtype"]).reshape(p["shape"]),
-        ),
-        "transform": (
-            lambda v: isinstance(v, RigidTransform),
-            lambda v: {"matrix": v.GetAsMatrix34().tolist()},
-            lambda p: RigidTransform(np.array(p["matrix"])),
-        ),
-        "dataclass": (_is_kept_dataclass, _pack_dataclass, _unpack_dataclass),
-        "tuple": (
-            lambda v: isinstance(v, tuple),
-            lambda v: {"items": [*map(_packed, v)]},
-            lambda p: tuple(map(_unpacked, p["items"])),
-        ),
-        "list": (
-            lambda v: isinstance(v, list),
-            lambda v: {"items": [*map(_packed, v)]},
-            lambda p: [*map(_unpacked, p["items"])],
-        ),
-        "set": (
-            lambda v: isinstance(v, frozenset),
-            lambda v: {"items": sorted(map(to_text, v))},
-            lambda p: frozenset(map(from_text, p["items"])),
-        ),
-        "map": (
-            lambda v: isinstance(v, Mapping),
-            lambda v: {"items": [[_packed(key), _packed(item)] for key, item in v.items()]},
-            lambda p: {_unpacked(key): _unpacked(item) for key, item in p["items"]},
-        ),
-    }
-)
+_KINDS: Final[Mapping[str, _Kind]] = {
+    "enum": (
+        lambda v: isinstance(v, enum.Enum),
+        lambda v: {"class": _class_name(v), "name": v.name},
+        _unpack_enum,
+    ),
+    "number": (lambda v: isinstance(v, np.generic), lambda v: {"item": v.item()}, lambda p: p["item"]),
+    "array": (
+        lambda v: isinstance(v, np.ndarray) and v.dtype.kind in "biuf",
+        _pack_array,
+        lambda p: np.array(p["items"], dtype=p["dtype"]).reshape(p["shape"]),
+    ),
+    "transform": (
+        lambda v: isinstance(v, RigidTransform),
+        lambda v: {"matrix": v.GetAsMatrix34().tolist()},
+        lambda p: RigidTransform(np.array(p["matrix"])),
+    ),
+    "dataclass": (_is_kept_dataclass, _pack_dataclass, _unpack_dataclass),
+    "tuple": (
+        lambda v: isinstance(v, tuple),
+        lambda v: {"items": [*map(_packed, v)]},
+        lambda p: tuple(map(_unpacked, p["items"])),
+    ),
+    "list": (
+        lambda v: isinstance(v, list),
+        lambda v: {"items": [*map(_packed, v)]},
+        lambda p: [*map(_unpacked, p["items"])],
+    ),
+    "set": (
+        lambda v: isinstance(v, frozenset),
+        lambda v: {"items": sorted(map(to_text, v))},
+        lambda p: frozenset(map(from_text, p["items"])),
+    ),
+    "map": (
+        lambda v: isinstance(v, Mapping),
+        lambda v: {"items": [[_packed(key), _packed(item)] for key, item in v.items()]},
+        lambda p: {_unpacked(key): _unpacked(item) for key, item in p["items"]},
+    ),
+}

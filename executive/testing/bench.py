@@ -31,7 +31,7 @@ _OUTCOMES = {Status.SUCCESS: "success", Status.FAILURE: "failure"}
 class SkillRun:
     """How a skill ended on the bench.
 
-    `outcome` is "success", "failure" or "cancelled"; `messages` tells when (s) which message came up.
+    `outcome` is "success", "failure" or "cancelled"; `messages` says when (s) which message came up.
     """
 
     outcome: str

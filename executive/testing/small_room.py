@@ -1,8 +1,9 @@
-"""The small room as a world: what is known of it, and a folder from which a plant builds it."""
+"""The small room as a world: what is known of it (`small_room.yaml`), and a folder from which a plant builds it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -14,10 +15,6 @@ import yaml
 from executive.mission.knowledge import Knowledge
 from skills.testing.blocks import ROOM, Block, grid_of
 
-TABLE = "table"
-TABLE_HEIGHT_M = 0.75
-TABLE_OUTLINE = [[1.2, -0.6], [1.8, -0.6], [1.8, 0.6], [1.2, 0.6]]
-_OUTLINE = [[-2.0, -2.5], [4.0, -2.5], [4.0, 2.5], [-2.0, 2.5]]
 _FLOOR = Block(-2.1, -2.6, 4.1, 2.6, -0.1, 0.0, (150, 140, 130))
 _BANDS = {"scan": (0.7, 1.3), "keepout": (0.05, 1.0)}
 _RESOLUTION_M = 0.025
@@ -27,9 +24,12 @@ def write_small_room(folder: Path, *, can: bool = True) -> Path:
     """Write the world into `folder`; that folder. Its only object is a can on the table, whose place the seed sets."""
     (folder / "map").mkdir(parents=True, exist_ok=True)
     (folder / "room.sdf").write_text(_sdf([_FLOOR, *ROOM]), encoding="utf-8")
-    _write_yaml(folder / "world.dmd.yaml", _directives(folder / "room.sdf"))
-    _write_yaml(folder / "knowledge.yaml", _knowledge())
-    _write_yaml(folder / "objects.yaml", _objects(can))
+    model = {"add_model": {"name": "room", "file": (folder / "room.sdf").resolve().as_uri()}}
+    weld = {"add_weld": {"parent": "world", "child": "room::room"}}
+    _write_yaml(folder / "world.dmd.yaml", {"directives": [model, weld]})
+    _write_yaml(folder / "knowledge.yaml", _facts()["knowledge"])
+    objects = _facts()["objects"]
+    _write_yaml(folder / "objects.yaml", objects if can else {**objects, "objects": []})
     for name, band_m in _BANDS.items():
         _write_map(folder / "map", name, band_m)
     return folder
@@ -37,45 +37,19 @@ def write_small_room(folder: Path, *, can: bool = True) -> Path:
 
 def room_knowledge() -> Knowledge:
     """What the robot is told of the room."""
-    return Knowledge.model_validate(_knowledge())
+    return Knowledge.model_validate(_facts()["knowledge"])
 
 
 def _write_yaml(path: Path, data: Mapping[str, Any]) -> None:
     path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
 
 
-def _directives(model: Path) -> dict[str, Any]:
-    return {
-        "directives": [
-            {"add_model": {"name": "room", "file": model.resolve().as_uri()}},
-            {"add_weld": {"parent": "world", "child": "room::room"}},
-        ]
-    }
-
-
-def _knowledge() -> dict[str, Any]:
-    surface = {
-        "place": "room",
-        "height": TABLE_HEIGHT_M,
-        "polygon": TABLE_OUTLINE,
-        "viewpoints": [{"x": 0.2, "y": 0.0, "yaw": 0.0}],
-    }
-    return {
-        "robot": {"name": "Alice"},
-        "start": {"x": -0.5, "y": 0.0, "yaw": 0.0},
-        "dock": {"x": -1.2, "y": -1.6, "yaw": 0.0},
-        "places": {"room": {"pose": {"x": 0.0, "y": 0.0, "yaw": 0.0}, "polygon": _OUTLINE}},
-        "surfaces": {TABLE: surface},
-        "things": {"coke": {"categories": ["drink"], "aliases": ["can"], "usual": [TABLE]}},
-    }
-
-
-def _objects(can: bool) -> dict[str, Any]:
-    return {
-        "rules": {"from_edge_m": [0.10, 0.20], "clear_m": 0.12, "rim_m": 0.03, "drop_m": 0.001},
-        "fronts": {TABLE: [[[1.2, -0.4], [1.2, 0.4]]]},
-        "objects": [{"name": "coke", "model": "coke", "surfaces": [TABLE]}] if can else [],
-    }
+@cache
+def _facts() -> dict[str, Any]:
+    """What is written down of the room: knowledge and objects."""
+    text = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
+    facts: dict[str, Any] = yaml.safe_load(text)
+    return facts
 
 
 def _write_map(folder: Path, name: str, band_m: tuple[float, float]) -> None:

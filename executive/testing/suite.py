@@ -83,11 +83,6 @@ def scripted_bench(
     return make
 
 
-def findings(case: SuiteCase) -> Iterator[str]:
-    """All that the suite finds wrong, one sentence each."""
-    yield from (finding for part in PARTS.values() for finding in part(case))
-
-
 def cancelled_at_every_tick(case: SuiteCase) -> Iterator[str]:
     """Cancel it at sampled ticks: cause CANCELLED, the robot still within 0.2 s, `end` a second time does nothing."""
     run, _ = case.nominal

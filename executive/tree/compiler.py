@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
 
 from executive.mission.command import Command
-from executive.mission.errors import InputError, SourceLine
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
+from executive.mission.errors import InputError
+from executive.mission.file.model import Mission
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.context import RunContext
 from executive.tree.compiling.assembly import StepPart, assemble, step_name
@@ -19,15 +18,7 @@ from executive.tree.compiling.wiring import check_wiring
 from executive.tree.kinds import build
 from executive.tree.node import NodeSpec
 
-__all__ = ["CompiledTree", "Step", "StepPart", "compile_commands", "compile_mission", "step_name"]
-
-
-@dataclass(frozen=True)
-class Step:
-    """A command, and the line of the mission file that it comes from."""
-
-    command: Command
-    source: SourceLine | None = None
+__all__ = ["CompiledTree", "StepPart", "compile_mission", "step_name"]
 
 
 @dataclass(frozen=True)
@@ -76,12 +67,3 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
     root = watched(PlanBuilder(knowledge, registry, body.path_id, start, Command(), mission.source), body)
     check_wiring(root)
     return CompiledTree(mission.robot_name, mission.name, mission.commands, root, parts)
-
-
-def compile_commands(
-    mission_name: str, steps: Sequence[Step], *, knowledge: Knowledge, registry: Registry, robot_name: str
-) -> CompiledTree:
-    """Compile commands, each with its source, as `compile_mission` does. Raises InputError."""
-    made = tuple(MissionStep((step.command,), step.source) for step in steps)
-    mission = Mission(mission_name, DEFAULT_WORLD, robot_name, made)
-    return compile_mission(mission, knowledge=knowledge, registry=registry)

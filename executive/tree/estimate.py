@@ -1,6 +1,6 @@
 """What a mission will take when all goes well: time, route and charge, and what of it cannot be done at all.
 
-A tree's nodes are followed in the order in which they run without failures: of several ways the first that can be gone.
+A tree's nodes are followed in the order in which they run without failures: of several branches the first possible one.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Final, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -70,7 +69,7 @@ class RoutePlanner(Protocol):
 
 @dataclass(frozen=True)
 class Estimate:
-    """Time on the robot's clock (s), way driven (m), and charge used (share of a full battery)."""
+    """Time on the robot's clock (s), distance driven (m), and charge used (share of a full battery)."""
 
     duration_s: float = 0.0
     distance_m: float = 0.0
@@ -140,7 +139,7 @@ def _all_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 
 def _first_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """The first way that can be gone; when there is none, the first one's reason."""
+    """The first branch that can be followed; when there is none, the first one's reason."""
     reasons: list[InputError] = []
     for child in expected(node):
         tried = _tried(child, walk, reasons)
@@ -150,7 +149,7 @@ def _first_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 
 def _all_that_can(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """All ways that can be gone; when there is none, the first one's reason."""
+    """All branches that can be followed; when there is none, the first one's reason."""
     reasons: list[InputError] = []
     done = [tried for child in expected(node) if (tried := _tried(child, walk, reasons)) is not None]
     if not done:
@@ -159,7 +158,7 @@ def _all_that_can(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 
 def _tried(way: NodeSpec, walk: _Walk, reasons: list[InputError]) -> Estimate | None:
-    """One way; None where it cannot be gone: then the walk stands as before, and `reasons` has its reason."""
+    """One branch; None where it cannot be followed: then the walk stands as before, and `reasons` has its reason."""
     here, noted = walk.pose, dict(walk.noted)
     try:
         return _followed(way, walk, first=True)
@@ -206,21 +205,17 @@ def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
     return binding.value if isinstance(binding, Constant) and isinstance(binding.value, Pose2D) else None
 
 
-_VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = MappingProxyType(
-    {
-        "skill": _skill,
-        "remember": _remember,
-        "selector": _first_of,
-        "round": _all_that_can,
-        "only if known": _if_known,
-    }
-)
-_EXPECTED: Final[Mapping[str, Callable[[NodeSpec], tuple[NodeSpec, ...]]]] = MappingProxyType(
-    {
-        "recover": lambda node: node.children[:1],
-        "go back": lambda node: node.children[:1],
-        "afterwards": lambda node: node.children[:1] if node.options["only_after_failure"] else node.children,
-        "interrupts": lambda node: node.children[-1:],
-        "only if holding": lambda node: (),
-    }
-)
+_VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
+    "skill": _skill,
+    "remember": _remember,
+    "selector": _first_of,
+    "round": _all_that_can,
+    "only if known": _if_known,
+}
+_EXPECTED: Final[Mapping[str, Callable[[NodeSpec], tuple[NodeSpec, ...]]]] = {
+    "recover": lambda node: node.children[:1],
+    "go back": lambda node: node.children[:1],
+    "afterwards": lambda node: node.children[:1] if node.options["only_after_failure"] else node.children,
+    "interrupts": lambda node: node.children[-1:],
+    "only if holding": lambda node: (),
+}

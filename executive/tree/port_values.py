@@ -248,15 +248,15 @@ def _unknown(kind: str, name: str, known: tuple[str, ...], knowledge: Knowledge,
     return PortValueError(path, f"unknown {kind} '{name}'", mend)
 
 
-_PLAIN: Final[Mapping[Any, tuple[tuple[type, ...], str]]] = MappingProxyType(
-    {
-        str: ((str,), "a text"),
-        bool: ((bool,), "true or false"),
-        int: ((int,), "a whole number"),
-        float: ((int, float), "a number"),
-    }
-)
-_SPECIAL: Final[Mapping[type, Callable[[Any, Knowledge, Path], Any]]] = MappingProxyType(
-    {Pose2D: _pose, Surface: _surface, Thing: _thing}
-)
-_DEFAULTS: Final[Mapping[type, Mapping[str, Any]]] = MappingProxyType({Pose2D: MappingProxyType({"yaw_rad": 0.0})})
+_PLAIN: Final[Mapping[Any, tuple[tuple[type, ...], str]]] = {
+    str: ((str,), "a text"),
+    bool: ((bool,), "true or false"),
+    int: ((int,), "a whole number"),
+    float: ((int, float), "a number"),
+}
+_SPECIAL: Final[Mapping[type, Callable[[Any, Knowledge, Path], Any]]] = {
+    Pose2D: _pose,
+    Surface: _surface,
+    Thing: _thing,
+}
+_DEFAULTS: Final[Mapping[type, Mapping[str, Any]]] = {Pose2D: MappingProxyType({"yaw_rad": 0.0})}

@@ -71,16 +71,14 @@ def asked_json(waiting: Waiting | None) -> dict[str, Any]:
     return {"question": {"text": question.text, "options": list(question.candidates), "until_s": waiting.until_s}}
 
 
-_CALLS: Final[Mapping[str, tuple[Callable[[Control, Mapping[str, Any]], None], str]]] = MappingProxyType(
-    {
-        "pause": (lambda control, _: control.pause("paused from the page"), "pausing"),
-        "resume": (lambda control, _: control.resume(), "going on"),
-        "step": (lambda control, _: control.step(), "one step"),
-        "cancel": (lambda control, _: control.cancel("cancelled from the page"), "cancelling"),
-        "stop": (lambda control, _: control.stop_button("the stop button on the page is pressed"), "stopped"),
-        "release": (lambda control, _: control.release_stop_button(), "stop button released"),
-        "break": (lambda control, values: control.set_breakpoint(text_of(values, "node")), "breakpoint set"),
-        "unbreak": (lambda control, values: control.clear_breakpoint(text_of(values, "node")), "breakpoint cleared"),
-        "answer": (lambda control, values: control.answer(text_of(values, "id"), text_of(values, "text")), "answered"),
-    }
-)
+_CALLS: Final[Mapping[str, tuple[Callable[[Control, Mapping[str, Any]], None], str]]] = {
+    "pause": (lambda control, _: control.pause("paused from the page"), "pausing"),
+    "resume": (lambda control, _: control.resume(), "going on"),
+    "step": (lambda control, _: control.step(), "one step"),
+    "cancel": (lambda control, _: control.cancel("cancelled from the page"), "cancelling"),
+    "stop": (lambda control, _: control.stop_button("the stop button on the page is pressed"), "stopped"),
+    "release": (lambda control, _: control.release_stop_button(), "stop button released"),
+    "break": (lambda control, values: control.set_breakpoint(text_of(values, "node")), "breakpoint set"),
+    "unbreak": (lambda control, values: control.clear_breakpoint(text_of(values, "node")), "breakpoint cleared"),
+    "answer": (lambda control, values: control.answer(text_of(values, "id"), text_of(values, "text")), "answered"),
+}

@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
@@ -20,7 +19,7 @@ from executive.view.styles import style_of
 from executive.view.text import note_of, printable
 
 FORMAT: Final = "4"
-_BUILT_IN: Final[Mapping[str, str]] = MappingProxyType({"sequence": "Sequence", "selector": "Fallback"})
+_BUILT_IN: Final[Mapping[str, str]] = {"sequence": "Sequence", "selector": "Fallback"}
 _CONDITIONS: Final = frozenset({"condition", "monitor"})
 _RESERVED: Final = frozenset({"ID", "name"})
 _BUILT_IN_NAMES: Final = """

@@ -6,7 +6,6 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
-from types import MappingProxyType
 from typing import Final
 
 from executive.tree.node_view import NodeView
@@ -25,15 +24,13 @@ NOTE_CHARS: Final = 33
 NOTE_LINES: Final = 3
 NAME_CHARS: Final = 30
 FONT: Final = "DejaVu Sans, Helvetica, Arial, sans-serif"
-SYMBOLS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "not run": '<circle r="5" fill="none"/>',
-        "running": '<path d="M-4,-6 L6,0 L-4,6 Z" fill="currentColor"/>',
-        "success": '<path d="M-6,0 L-2,5 L6,-5" fill="none" stroke-width="2.6"/>',
-        "failure": '<path d="M-5,-5 L5,5 M-5,5 L5,-5" fill="none" stroke-width="2.6"/>',
-        "cancelled": '<circle r="6" fill="none"/><path d="M-4,4 L4,-4" fill="none"/>',
-    }
-)
+SYMBOLS: Final[Mapping[str, str]] = {
+    "not run": '<circle r="5" fill="none"/>',
+    "running": '<path d="M-4,-6 L6,0 L-4,6 Z" fill="currentColor"/>',
+    "success": '<path d="M-6,0 L-2,5 L6,-5" fill="none" stroke-width="2.6"/>',
+    "failure": '<path d="M-5,-5 L5,5 M-5,5 L5,-5" fill="none" stroke-width="2.6"/>',
+    "cancelled": '<circle r="6" fill="none"/><path d="M-4,4 L4,-4" fill="none"/>',
+}
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ class Referee:
         return tuple(sorted(all_lifts, key=lambda lift: lift.time_s))
 
     def path(self, robot: str) -> FloatArray:
-        """The way of a robot's body so far, (N, 3) in the world, a point every few centimetres. Raises KeyError."""
+        """The path of a robot's body so far, (N, 3) in the world, a point every few centimetres. Raises KeyError."""
         return np.array(self._paths[robot], dtype=np.float64).reshape(-1, 3)
 
     def observe(self, plant_context: Context, time_s: float, *, asleep: Collection[str] = ()) -> None:

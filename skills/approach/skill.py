@@ -18,8 +18,7 @@ from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.candidates import GraspCandidate, Target
-from skills.grasp.planning import within_reach
-from skills.grasp.posture import body_height_m
+from skills.grasp.planning import body_height_m, within_reach
 from skills.navigate.skill import NavigateInputs
 from skills.robot import Pose2D
 
@@ -58,7 +57,7 @@ class Approach(ArmSkill[ApproachInputs]):
     options: ApproachOptions
     outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PLANNING: "no free place to stand is near enough to the object, or no way leads there",
+        Cause.PLANNING: "no free place to stand is near enough to the object, or no path leads there",
         Cause.EXECUTION: "the robot did not get to where it should stand",
         Cause.POSTCONDITION: "the object is not seen again from there",
     }
@@ -90,7 +89,7 @@ class Approach(ArmSkill[ApproachInputs]):
         return (yield from self._look_again(inputs))
 
     def undone(self, inputs: ApproachInputs) -> str | None:
-        """The robot's place tells."""
+        """Judged by the robot's pose."""
         (x, y, _), pose = inputs.observation.position_W, self.context.pose()
         off_m = math.hypot(x - pose.x_m, y - pose.y_m)
         return None if off_m < _STILL_BEFORE_M else f"the robot is {off_m:.1f} m from the {inputs.observation.thing}"

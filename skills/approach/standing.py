@@ -58,7 +58,7 @@ def free_places(
 def reachable(free: Sequence[Standing], reach_cost: Callable[[Pose2D], float | None]) -> list[Standing]:
     """The best of some places, best first.
 
-    `reach_cost` tells how awkward the reach from a pose is, None where the point is out of reach.
+    `reach_cost` says how awkward the reach from a pose is, None where the point is out of reach.
     """
     reaches = [(standing, reach_cost(standing.pose)) for standing in free]
     reached = [Standing(each.pose, each.cost + REACH_WEIGHT * cost) for each, cost in reaches if cost is not None]

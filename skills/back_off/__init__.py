@@ -1,1 +1,1 @@
-"""Getting a little away from what blocks the way."""
+"""Getting a little away from what blocks the path."""

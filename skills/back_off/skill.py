@@ -1,4 +1,4 @@
-"""The skill that drives a short way to where there is more clearance."""
+"""The skill that drives a short distance to where there is more clearance."""
 
 from __future__ import annotations
 
@@ -83,9 +83,9 @@ class BackOff(Skill[BackOffInputs]):
 
     def _choose(self) -> Pose2D | None:
         """Where to go, in the body frame: the first direction that is clear all along, else the longest."""
-        ways = [(self._free_m(direction), direction) for direction in DIRECTIONS_RAD]
-        longest = max(ways, key=lambda way: way[0])
-        length, direction = next((way for way in ways if way[0] >= self._inputs.distance_m - 1e-6), longest)
+        lengths = [(self._free_m(direction), direction) for direction in DIRECTIONS_RAD]
+        longest = max(lengths, key=lambda each: each[0])
+        length, direction = next((each for each in lengths if each[0] >= self._inputs.distance_m - 1e-6), longest)
         if length < self._inputs.least_m:
             return None
         return Pose2D(length * math.cos(direction), length * math.sin(direction), 0.0)

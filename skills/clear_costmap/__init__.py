@@ -1,1 +1,1 @@
-"""Forgetting what was seen in the way, to see it anew."""
+"""Forgetting what was seen on the path, to see it anew."""

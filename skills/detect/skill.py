@@ -209,11 +209,9 @@ class Detect(ArmSkill[DetectInputs]):
         shift_rad: float = 0.0,
     ) -> Routine[None]:
         """Look at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
-        try:
-            yield from self.look(inputs, p_BT, self._viewpoints(p_BT, shift_rad, close=close))
-        except SkillFailure as failure:
-            if failure.cause is not Cause.PLANNING:
-                raise
+        viewpoints = self._viewpoints(p_BT, shift_rad, close=close)
+        failure = yield from self._look_if_possible(inputs, p_BT, viewpoints)
+        if failure is not None:
             blocked.append(failure)
             return
         while (track := self._candidate(inputs)) is not None:
@@ -223,13 +221,15 @@ class Detect(ArmSkill[DetectInputs]):
 
     def _look_if_possible(
         self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray]
-    ) -> Routine[None]:
-        """Look at a point, unless the arm cannot."""
+    ) -> Routine[SkillFailure | None]:
+        """Look at a point, unless the arm cannot: then why."""
         try:
             yield from self.look(inputs, p_BT, viewpoints_B)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
+            return failure
+        return None
 
     def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
         """Camera places p_BC to look from at p_BT, turned by shift_rad about the shoulder; near ones first if close."""

@@ -12,13 +12,15 @@ from skills.api import PlanningError
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
-from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
+from skills.robot import ArmTrajectory, Capabilities, FloatArray, GripperCapabilities
 from skills.stack import ArmPlanner
 
 PREGRASPS_M = (0.12, 0.07)
 """How far before the grasp the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0))
 """Ways to lift, up and back towards the shoulder, the best first."""
+_HIGH_SURFACE_M = 0.72
+_BELOW_LIMIT_M = 0.005
 
 
 @dataclass(frozen=True)
@@ -136,3 +138,10 @@ def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray, arm_planner: Arm
             continue
         return lift_B
     raise PlanningError("the arm cannot lift the object from there")
+
+
+def body_height_m(base_m: float, capabilities: Capabilities) -> float:
+    """Height of the body's origin over the floor to take an object that stands base_m over the floor."""
+    if base_m < _HIGH_SURFACE_M:
+        return capabilities.standing_height_m
+    return max(capabilities.standing_height_m, capabilities.height_range_m[1] - _BELOW_LIMIT_M)

@@ -18,8 +18,7 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
-from skills.grasp.posture import body_height_m
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, body_height_m, lifts
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.perception.surface_segmentation import Cluster, SurfaceView, cluster_of, parted, view_surface
@@ -87,7 +86,7 @@ class Grasp(ArmSkill[GraspInputs]):
     changes_world = True
 
     def undone(self, inputs: GraspInputs) -> str | None:
-        """The gripper tells."""
+        """Judged by the gripper."""
         return None if self.context.robot.gripper().holding else f"the {inputs.observation.thing} is not in the gripper"
 
     def run(self, inputs: GraspInputs) -> Routine[Succeeded]:
@@ -114,7 +113,7 @@ class Grasp(ArmSkill[GraspInputs]):
         return Succeeded(f"holding the {thing}", {"tried": self._tried})
 
     def begin(self, inputs: GraspInputs) -> None:
-        """Forget an earlier attempt, but not what `inputs` tells of it."""
+        """Forget an earlier attempt, but not the grasps that `inputs` names."""
         self._tried = inputs.avoid
         super().begin(inputs)
 
@@ -124,7 +123,7 @@ class Grasp(ArmSkill[GraspInputs]):
         super().resume(inputs)
 
     def _telling(self, failure: SkillFailure) -> SkillFailure:
-        """A failure that tells which grasps were tried."""
+        """A failure that says which grasps were tried."""
         return SkillFailure(failure.cause, failure.message, {"tried": self._tried})
 
     def run_again(self, inputs: GraspInputs) -> Routine[Succeeded]:

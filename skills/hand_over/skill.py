@@ -59,7 +59,7 @@ class HandOver(ArmSkill[HandOverInputs]):
     options: HandOverOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held, or nobody is seen near",
-        Cause.PLANNING: "no free place before the person, or no free way for the arm",
+        Cause.PLANNING: "no free place before the person, or no free path for the arm",
         Cause.EXECUTION: "the robot or its arm did not get there",
         Cause.POSTCONDITION: "the object is no longer held, or not near the person",
     }

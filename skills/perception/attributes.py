@@ -4,16 +4,67 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from types import MappingProxyType
+from functools import lru_cache
+from pathlib import Path
 from typing import Final
 
+import cv2
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
 from skills.perception.class_forms import class_forms
-from skills.perception.colour_words import load_appearance
 from skills.perception.detection_3d import Detection3D
 
-_BIGGER: Final[Mapping[str, bool]] = MappingProxyType(
-    {"big": True, "large": True, "huge": True, "small": False, "little": False, "tiny": False}
-)
+Colours = NDArray[np.uint8]
+_BIGGER: Final[Mapping[str, bool]] = {
+    "big": True,
+    "large": True,
+    "huge": True,
+    "small": False,
+    "little": False,
+    "tiny": False,
+}
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class ColourRange(_Model):
+    """A range of hue (degrees, may wrap past 360), saturation and value (0 to 1)."""
+
+    hue_deg: tuple[float, float] = (0.0, 360.0)
+    saturation: tuple[float, float] = (0.0, 1.0)
+    value: tuple[float, float] = (0.0, 1.0)
+
+    def share(self, colours: Colours) -> float:
+        """Share of colours (N, 3) RGB in the range."""
+        hsv = cv2.cvtColor(colours.reshape(1, -1, 3), cv2.COLOR_RGB2HSV_FULL)[0].astype(np.float64)
+        hue, saturation, value = hsv[:, 0] * (360 / 255), hsv[:, 1] / 255, hsv[:, 2] / 255
+        low, high = self.hue_deg
+        in_hue = (hue >= low) & (hue <= high) if low <= high else (hue >= low) | (hue <= high)
+        in_saturation = (saturation >= self.saturation[0]) & (saturation <= self.saturation[1])
+        in_value = (value >= self.value[0]) & (value <= self.value[1])
+        return float(np.mean(in_hue & in_saturation & in_value))
+
+
+class Appearance(_Model):
+    """The colour words."""
+
+    attributes: dict[str, ColourRange]
+
+    def shows(self, colours: Colours, attribute: str) -> bool:
+        """Whether a colour word fits. Raises KeyError for an unknown word."""
+        return self.attributes[attribute].share(colours) > 0.3
+
+
+@lru_cache(maxsize=1)
+def load_appearance() -> Appearance:
+    """The appearance data beside this module. Raises pydantic.ValidationError when it is malformed."""
+    path = Path(__file__).with_name("colour_words.yaml")
+    return Appearance.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
 
 
 def known_attributes() -> frozenset[str]:

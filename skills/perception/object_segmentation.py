@@ -46,7 +46,7 @@ _GAP_PX = 11
 class Window:
     """The depth about a box, rows by columns: points p_O (H, W, 3), pixels (u, v) of the colour picture, depth z (m).
 
-    `valid` tells where there is depth, `inside` which pixels lie in the box; `pixel_m` is what a pixel spans at 1 m.
+    `valid` says where there is depth, `inside` which pixels lie in the box; `pixel_m` is what a pixel spans at 1 m.
     """
 
     p_O: FloatArray
@@ -109,7 +109,7 @@ class ObjectSegment:
 def window_about(image: Image, box: Box, taken: Mask | None = None) -> Window | None:
     """The depth about a box of the colour picture; None when no depth is there at all.
 
-    `taken` (H, W) tells which pixels of the colour picture are known to be other objects.
+    `taken` (H, W) says which pixels of the colour picture are known to be other objects.
     """
     lens, depth_lens = image.intrinsics, image.depth_intrinsics
     if image.depth_m.ndim != 2 or image.depth_m.size == 0:

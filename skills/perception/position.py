@@ -1,6 +1,6 @@
 """Where a detected object is: the middle of the whole object, not of the side that is seen, with its covariance.
 
-The segment of the box gives the side that is seen. The form of the class tells how far the object goes on behind it:
+The segment of the box gives the side that is seen. The form of the class says how far the object goes on behind it:
 
 | form | middle |
 |---|---|
@@ -75,7 +75,7 @@ class Position:
 def position_of(image: Image, detection: Detection, taken: Mask | None = None) -> Position | None:
     """Where the object of a box is; None where no depth is seen there. Raises KeyError for a class without a form.
 
-    `taken` (H, W) tells which pixels are known to be other objects.
+    `taken` (H, W) says which pixels are known to be other objects.
     """
     form = class_forms()[detection.class_name]
     window = window_about(image, detection.box, taken)

@@ -17,7 +17,7 @@ _FIT_STEPS = 30
 class SeenShape:
     """A box about an object: centre (x, y) in W, length >= width, height above its surface (m), yaw of the length.
 
-    `round` tells that its outline from above fits a circle.
+    `round` says that its outline from above fits a circle.
     """
 
     centre: tuple[float, float]

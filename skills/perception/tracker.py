@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Protocol
 
 import numpy as np
 
@@ -41,7 +40,7 @@ _MOST_BELIEF, _LEAST_BELIEF = 0.999, 0.05
 class Track:
     """One object. `position_W` with `covariance` (3, 3) from the views, without the localisation's error.
 
-    `classes` tells how likely each class is, `belief` how likely it is that something is there at all. `views` counts
+    `classes` says how likely each class is, `belief` how likely it is that something is there at all. `views` counts
     the places that it was seen from; `latest` is its last detection, `best` its surest one.
     """
 
@@ -77,15 +76,8 @@ class Track:
         return self.views >= 2 and believed and self.latest.class_name == self.class_name
 
 
-class Tracks(Protocol):
-    """Gives what is known of the objects around."""
-
-    def snapshot(self) -> tuple[Track, ...]:
-        """All tracks, the surest first; immutable."""
-
-
 class Tracker:
-    """Keeps tracks up to date with the detections of each picture. Implements `Tracks`."""
+    """Keeps tracks up to date with the detections of each picture."""
 
     def __init__(self, class_names: Sequence[str]) -> None:
         self._names = tuple(class_names)

@@ -63,7 +63,7 @@ class Place(ArmSkill[PlaceInputs]):
     options: PlaceOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held",
-        Cause.PLANNING: "no free spot is seen within reach, or the arm finds no way to it",
+        Cause.PLANNING: "no free spot is seen within reach, or the arm finds no path to it",
         Cause.EXECUTION: "the robot or its arm did not get there",
         Cause.POSTCONDITION: "the object is not seen where it was put down, or is still in the gripper",
     }
@@ -72,7 +72,7 @@ class Place(ArmSkill[PlaceInputs]):
     changes_world = True
 
     def undone(self, inputs: PlaceInputs) -> str | None:
-        """The gripper tells."""
+        """Judged by the gripper."""
         return "the object is still in the gripper" if self.context.robot.gripper().holding else None
 
     def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
@@ -170,8 +170,8 @@ class Place(ArmSkill[PlaceInputs]):
     def _lower(self, surface: Surface, q_above_rad: FloatArray) -> Routine[None]:
         """Go down in small steps until the arm is held up, by contact, or the height is that of the surface.
 
-        The way down begins at the angles for which it was found to be possible, and not at those that the arm has: they
-        differ a little, and near a singular posture that may make the difference between a way and none.
+        The path down begins at the angles for which it was found to be possible, and not at those of the arm: they
+        differ a little, and near a singular posture that may make the difference between a path and none.
         After contact the arm no longer presses, or it would dip onto the surface as the gripper lets go.
         """
         message = f"putting the object down on the {surface.name}"

@@ -28,7 +28,7 @@ class Stow(ArmSkill[StowInputs]):
     name = "stow"
     Inputs = StowInputs
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PLANNING: "the arm finds no free way",
+        Cause.PLANNING: "the arm finds no free path",
         Cause.EXECUTION: "the arm did not get there",
     }
     default_timeout_s = 30.0

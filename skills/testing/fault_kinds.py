@@ -6,7 +6,6 @@ import dataclasses
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -25,9 +24,13 @@ VERBS: Final = (
 SENSE_VERBS: Final = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")
 MOTION_VERBS: Final = ("drive", "stand", "sit", "move_arm", "set_gripper")
 
-_OTHER_WORDS: Final[Mapping[str, str]] = MappingProxyType(
-    {"camera": "image", "lidar": "scan", "arm": "move_arm", "base": "drive", "body": "stand"}
-)
+_OTHER_WORDS: Final[Mapping[str, str]] = {
+    "camera": "image",
+    "lidar": "scan",
+    "arm": "move_arm",
+    "base": "drive",
+    "body": "stand",
+}
 
 
 @dataclass

@@ -280,10 +280,6 @@ class ScriptedRobot:
         driving = ("drive",) if float(np.max(np.abs(self.velocity))) > 0.01 else ()
         return (*driving, *(part for part in self._commands.moving_parts if part != "drive"))
 
-    def put_in_gripper(self, opening_rad: float | None) -> None:
-        """From now on closing the gripper stops at this opening and holds something; None takes it away."""
-        self.in_gripper_rad = opening_rad
-
     def _begin(
         self, part: str, goal: object, until_s: float, lease: Lease, fault: str, *, verb: str | None = None
     ) -> CommandId:

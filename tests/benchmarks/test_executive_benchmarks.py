@@ -11,6 +11,7 @@ import py_trees
 import pytest
 
 from executive.mission.command import parse_command
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.knowledge import Knowledge
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
@@ -18,7 +19,7 @@ from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
-from executive.tree.compiler import Step, compile_commands
+from executive.tree.compiler import compile_mission
 from tests.executive.conftest import (
     FETCH,
     KNOWLEDGE,
@@ -41,9 +42,11 @@ def fetch():
     """The tree of a fetch, whose leaves drive for some ticks and say something new in each."""
     script = Script(steps=STEPS_EACH, says=lambda name, left: f"{name}, {left} to go")
     registry = {name: scripted_skill(script, name, *ports) for name, ports in PORTS.items()}
-    steps = [Step(parse_command(text)) for text in FETCH]
+    steps = [MissionStep((parse_command(text),)) for text in FETCH]
     knowledge = Knowledge.model_validate(KNOWLEDGE)
-    return compile_commands("fetch drink", steps, knowledge=knowledge, registry=registry, robot_name="Alice")
+    return compile_mission(
+        Mission("fetch drink", DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=knowledge, registry=registry
+    )
 
 
 def ticks_of_a_run(tree, folder):

@@ -12,12 +12,13 @@ import pytest
 from pydrake.math import RigidTransform
 
 from executive.mission.command import parse_command
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.knowledge import Knowledge
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.board import Board
 from executive.tree.behaviours.context import RunContext
-from executive.tree.compiler import CompiledTree, Step, compile_commands
+from executive.tree.compiler import CompiledTree, compile_mission
 from skills.api import (
     Cause,
     Failed,
@@ -378,8 +379,10 @@ def compiled(knowledge: Knowledge, registry: dict[str, type[Skill[Any]]]) -> Cal
     """Compile commands given in their text form."""
 
     def compile_texts(*texts: str, name: str = "fetch drink") -> CompiledTree:
-        steps = [Step(parse_command(text)) for text in texts]
-        return compile_commands(name, steps, knowledge=knowledge, registry=registry, robot_name="Alice")
+        steps = [MissionStep((parse_command(text),)) for text in texts]
+        return compile_mission(
+            Mission(name, DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=knowledge, registry=registry
+        )
 
     return compile_texts
 

@@ -11,10 +11,11 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from executive.cli.assembly import judge, run_entry
 from executive.cli.worlds import knowledge_of, open_world
 from executive.mission.command import parse_command
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings, run
 from executive.run.worker import LockStepWorker
-from executive.tree.compiler import Step, compile_commands
+from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from plant.diagram import LooseModel
 from plant.simulation import Simulation
@@ -32,15 +33,15 @@ BOX_PART = (
 pytestmark = pytest.mark.mission
 
 
-class Mission:
+class FlatMission:
     """A mission in the flat, with what happened in it."""
 
     def __init__(self, texts, *, seed=1, **plant: Any) -> None:
         self.world = open_world("flat")
         self.knowledge = knowledge_of(self.world)
-        steps = [Step(parse_command(text)) for text in texts]
-        self.tree = compile_commands(
-            "m", steps, knowledge=self.knowledge, registry=built_in_skills(), robot_name="Alice"
+        steps = [MissionStep((parse_command(text),)) for text in texts]
+        self.tree = compile_mission(
+            Mission("m", DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
         )
         self.simulation = Simulation(self.world, seed=seed, robot_names=("Alice",), looks=False, **plant)
         self.entry = run_entry(self.simulation, self.world, self.tree)
@@ -89,7 +90,7 @@ def honest(result, verdict):
 
 def test_a_blocked_doorway_is_gone_around(tmp_path):
     box = box_at(tmp_path, 9.0, 5.4, (0.7, 0.3, 0.8))
-    mission = Mission(FETCH, extra_models=(box,))
+    mission = FlatMission(FETCH, extra_models=(box,))
     result, verdict = mission.run()
     honest(result, verdict)
     assert result.outcome is Outcome.SUCCESS, result.message
@@ -113,7 +114,7 @@ class WeakGripper:
 
 
 def test_a_thing_that_slips_is_taken_again():
-    mission = Mission(FETCH)
+    mission = FlatMission(FETCH)
     robot = WeakGripper(mission.entry.robot, weak_times=1, force_n=1.0)
     result, verdict = mission.run(robot)
     honest(result, verdict)
@@ -122,7 +123,7 @@ def test_a_thing_that_slips_is_taken_again():
 
 
 def test_a_low_battery_is_charged_in_between_and_the_mission_goes_on():
-    mission = Mission(("Take [Nothing] to [workshop] and do [find] to [hammer]",), charge=0.153)
+    mission = FlatMission(("Take [Nothing] to [workshop] and do [find] to [hammer]",), charge=0.153)
     charges = []
     battery = mission.entry.robot.battery
     result, verdict = mission.run(observer=lambda progress: charges.append(battery().charge))
@@ -134,7 +135,7 @@ def test_a_low_battery_is_charged_in_between_and_the_mission_goes_on():
 
 
 def test_a_lost_place_is_found_again_and_the_mission_goes_on():
-    mission = Mission(("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]",))
+    mission = FlatMission(("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]",))
     localiser = mission.entry.localiser
     moved = []
 

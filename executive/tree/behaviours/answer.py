@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Final
 
 from py_trees.common import Status
@@ -14,8 +13,7 @@ from executive.tree.behaviours.decorators import ExplainedDecorator
 from executive.tree.behaviours.explained import Explained
 from executive.tree.node import NodeKind
 from skills.api import Cause, Failed, ObjectObservation, Publish
-from skills.detect.counting import told_apart
-from skills.detect.words import counted
+from skills.detect.words import counted, told_apart
 
 ANSWER_TOPIC: Final = "answer"
 
@@ -100,6 +98,6 @@ def _obstacle(nodes: Mapping[str, Explained]) -> Cause:
     return next((cause for cause in causes if cause not in (None, Cause.POSTCONDITION)), None) or Cause.EXECUTION
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
-    {"answer": NodeKind(Answer, ("child", "board", "publish"), writes=lambda options: {options["key"]: bool})}
-)
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "answer": NodeKind(Answer, ("child", "board", "publish"), writes=lambda options: {options["key"]: bool})
+}

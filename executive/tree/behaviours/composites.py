@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import ClassVar, Final, Protocol, runtime_checkable
 
 from py_trees.behaviour import Behaviour
@@ -101,7 +100,7 @@ class MemorySequence(MemoryComposite):
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class MemorySelector(MemoryComposite):
-    """One way after the other until one works.
+    """One child after the other until one works.
 
     Child that does not apply (`Conditional`): passed over, it stays idle. Child RUNNING: RUNNING. Child SUCCESS:
     SUCCESS. Child FAILURE: on to the next in the same tick; after the last: FAILURE with the sentences of all that
@@ -134,7 +133,7 @@ class MemorySelector(MemoryComposite):
 
 
 class MemoryRound(MemorySelector):
-    """All ways, one after the other, whatever becomes of each.
+    """All children, one after the other, whatever becomes of each.
 
     Child that does not apply: passed over. Child RUNNING: RUNNING. Child SUCCESS or FAILURE: on to the next in the same
     tick. After the last: SUCCESS with the sentences of those that worked when any did, else FAILURE as a selector.
@@ -151,10 +150,8 @@ class MemoryRound(MemorySelector):
         self.message = "; ".join(dict.fromkeys(map(message_of, done)))
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
-    {
-        "sequence": NodeKind(MemorySequence, ("children",)),
-        "selector": NodeKind(MemorySelector, ("children",)),
-        "round": NodeKind(MemoryRound, ("children",)),
-    }
-)
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "sequence": NodeKind(MemorySequence, ("children",)),
+    "selector": NodeKind(MemorySelector, ("children",)),
+    "round": NodeKind(MemoryRound, ("children",)),
+}

@@ -160,9 +160,9 @@ class BatteryAtLeast(Condition):
 
 @dataclass
 class BatteryForWork(BatteryAtLeast):
-    """The charge is at least `charge`, and enough for the way to the dock.
+    """The charge is at least `charge`, and enough for the route to the dock.
 
-    The way is taken as twice the distance as the crow flies, at `per_m` of charge for each metre.
+    The route is taken as twice the distance as the crow flies, at `per_m` of charge for each metre.
     """
 
     dock: Pose2D

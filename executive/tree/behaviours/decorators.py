@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Final
 
 from py_trees.behaviour import Behaviour
@@ -143,10 +142,8 @@ class Guard(ExplainedDecorator):
         return self.pass_on()
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
-    {
-        "timeout": NodeKind(Timeout, ("child", "clock")),
-        "retry": NodeKind(Retry, ("child",)),
-        "guard": NodeKind(Guard, ("child", "context")),
-    }
-)
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "timeout": NodeKind(Timeout, ("child", "clock")),
+    "retry": NodeKind(Retry, ("child",)),
+    "guard": NodeKind(Guard, ("child", "context")),
+}

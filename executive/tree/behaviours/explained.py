@@ -34,7 +34,7 @@ class Explained:
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ExplainedNode(Explained):
-    """An explained node of ours: what a spec says of it is given by keywords."""
+    """An explained node of ours: it takes what its spec says by keywords."""
 
     path_id: str
     name: str

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, ClassVar, Final
 
 from py_trees.behaviour import Behaviour
@@ -176,10 +175,8 @@ class Interrupts(MemoryComposite):
         self.status, self.cause, self.message = Status.RUNNING, None, watch.waiting or message_of(watch)
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
-    {
-        "monitor": NodeKind(Monitor, ("context",)),
-        "interrupt": NodeKind(Interrupt, ("child", "context")),
-        "interrupts": NodeKind(Interrupts, ("children",)),
-    }
-)
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "monitor": NodeKind(Monitor, ("context",)),
+    "interrupt": NodeKind(Interrupt, ("child", "context")),
+    "interrupts": NodeKind(Interrupts, ("children",)),
+}

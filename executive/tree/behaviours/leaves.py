@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 from py_trees.common import Status
@@ -103,12 +102,8 @@ def _xy(point: tuple[float, float]) -> str:
     return f"({point[0]:.2f}, {point[1]:.2f}) m"
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
-    {
-        "remember": NodeKind(RememberPose, ("context",), writes=lambda options: {options["key"]: Pose2D}),
-        "pause": NodeKind(Pause, ("clock",)),
-        "surfaces near": NodeKind(
-            SurfacesNear, ("context",), writes=lambda options: {options["key"]: tuple[Surface, ...]}
-        ),
-    }
-)
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "remember": NodeKind(RememberPose, ("context",), writes=lambda options: {options["key"]: Pose2D}),
+    "pause": NodeKind(Pause, ("clock",)),
+    "surfaces near": NodeKind(SurfacesNear, ("context",), writes=lambda options: {options["key"]: tuple[Surface, ...]}),
+}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Final
 
 from py_trees.behaviour import Behaviour
@@ -110,14 +109,14 @@ class AskOperator(Skip):
 
 
 class GoBack(MemorySequence):
-    """A way back after a failure: two children, the first what is to be done, the second the way back.
+    """A route back after a failure: two children, the first what is to be done, the second the route back.
 
     First child RUNNING or SUCCESS: the same. First child FAILURE: the second is ticked, RUNNING while it runs; at its
     end FAILURE with the first's cause and sentence, and whether the robot is back.
     """
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick what is to be done, or the way back."""
+        """Tick what is to be done, or the route back."""
         if self.status != Status.RUNNING:
             self._restart()
         action, way_back = self.children
@@ -169,11 +168,9 @@ class Summary(ExplainedDecorator):
         return status
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
-    {
-        "skip": NodeKind(Skip, ("child",)),
-        "ask": NodeKind(AskOperator, ("child", "context")),
-        "go back": NodeKind(GoBack, ("children",)),
-        "summary": NodeKind(Summary, ("child",)),
-    }
-)
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "skip": NodeKind(Skip, ("child",)),
+    "ask": NodeKind(AskOperator, ("child", "context")),
+    "go back": NodeKind(GoBack, ("children",)),
+    "summary": NodeKind(Summary, ("child",)),
+}

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Final
 
 from py_trees.behaviour import Behaviour
@@ -195,13 +194,11 @@ class OnlyIfHolding(MemoryComposite):
         return self.robot.gripper().holding
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType(
-    {
-        "recover": NodeKind(Recover, ("children", "board")),
-        "afterwards": NodeKind(Afterwards, ("children",)),
-        "only if known": NodeKind(
-            OnlyIfKnown, ("children", "board"), writes=lambda options: {options["key"]: ObjectObservation}
-        ),
-        "only if holding": NodeKind(OnlyIfHolding, ("children", "robot")),
-    }
-)
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "recover": NodeKind(Recover, ("children", "board")),
+    "afterwards": NodeKind(Afterwards, ("children",)),
+    "only if known": NodeKind(
+        OnlyIfKnown, ("children", "board"), writes=lambda options: {options["key"]: ObjectObservation}
+    ),
+    "only if holding": NodeKind(OnlyIfHolding, ("children", "robot")),
+}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 from py_trees.common import Status
@@ -13,7 +12,6 @@ from py_trees.common import Status
 from executive.tree.behaviours.board import Binding
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import ExplainedLeaf
-from executive.tree.behaviours.freshness import refuse_stale
 from executive.tree.behaviours.suspension import StoppableTime
 from executive.tree.node import NodeKind
 from executive.tree.types import conforms, describe_type
@@ -21,6 +19,11 @@ from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
 
 ResultT = TypeVar("ResultT")
 ERROR_TOPIC = "errors"
+_TOLERANCE_S = 1e-6
+
+
+class Remembered(Succeeded):
+    """A success from before a restart: its data was fresh then."""
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -178,9 +181,34 @@ class SkillLeaf(ExplainedLeaf):
             return Failed(Cause.ERROR, f"{self.name} raised {type(defect).__name__}: {text}")
 
 
+def refuse_stale(skill: type[Skill[Any]], success: Succeeded, context: RunContext) -> Succeeded | Failed:
+    """The success, or a failed postcondition when data that it rests on is older than the skill allows."""
+    if isinstance(success, Remembered):
+        return success
+    for source, most_s in skill.max_data_age_s.items():
+        stamp_s = _stamp_s(source, success.outputs, context)
+        if stamp_s is None:
+            return Failed(Cause.POSTCONDITION, f"{skill.name} cannot be sure: there is no {source} data")
+        age_s = context.clock.now() - stamp_s
+        if age_s > most_s + _TOLERANCE_S:
+            why = f"its {source} data is {age_s:.1f} s old, more than {most_s:g} s"
+            return Failed(Cause.POSTCONDITION, f"{skill.name} cannot be sure: {why}")
+    return success
+
+
+def _stamp_s(source: str, outputs: Mapping[str, Any], context: RunContext) -> float | None:
+    """When the data was taken: an output port's value, the place estimate, or a sense verb that does not block."""
+    if source in outputs:
+        return float(outputs[source].stamp_s)
+    if source == "localisation":
+        return context.localiser.estimate().stamp_s
+    reading = getattr(context.robot, source)()
+    return None if reading is None else float(reading.stamp_s)
+
+
 def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
     """The keys bound to the skill's output ports."""
     return {key: options["skill"].outputs.get(port, Any) for port, key in options.get("outputs", {}).items()}
 
 
-KINDS: Final[Mapping[str, NodeKind]] = MappingProxyType({"skill": NodeKind(SkillLeaf, ("context",), _written)})
+KINDS: Final[Mapping[str, NodeKind]] = {"skill": NodeKind(SkillLeaf, ("context",), _written)}

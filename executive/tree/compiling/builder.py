@@ -102,7 +102,7 @@ class PlanBuilder:
         return self.node("pause", name, part=part, duration_s=duration_s)
 
     def navigate(self, pose: Pose2D | FromBoard, *, exactly: bool = False) -> NodeSpec:
-        """Drive to a pose; where the way is blocked, see anew what stands there, then back off a little.
+        """Drive to a pose; where the path is blocked, see anew what stands there, then back off a little.
 
         With `exactly`, within 8 cm.
         """

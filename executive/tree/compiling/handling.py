@@ -2,7 +2,7 @@
 
 | what failed | cause | what is done before the next attempt |
 |---|---|---|
-| going somewhere | PLANNING, EXECUTION | see anew what stands in the way; back off; another pose nearby |
+| going somewhere | PLANNING, EXECUTION | see anew what blocks the path; back off; another pose nearby |
 | finding | not seen | from aside; where such objects usually are; other surfaces (`search`) |
 | standing before it | PLANNING | see anew what stands around; back off |
 | standing before it | others | look again |
@@ -35,7 +35,7 @@ _NOT_PLANNING: Final = (Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION
 
 
 def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard) -> NodeSpec:
-    """Drive to a pose or, when there is no way to it, to one nearby in the same room."""
+    """Drive to a pose or, when there is no path to it, to one nearby in the same room."""
     direct = builder.navigate(pose)
     others = [builder.at(f"nearby-{n}").navigate(other) for n, other in enumerate(_nearby(builder, pose), start=1)]
     return builder.node("selector", "go there or near it", direct, *others, part="or-near") if others else direct

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 from executive.mission.file.model import OnFailure, StepGuards, StepPolicy
@@ -93,12 +92,10 @@ def _stop(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:
     return below
 
 
-_ON_FAILURE: Final[Mapping[OnFailure, Callable[[NodeSpec, StepPolicy, PolicyFrame], NodeSpec]]] = MappingProxyType(
-    {
-        OnFailure.STOP: _stop,
-        OnFailure.RETRY: _stop,
-        OnFailure.SKIP: _skip,
-        OnFailure.ASK: _ask,
-        OnFailure.RETURN: _go_back,
-    }
-)
+_ON_FAILURE: Final[Mapping[OnFailure, Callable[[NodeSpec, StepPolicy, PolicyFrame], NodeSpec]]] = {
+    OnFailure.STOP: _stop,
+    OnFailure.RETRY: _stop,
+    OnFailure.SKIP: _skip,
+    OnFailure.ASK: _ask,
+    OnFailure.RETURN: _go_back,
+}

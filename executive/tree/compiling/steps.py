@@ -191,6 +191,9 @@ def _required(builder: PlanBuilder, thing: Thing | None) -> Thing:
     return thing
 
 
-_BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = MappingProxyType(
-    {Task.GRASP: grasp_plan, Task.FIND: find_plan, Task.PLACE: carry_plan, None: go_plan}
-)
+_BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {
+    Task.GRASP: grasp_plan,
+    Task.FIND: find_plan,
+    Task.PLACE: carry_plan,
+    None: go_plan,
+}

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from executive.mission.command import parse_command
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
-from executive.tree.compiler import Step, compile_commands
+from executive.tree.compiler import compile_mission
 from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, ObjectObservation, Running, Skill, Succeeded, Thing
 from skills.robot import ArmTrajectory
@@ -60,15 +61,17 @@ def moving_skill(skill_name, inputs, outputs_):
 @pytest.fixture
 def mission(make, knowledge):
     registry = {name: moving_skill(name, *ports) for name, ports in make.PORTS.items()}
-    steps = [Step(parse_command(text)) for text in make.FETCH]
-    return compile_commands("fetch drink", steps, knowledge=knowledge, registry=registry, robot_name="Alice")
+    steps = [MissionStep((parse_command(text),)) for text in make.FETCH]
+    return compile_mission(
+        Mission("fetch drink", DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=knowledge, registry=registry
+    )
 
 
 def run_until(mission, tick, act):
     """Run the mission, act on its control after a tick; the result, robot, clock, and how long each part moved on."""
     clock, control = VirtualClock(), Control(pace=None)
     robot = ScriptedRobot(clock, capabilities=CAPABILITIES)
-    robot.put_in_gripper(0.3)
+    robot.in_gripper_rad = 0.3
     entry = RunEntry(mission, robot, KnownPlace(), BlockCostmap())
     result = run(
         [entry],

@@ -7,11 +7,12 @@ import pytest
 from py_trees.common import Status
 
 from executive.mission.command import parse_command
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
 from executive.run.worker import LockStepWorker
-from executive.tree.compiler import Step, compile_commands
+from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Succeeded
 
 
@@ -234,11 +235,11 @@ def test_overruns_are_counted(compiled, run_tree, make, script, published):
 
 
 def test_robots_run_side_by_side_in_the_order_of_their_names(make, knowledge, registry, clock, published):
-    steps = [Step(parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"))]
+    steps = [MissionStep((parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"),))]
     robots = {name: make.ScriptedRobot(clock, name) for name in ("Bob", "Alice")}
     entries = [
         RunEntry(
-            compile_commands("go", steps, knowledge=knowledge, registry=registry, robot_name=name),
+            compile_mission(Mission("go", DEFAULT_WORLD, name, tuple(steps)), knowledge=knowledge, registry=registry),
             robot,
             make.StillLocaliser(),
             make.EmptyCostmap(),

@@ -6,6 +6,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.mission.command import parse_command
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.request import Request
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
@@ -13,7 +14,7 @@ from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.records import Memory, StepRecord
 from executive.store.resuming import resumed_tree
-from executive.tree.compiler import Step, compile_commands
+from executive.tree.compiler import compile_mission
 from executive.tree.node import NodeSpec
 from executive.tree.registry import installed_skills
 from skills.api import Cause, Failed, Running, Succeeded
@@ -112,8 +113,10 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
     def one_life(texts, *, kill_after=None, kill_when=None, lag=0):
         missions = store.missions()
         mission = missions[0] if missions else store.add(REQUEST, queued=False)
-        steps = [Step(parse_command(text)) for text in texts]
-        tree = compile_commands("fetch drink", steps, knowledge=knowledge, registry=handling, robot_name="Alice")
+        steps = [MissionStep((parse_command(text),)) for text in texts]
+        tree = compile_mission(
+            Mission("fetch drink", DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=knowledge, registry=handling
+        )
         journal, recollection = store.journal(mission.id), None
         if missions:
             tree, recollection = resumed_tree(tree, store.memory(mission.id))

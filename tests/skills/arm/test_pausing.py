@@ -125,7 +125,7 @@ def test_when_the_robot_was_elsewhere_it_looks_anew(bench, robot):
 
 
 def test_when_the_thing_was_lost_it_looks_anew(bench, robot):
-    robot.put_in_gripper(0.3)
+    robot.in_gripper_rad = 0.3
     robot.opening_rad, robot.clamp_force_n = 0.3, 20.0
 
     def lose():

@@ -3,7 +3,7 @@
 import pytest
 
 from skills.api import ObjectObservation, Thing
-from skills.detect.counting import told_apart
+from skills.detect.words import told_apart
 
 
 def beer(x_m, name="beer"):

@@ -13,47 +13,20 @@ from skills.robot import Pose2D
 from skills.stow.skill import Stow, StowInputs
 
 
-@pytest.fixture
-def run_pytest(tmp_path):
+def run_pytest(folder, **files):
     """Run pytest on files of the given texts, in a process of its own."""
-
-    def run(**files):
-        for name, text in files.items():
-            file = tmp_path / name.replace("__", ".")
-            file.write_text(textwrap.dedent(text))
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(tmp_path), "."]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-
-    return run
+    for name, text in files.items():
+        (folder / name.replace("__", ".")).write_text(textwrap.dedent(text))
+    options = ["-q", "-p", "no:cacheprovider", "--continue-on-collection-errors", "--rootdir", str(folder)]
+    command = [sys.executable, "-m", "pytest", *options, "."]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
 
 
-def test_skill_tests_are_collected_by_name_and_fail_with_line_and_story(run_pytest):
+@pytest.fixture(scope="module")
+def output(tmp_path_factory):
+    """What pytest says of four files of skill tests, one of them broken, and a conftest with a fault of its own."""
     done = run_pytest(
-        stow__skilltest__yaml="""\
-        skill: stow
-        tests:
-          - name: stowed already
-            expect: {outcome: success}
-          - name: hopeful
-            faults: [arm refuses]
-            robot: {arm: [0.4, -1.6, 1.6, 0.0, 0.4, 0.0]}
-            expect: {outcome: success}
-        """
-    )
-    assert "1 failed, 1 passed" in done.stdout
-    assert "stow.skilltest.yaml:5: skill 'stow'" in done.stdout
-    assert "expected success, and it was failure EXECUTION" in done.stdout
-    assert "Traceback" not in done.stdout
-
-
-def test_a_broken_file_is_one_error_with_its_line(run_pytest):
-    done = run_pytest(stow__skilltest__yaml="skill: stow\ntests:\n  - nam: x\n    expect: {outcome: success}\n")
-    assert "stow.skilltest.yaml:3: unknown key 'nam'" in done.stdout
-    assert done.returncode == 2
-
-
-def test_a_conftest_may_add_faults_of_its_own(run_pytest):
-    done = run_pytest(
+        tmp_path_factory.mktemp("skill_tests"),
         conftest__py="""\
         from skills.testing.fault_kinds import Effect, FaultKind
 
@@ -67,34 +40,54 @@ def test_a_conftest_may_add_faults_of_its_own(run_pytest):
         stow__skilltest__yaml="""\
         skill: stow
         tests:
+          - name: stowed already
+            expect: {outcome: success}
+          - name: hopeful
+            faults: [arm refuses]
+            robot: {arm: [0.4, -1.6, 1.6, 0.0, 0.4, 0.0]}
+            expect: {outcome: success}
+        """,
+        broken__skilltest__yaml="skill: stow\ntests:\n  - nam: x\n    expect: {outcome: success}\n",
+        moon__skilltest__yaml="""\
+        skill: stow
+        tests:
           - {name: moon, faults: [full moon], expect: {outcome: failure, cause: ERROR, message: the moon is full}}
         """,
-    )
-    assert "1 passed" in done.stdout
-
-
-def test_a_skill_test_may_ask_for_the_plant(run_pytest):
-    done = run_pytest(
-        stow__skilltest__yaml="""\
+        walk__skilltest__yaml="""\
         skill: navigate
         robot: {kind: plant}
         with: {goal: {x: 0.0, y: 0.0}}
         tests:
           - {name: it walks, expect: {outcome: success, message: standing, within_s: 20}}
           - {name: it is stopped, faults: [drive is stopped at 1 s], expect: {outcome: failure}}
-        """
+        """,
     )
-    assert "2 passed" in done.stdout, done.stdout
+    return done.stdout
 
 
-def test_tests_that_use_nothing_of_it_load_nothing_heavy(run_pytest):
+def test_skill_tests_are_collected_by_name_and_fail_with_line_and_story(output):
+    assert "stow.skilltest.yaml:5: skill 'stow'" in output
+    assert "expected success, and it was failure EXECUTION" in output
+    assert "Traceback" not in output
+
+
+def test_a_broken_file_is_one_error_with_its_line(output):
+    assert "broken.skilltest.yaml:3: unknown key 'nam'" in output
+
+
+def test_tests_in_the_plant_and_with_faults_of_a_conftest_pass(output):
+    assert "1 failed, 4 passed, 1 error" in output, output
+
+
+def test_tests_that_use_nothing_of_it_load_nothing_heavy(tmp_path):
     done = run_pytest(
+        tmp_path,
         test_light__py="""\
         import sys
 
         def test_light():
             assert not {"pydrake", "numpy", "pydantic"} & set(sys.modules)
-        """
+        """,
     )
     assert "1 passed" in done.stdout, done.stdout
 

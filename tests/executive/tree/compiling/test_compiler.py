@@ -4,10 +4,11 @@ import pytest
 
 from executive.mission.command import parse_command
 from executive.mission.errors import InputError, SourceLine
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.goal import surfaces_to_search
 from executive.run.outcome import Outcome
 from executive.tree.behaviours.board import FromBoard
-from executive.tree.compiler import Step, compile_commands
+from executive.tree.compiler import compile_mission
 from executive.tree.estimate import expected
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Thing
 from skills.robot import Pose2D
@@ -218,24 +219,30 @@ def test_what_cannot_be_done_is_refused_with_a_reason(compiled, text, words):
 
 def test_refusals_name_the_line(knowledge, registry, tmp_path):
     command = parse_command("Take [Nothing] to [moon] and do [Nothing] to [Nothing]")
-    step = Step(command, SourceLine(tmp_path / "m.yaml", 7))
+    step = MissionStep((command,), SourceLine(tmp_path / "m.yaml", 7))
     with pytest.raises(InputError, match=r"m\.yaml:7: the place 'moon'"):
-        compile_commands("m", [step], knowledge=knowledge, registry=registry, robot_name="Alice")
+        compile_mission(Mission("m", DEFAULT_WORLD, "Alice", (step,)), knowledge=knowledge, registry=registry)
 
 
 def test_nodes_keep_their_line(knowledge, registry, tmp_path):
     source = SourceLine(tmp_path / "m.yaml", 4)
     command = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
-    tree = compile_commands("m", [Step(command, source)], knowledge=knowledge, registry=registry, robot_name="Alice")
+    tree = compile_mission(
+        Mission("m", DEFAULT_WORLD, "Alice", (MissionStep((command,), source),)),
+        knowledge=knowledge,
+        registry=registry,
+    )
     assert {node.source for node in tree.mission.children[0].walk()} == {source}
 
 
 def test_an_absent_skill_and_an_empty_mission_are_refused(knowledge, registry):
     command = parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")
     with pytest.raises(InputError, match="no skill 'navigate'"):
-        compile_commands("m", [Step(command)], knowledge=knowledge, registry={}, robot_name="Alice")
+        compile_mission(
+            Mission("m", DEFAULT_WORLD, "Alice", (MissionStep((command,)),)), knowledge=knowledge, registry={}
+        )
     with pytest.raises(InputError, match="no commands"):
-        compile_commands("m", [], knowledge=knowledge, registry=registry, robot_name="Alice")
+        compile_mission(Mission("m", DEFAULT_WORLD, "Alice", ()), knowledge=knowledge, registry=registry)
 
 
 def test_a_mission_of_a_hundred_steps_compiles(compiled, make):

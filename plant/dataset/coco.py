@@ -32,16 +32,6 @@ def run_lengths(mask: Mask) -> dict[str, Any]:
     return {"size": list(mask.shape), "counts": counts}
 
 
-def mask_of(lengths: Mapping[str, Any]) -> Mask:
-    """The mask of run lengths. Raises ValueError when they do not fill its size."""
-    height, width = lengths["size"]
-    counts = np.asarray(lengths["counts"], dtype=int)
-    if int(counts.sum()) != height * width:
-        raise ValueError(f"run lengths fill {int(counts.sum())} pixels, not {height} x {width}")
-    values = np.arange(len(counts)) % 2 == 1
-    return np.asarray(np.repeat(values, counts).reshape((height, width), order="F"))
-
-
 def box_of(mask: Mask) -> tuple[int, int, int, int]:
     """The box (x, y, width, height) of a mask in pixels. Raises ValueError when it is empty."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))

@@ -100,35 +100,6 @@ def cabinet(rng: np.random.Generator, m: Materials) -> Furnished:
     return Furnished(piece, w, d, (_whole(w, d, h),))
 
 
-def counter(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A kitchen run."""
-    w = _of(rng, 2.2, 3.6)
-    sink, hob = -w / 2 + 0.45, w / 2 - 0.45
-    piece = f.counter(m, width=w, sink_x=sink, hob_x=hob)
-    return Furnished(piece, w, 0.6, (Top((sink + 0.32, -0.58, hob - 0.32, -0.03), 0.90),))
-
-
-def workbench(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A workbench with a vice, or a plain one of another height."""
-    w = _of(rng, 1.9, 2.6)
-    return Furnished(
-        f.workbench(m, width=w),
-        w,
-        0.65,
-        (Top((-w / 2, -0.64, w / 2 - 0.3, -0.02), 0.82), Top((-w / 2 + 0.1, -0.6, -1.0, -0.1), 0.23, 0.3)),
-    )
-
-
-def trolley(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A tool trolley."""
-    return Furnished(f.trolley(m), 0.7, 0.45, (Top((-0.33, -0.43, 0.33, -0.02), 0.80),))
-
-
-def desk(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A desk with a screen at its left."""
-    return Furnished(f.desk(m), 1.6, 0.7, (Top((-0.05, -0.68, 0.78, -0.02), 0.74),))
-
-
 def shelf(rng: np.random.Generator, m: Materials) -> Furnished:
     """Open shelves on which things stand."""
     w, d, h, boards = _of(rng, 0.6, 1.4), _of(rng, 0.26, 0.45), _of(rng, 0.8, 1.9), int(rng.integers(2, 5))
@@ -145,53 +116,6 @@ def shelf(rng: np.random.Generator, m: Materials) -> Furnished:
     return Furnished(piece, w, d, tuple(tops))
 
 
-def bookshelf(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A bookshelf; low ones carry things."""
-    w, h = _of(rng, 0.6, 1.4), _of(rng, 0.8, 2.0)
-    tops = (_whole(w, 0.30, h),) if h < 1.4 else ()
-    return Furnished(f.bookshelf(m, width=w, height=h, boards=max(2, round(h / 0.36))), w, 0.30, tops)
-
-
-def tall(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A fridge, wardrobe or locker."""
-    w, d, h = _of(rng, 0.5, 1.6), _of(rng, 0.5, 0.66), _of(rng, 1.5, 2.2)
-    return Furnished(
-        f.tall_unit(
-            m, size=(w, d, h), body=str(rng.choice(_BODIES)), grid=(max(1, round(w / 0.6)), int(rng.integers(1, 4)))
-        ),
-        w,
-        d,
-    )
-
-
-def rack(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A storage rack."""
-    w = _of(rng, 0.9, 1.6)
-    return Furnished(f.rack(m, width=w), w, 0.42)
-
-
-def sofa(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A sofa or an armchair; things lie on its seat."""
-    w = _of(rng, 0.85, 2.2)
-    return Furnished(
-        f.sofa(m, width=w, cloth=str(rng.choice(_CLOTHS))),
-        w,
-        0.9,
-        (Top((-w / 2 + 0.2, -0.86, w / 2 - 0.2, -0.4), 0.46),),
-    )
-
-
-def bed(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A bed; things lie on its cover."""
-    w = _of(rng, 0.9, 1.7)
-    return Furnished(f.bed(m, width=w), w, 2.05, (Top((-w / 2 + 0.1, -1.9, w / 2 - 0.1, -0.8), 0.52),))
-
-
-def television(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A television on a board."""
-    return Furnished(f.television(m), 1.6, 0.4, (Top((-0.78, -0.39, 0.78, -0.29), 0.45),))
-
-
 def stool(rng: np.random.Generator, m: Materials) -> Furnished:
     """A stool, a box or a crate to put things on."""
     w, h, piece = _of(rng, 0.3, 0.5), _of(rng, 0.3, 0.65), Piece(m)
@@ -204,62 +128,49 @@ def stool(rng: np.random.Generator, m: Materials) -> Furnished:
     return Furnished(piece, w, w, (_whole(w, w, h),))
 
 
-def chair(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A chair; things lie on its seat."""
-    if rng.random() < 0.3:
-        return Furnished(f.office_chair(m), 0.5, 0.52, (Top((-0.2, -0.48, 0.2, -0.1), 0.51),))
+def _sofa(rng: np.random.Generator, m: Materials) -> Furnished:
+    w = _of(rng, 0.85, 2.2)
     return Furnished(
-        f.chair(
-            m, wood=str(rng.choice(("wood_dark", "wood_light", "white", "charcoal"))), seat=str(rng.choice(_CLOTHS))
-        ),
-        0.42,
-        0.44,
-        (Top((-0.2, -0.43, 0.2, -0.06), 0.45),),
+        f.sofa(m, width=w, cloth=str(rng.choice(_CLOTHS))),
+        w,
+        0.9,
+        (Top((0.2 - w / 2, -0.86, w / 2 - 0.2, -0.4), 0.46),),
     )
 
 
-def lamp(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A floor lamp."""
-    return Furnished(f.floor_lamp(m), 0.4, 0.4)
+def _chair(rng: np.random.Generator, m: Materials) -> Furnished:
+    wood = str(rng.choice(("wood_dark", "wood_light", "white", "charcoal")))
+    top = Top((-0.2, -0.43, 0.2, -0.06), 0.45)
+    return Furnished(f.chair(m, wood=wood, seat=str(rng.choice(_CLOTHS))), 0.42, 0.44, (top,))
 
 
-def plant(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A large plant."""
-    return Furnished(f.plant(m, height=_of(rng, 0.7, 1.7), seed=int(rng.integers(1000))), 0.45, 0.45)
+def _tall(rng: np.random.Generator, m: Materials) -> Furnished:
+    """A fridge, wardrobe or locker."""
+    w, d, h = _of(rng, 0.5, 1.6), _of(rng, 0.5, 0.66), _of(rng, 1.5, 2.2)
+    grid = (max(1, round(w / 0.6)), int(rng.integers(1, 4)))
+    return Furnished(f.tall_unit(m, size=(w, d, h), body=str(rng.choice(_BODIES)), grid=grid), w, d)
 
 
-def basket(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A laundry basket."""
-    return Furnished(f.basket(m), 0.44, 0.44)
-
-
-def washbasin(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A washbasin with a mirror."""
-    return Furnished(f.washbasin(m), 0.7, 0.45)
+def _fixed(make: Callable[..., Piece], size: tuple[float, float], *tops: Top, **options: float) -> Maker:
+    """A piece of the flat as it is, with its width, its depth and its tops."""
+    return lambda _, m: Furnished(make(m, **options), *size, tops)
 
 
 BY_THE_WALL: tuple[Maker, ...] = (
-    table,
-    table,
-    cabinet,
-    cabinet,
-    counter,
-    workbench,
-    trolley,
-    desk,
-    shelf,
-    shelf,
-    bookshelf,
-    tall,
-    rack,
-    sofa,
-    bed,
-    television,
-    stool,
-    chair,
-    lamp,
-    plant,
-    basket,
-    washbasin,
+    *(table, table, cabinet, cabinet, shelf, shelf, stool, _sofa, _chair, _tall),
+    _fixed(f.counter, (3.0, 0.6), Top((-0.73, -0.58, 0.73, -0.03), 0.90), width=3.0, sink_x=-1.05, hob_x=1.05),
+    _fixed(f.workbench, (2.4, 0.65), Top((-1.2, -0.64, 0.9, -0.02), 0.82), width=2.4),
+    _fixed(f.trolley, (0.7, 0.45), Top((-0.33, -0.43, 0.33, -0.02), 0.80)),
+    _fixed(f.desk, (1.6, 0.7), Top((-0.05, -0.68, 0.78, -0.02), 0.74)),
+    _fixed(f.bookshelf, (0.9, 0.3), _whole(0.9, 0.3, 1.1), width=0.9, height=1.1, boards=3),
+    _fixed(f.bookshelf, (1.3, 0.3), width=1.3, height=1.9, boards=5),
+    _fixed(f.rack, (1.3, 0.42), width=1.3),
+    _fixed(f.bed, (1.4, 2.05), Top((-0.6, -1.9, 0.6, -0.8), 0.52), width=1.4),
+    _fixed(f.television, (1.6, 0.4), Top((-0.78, -0.39, 0.78, -0.29), 0.45)),
+    _fixed(f.office_chair, (0.5, 0.52), Top((-0.2, -0.48, 0.2, -0.1), 0.51)),
+    _fixed(f.floor_lamp, (0.4, 0.4)),
+    _fixed(f.plant, (0.45, 0.45), height=1.3, seed=5),
+    _fixed(f.basket, (0.44, 0.44)),
+    _fixed(f.washbasin, (0.7, 0.45)),
 )
-IN_THE_MIDDLE: tuple[Maker, ...] = (table, table, round_table, stool, trolley, chair)
+IN_THE_MIDDLE: tuple[Maker, ...] = (table, table, round_table, stool, _chair)

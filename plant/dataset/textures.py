@@ -80,17 +80,6 @@ def _planks(rng: np.random.Generator) -> FloatArray:
     return image
 
 
-def _herringbone(rng: np.random.Generator) -> FloatArray:
-    image = wood(rng, _square(), _wood_colour(rng), 0.06)
-    rows, columns = np.indices(_square())
-    size = int(rng.choice([32, 64]))
-    band = (columns // size) % 2
-    stripe = np.where(band == 0, rows + columns, rows - columns) // (size // 2)
-    tone = 1 + 0.07 * rng.standard_normal(64)
-    edge = np.where(band == 0, rows + columns, rows - columns) % (size // 2) < 1
-    return np.asarray(image * np.where(edge, 0.7, tone[stripe % 64])[..., None])
-
-
 def _tiles(rng: np.random.Generator) -> FloatArray:
     count = int(rng.choice([2, 4, 8]))
     edge = SIZE_PX // count
@@ -113,25 +102,10 @@ def _checker(rng: np.random.Generator) -> FloatArray:
     return image
 
 
-def _carpet(rng: np.random.Generator) -> FloatArray:
-    image = cloth(rng, _square(), _colour(rng, 0.15, 0.8, 0.6), float(rng.uniform(0.08, 0.25)))
-    if rng.random() < 0.4:
-        pattern = noise(rng, _square(), (10, 10)) > 0.7
-        image[pattern] *= np.array(_colour(rng, 0.5, 1.0, 0.6)) * 1.2
-    return image
-
-
 def _concrete(rng: np.random.Generator) -> FloatArray:
     image = speckle(rng, _square(), _colour(rng, 0.3, 0.75, 0.1), float(rng.uniform(0.03, 0.10)))
     stains = np.clip(noise(rng, _square(), (30, 30)) - 1, 0, 1)[..., None]
     return np.asarray(image * (1 - float(rng.uniform(0, 0.35)) * stains))
-
-
-def _terrazzo(rng: np.random.Generator) -> FloatArray:
-    image = speckle(rng, _square(), _colour(rng, 0.5, 0.92, 0.15), 0.02)
-    for _ in range(3):
-        image[noise(rng, _square(), (2.5, 2.5)) > rng.uniform(1.4, 2.2)] = _colour(rng, 0.1, 0.9, 0.5)
-    return image
 
 
 def _plaster(rng: np.random.Generator) -> FloatArray:
@@ -143,21 +117,11 @@ def _wallpaper(rng: np.random.Generator) -> FloatArray:
     rows, columns = np.indices(_square())
     second = np.array(_colour(rng, 0.3, 0.95, 0.5))
     period = int(rng.choice([16, 32, 64]))
-    style = int(rng.integers(4))
-    if style == 0:
+    if rng.random() < 0.5:
         image[columns % period < period // int(rng.integers(2, 6))] = second
-    elif style == 1:
-        image[
-            ((rows % period - period / 2) ** 2 + (columns % period - period / 2) ** 2)
-            < (period * rng.uniform(0.1, 0.3)) ** 2
-        ] = second
-    elif style == 2:
-        image[
-            (np.abs(rows % period - period / 2) + np.abs(columns % period - period / 2))
-            < period * rng.uniform(0.15, 0.4)
-        ] = second
     else:
-        image[noise(rng, _square(), (6, 6)) > 0.9] = second
+        apart = (rows % period - period / 2) ** 2 + (columns % period - period / 2) ** 2
+        image[apart < (period * rng.uniform(0.1, 0.3)) ** 2] = second
     return image
 
 
@@ -177,13 +141,6 @@ def _panels(rng: np.random.Generator) -> FloatArray:
     return np.asarray(np.rot90(_planks(rng)))
 
 
-def _perforated(rng: np.random.Generator) -> FloatArray:
-    image = speckle(rng, _square(), _colour(rng, 0.35, 0.9, 0.3), 0.02)
-    rows, columns = np.indices(_square())
-    image[((rows % 16) < 3) & ((columns % 16) < 3)] *= 0.4
-    return image
-
-
 def _grain(rng: np.random.Generator) -> FloatArray:
     return wood(rng, _square(), _wood_colour(rng), float(rng.uniform(0.03, 0.12)))
 
@@ -196,11 +153,6 @@ def _stone(rng: np.random.Generator) -> FloatArray:
     image = speckle(rng, _square(), _colour(rng, 0.15, 0.9, 0.2), 0.08)
     veins = np.abs(noise(rng, _square(), (14, 14)))[..., None] < 0.06
     return np.asarray(np.where(veins, image * rng.uniform(0.6, 1.5), image))
-
-
-def _metal(rng: np.random.Generator) -> FloatArray:
-    lines = noise(rng, _square(), (0.6, 40))
-    return np.asarray(np.array(_colour(rng, 0.3, 0.8, 0.08)) * (1 + 0.06 * lines)[..., None])
 
 
 def _woven(rng: np.random.Generator) -> FloatArray:
@@ -264,11 +216,11 @@ def _door(rng: np.random.Generator) -> FloatArray:
 
 
 _MAKERS: Mapping[str, tuple[Maker, ...]] = {
-    "floor": (_planks, _herringbone, _tiles, _checker, _carpet, _concrete, _terrazzo, _laminate),
-    "wall": (_plaster, _plaster, _plaster, _wallpaper, _brick, _panels, _tiles, _concrete, _perforated),
-    "ceiling": (_plaster, _plaster, _panels, _concrete, _perforated),
-    "wood": (_grain, _grain, _laminate, _laminate, _stone, _metal),
-    "cloth": (_woven, _woven, _carpet),
+    "floor": (_planks, _tiles, _checker, _woven, _concrete, _laminate),
+    "wall": (_plaster, _plaster, _plaster, _wallpaper, _brick, _panels, _tiles, _concrete),
+    "ceiling": (_plaster, _plaster, _panels, _concrete),
+    "wood": (_grain, _grain, _laminate, _laminate, _stone),
+    "cloth": (_woven,),
     "picture": (_abstract, _landscape, _wallpaper),
     "outside": (_view_outside,),
     "door": (_door,),

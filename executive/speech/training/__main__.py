@@ -21,7 +21,7 @@ def main() -> int:
         from executive.speech.training.learning import Lessons
 
         lessons = Lessons(steps=args.steps)
-        train(Course(args.out, args.folder, lessons, args.sentences, args.seed, args.batch, args.jobs))
+        train(Course(args.out, args.folder, lessons, args.sentences, args.seed, args.batch))
     except InputError as error:
         sys.stderr.write(f"{error}\n")
         return _BAD_INPUT
@@ -34,8 +34,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--folder", type=Path, default=Path("out/speech-training"), help="keeps what was spoken")
     parser.add_argument("--sentences", type=int, default=4500)
     parser.add_argument("--steps", type=int, default=214)
-    parser.add_argument("--batch", type=int, default=6, help="sentences of each process in each step")
-    parser.add_argument("--jobs", type=int, default=2, help="processes, each on one core")
+    parser.add_argument("--batch", type=int, default=12, help="sentences of each step")
     parser.add_argument("--seed", type=int, default=1)
     return parser.parse_args()
 

@@ -1,17 +1,14 @@
-"""A whole training: sentences are spoken, several processes learn together, and the adapter is kept."""
+"""A whole training: sentences are spoken, the network is trained on them, and the adapter is kept."""
 
 from __future__ import annotations
 
 import logging
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import torch
-import torch.distributed
-import torch.multiprocessing
 
 from executive.speech.extra import speech_module
 from executive.speech.model_file import read_model_file
@@ -41,7 +38,7 @@ class Course:
         out: the file of the adapter.
         folder: where the spoken sentences are kept.
         sentences: how many are spoken, and `seed` what is drawn by.
-        jobs: processes, each on one thread, that take each step together with `batch` sentences each.
+        batch: sentences of each step.
         lessons: how they learn.
         kept_every: after how many steps the adapter is written and tried on the validation sentences.
     """
@@ -51,8 +48,7 @@ class Course:
     lessons: Lessons
     sentences: int = 4500
     seed: int = 1
-    batch: int = 6
-    jobs: int = 2
+    batch: int = 12
     kept_every: int = 60
 
 
@@ -64,27 +60,18 @@ def train(course: Course) -> None:
     """
     spoken_sentences(course.folder, course.sentences, course.seed)
     spoken_sentences(course.folder, _VALIDATED, course.seed, validation=True)
-    with tempfile.TemporaryDirectory() as meeting:
-        torch.multiprocessing.spawn(_job, (course, f"file://{meeting}/point"), nprocs=course.jobs)
-
-
-def _job(number: int, course: Course, meeting: str) -> None:
-    """One of the processes; the first one tells and writes."""
-    logging.basicConfig(level=logging.INFO if number == 0 else logging.WARNING, format="%(asctime)s %(message)s")
-    torch.set_num_threads(1)
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s")
     torch.manual_seed(course.seed)
-    torch.distributed.init_process_group("gloo", init_method=meeting, rank=number, world_size=course.jobs)
     model, small = base_weights()
     net = AdaptedWhisper(read_model_file(model.getbuffer()), _RANKS)
     sentences = usual(spoken_sentences(course.folder, course.sentences, course.seed))
-    batches = _batches(sentences, small, course).training(Conditions(), np.random.default_rng([course.seed, number]))
+    batches = _batches(sentences, small, course).training(Conditions(), np.random.default_rng(course.seed))
     kept = spoken_sentences(course.folder, _VALIDATED, course.seed, validation=True)
     validation = _batches(kept, small, course)
     for step in learn(net, batches, course.lessons):
-        if number == 0 and (step % course.kept_every == 0 or step == course.lessons.steps):
+        if step % course.kept_every == 0 or step == course.lessons.steps:
             _LOG.info("step %d: validation %s", step, _validated(net, validation))
             net.adapter().save(course.out, base=BASE_SHA256)
-    torch.distributed.destroy_process_group()
 
 
 def _batches(sentences: Any, small: dict[str, bytes], course: Course) -> Batches:

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from typing import Final
 
 import torch
-import torch.distributed
 import torch.nn.functional as tf
 from torch import Tensor, nn
 
@@ -46,10 +45,7 @@ class Lessons:
 
 
 def learn(net: AdaptedWhisper, batches: Iterator[Batch], lessons: Lessons) -> Iterator[int]:
-    """Learn step by step; yields the number of steps so far.
-
-    Where this is one of several processes of a group, all take each step together, with the mean of their gradients.
-    """
+    """Learn step by step; yields the number of steps so far."""
     learned = [part for part in net.parameters() if part.requires_grad]
     optimiser = torch.optim.AdamW(learned, weight_decay=0.0, betas=(0.9, 0.98))
     for step, batch in enumerate(islice(batches, lessons.steps)):
@@ -58,7 +54,6 @@ def learn(net: AdaptedWhisper, batches: Iterator[Batch], lessons: Lessons) -> It
         optimiser.zero_grad()
         text, likeness = losses(net, batch)
         (text + lessons.likeness * likeness).backward()
-        _share(learned)
         nn.utils.clip_grad_norm_(learned, lessons.most_gradient)
         optimiser.step()
         if step % lessons.told_every == 0:
@@ -88,14 +83,3 @@ def _text(net: AdaptedWhisper, heard: Tensor, batch: Batch, reduction: str) -> T
     states = net.states(heard, batch.prompt, batch.lengths, batch.given)
     counts = batch.wanted != _NO_TOKEN
     return tf.cross_entropy(net.logits(states[counts]), batch.wanted[counts], reduction=reduction)
-
-
-def _share(learned: Sequence[nn.Parameter]) -> None:
-    """The mean of the gradients of all processes of the group."""
-    if not torch.distributed.is_initialized():
-        return
-    together = torch.cat([part.grad.flatten() for part in learned if part.grad is not None])
-    torch.distributed.all_reduce(together)
-    together /= torch.distributed.get_world_size()
-    for part, mean in zip(learned, together.split([part.numel() for part in learned]), strict=True):
-        part.grad = mean.view_as(part)

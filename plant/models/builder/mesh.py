@@ -163,19 +163,6 @@ class Mesh:
         self.add_lathe(material, [(0, 0), (radius, 0), (radius, height)], centre=centre, sides=sides)
         self.add_lathe(cap or material, [(radius, height), (0, height)], centre=centre, sides=sides)
 
-    def add_prism(self, material: str, outline: Sequence[tuple[float, float]], z0: float, z1: float) -> None:
-        """Extrude a convex, counter-clockwise outline (x, y) from z0 to z1."""
-        flat = np.asarray(outline, dtype=float)
-        bottom = np.column_stack([flat, np.full(len(flat), z0)])
-        top = np.column_stack([flat, np.full(len(flat), z1)])
-        for i in range(len(flat)):
-            j = (i + 1) % len(flat)
-            self._add_patch(material, bottom[i], bottom[j] - bottom[i], top[i] - bottom[i], WHOLE)
-        for i in range(1, len(flat) - 1):
-            uv = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]
-            self.add_triangles(material, [top[0], top[i], top[i + 1]], [(0, 0, 1)] * 3, uv)
-            self.add_triangles(material, [bottom[0], bottom[i + 1], bottom[i]], [(0, 0, -1)] * 3, uv)
-
     def add_mesh(self, other: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> None:
         """Add another mesh, turned by the (3, 3) matrix R, then moved by p. R may scale, too."""
         matrix, offset = np.asarray(R, dtype=float), np.asarray(p, dtype=float)

@@ -76,9 +76,3 @@ def arc(centre: tuple[float, float], radius: float, start_deg: float, end_deg: f
     """Points (steps, 2) on a circle."""
     angle = np.radians(np.linspace(start_deg, end_deg, steps))
     return np.asarray(centre) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-
-
-def mirrored(half: ArrayLike) -> FloatArray:
-    """A closed outline from its half above the x axis, which runs from right to left."""
-    upper = np.asarray(half, dtype=float)
-    return np.concatenate([upper, (upper * [1, -1])[::-1]])

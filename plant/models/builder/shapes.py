@@ -94,26 +94,6 @@ class Cylinder(Shape):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Capsule(Shape):
-    """A capsule along its own z axis; `length` is that of the straight part (m)."""
-
-    radius: float
-    length: float
-
-    def sdf(self) -> str:
-        """The SDF `<geometry>` content."""
-        return f"<capsule><radius>{number(self.radius)}</radius><length>{number(self.length)}</length></capsule>"
-
-    def volume(self) -> float:
-        """Volume in cubic metres."""
-        return float(np.pi * self.radius**2 * (self.length + 4.0 / 3.0 * self.radius))
-
-    def unit_inertia(self) -> Vector:
-        """Principal moments about the centre per kilogram (m^2), in the shape's own axes."""
-        return Cylinder(radius=self.radius, length=self.length + 4.0 / 3.0 * self.radius).unit_inertia()
-
-
-@dataclass(frozen=True, kw_only=True)
 class Sphere(Shape):
     """A sphere (m)."""
 

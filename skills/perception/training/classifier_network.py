@@ -28,26 +28,12 @@ class ClassifierNetwork(CropNetwork):
     """A crop network that says at first what stands before it says."""
 
     def __init__(self, classes: int) -> None:
-        super().__init__()
-        self.classes = classes
+        known = _SQUEEZED_16 * _CELLS_16 * _CELLS_16 + _SQUEEZED_32 * _CELLS_32 * _CELLS_32 + classes + 4
+        super().__init__(classes, known, _JOINED, AT_8)
         self.backbone = LiteBackbone()
-        self.place = nn.Conv2d(1, AT_8, 1, bias=False)
         self.squeeze16 = ConvUnit(AT_16, _SQUEEZED_16)
         self.squeeze32 = ConvUnit(AT_32, _SQUEEZED_32)
-        known = _SQUEEZED_16 * _CELLS_16 * _CELLS_16 + _SQUEEZED_32 * _CELLS_32 * _CELLS_32 + classes + 4
-        self.join = nn.Sequential(
-            nn.Linear(known, _JOINED, bias=False),
-            nn.BatchNorm1d(_JOINED, eps=1e-3, momentum=0.03),
-            nn.ReLU(),
-            nn.Dropout(0.1),
-        )
-        self.scores = nn.Linear(_JOINED, classes)
-        self.sides = nn.Linear(_JOINED, 4)
         self.trust = nn.Parameter(torch.ones(classes))
-        for last in (self.scores, self.sides):
-            nn.init.zeros_(last.weight)
-            nn.init.zeros_(last.bias)
-        nn.init.zeros_(self.place.weight)
 
     @property
     def early_layers(self) -> LiteBackbone:

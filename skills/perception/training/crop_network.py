@@ -20,8 +20,23 @@ _CELLS_8: Final = CROP_PX // 8
 class CropNetwork(nn.Module):
     """Crops (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them and logits before (N, K) to logits and better boxes."""
 
-    classes: int
-    scores: nn.Linear
+    def __init__(self, classes: int, known: int, joined: int, at8: int) -> None:
+        """So many numbers `known` are joined to `joined`; `at8` are the channels at stride 8."""
+        super().__init__()
+        self.classes = classes
+        self.place = nn.Conv2d(1, at8, 1, bias=False)
+        self.join = nn.Sequential(
+            nn.Linear(known, joined, bias=False),
+            nn.BatchNorm1d(joined, eps=1e-3, momentum=0.03),
+            nn.ReLU(),
+            nn.Dropout(0.1),
+        )
+        self.scores = nn.Linear(joined, classes)
+        self.sides = nn.Linear(joined, 4)
+        for last in (self.scores, self.sides):
+            nn.init.zeros_(last.weight)
+            nn.init.zeros_(last.bias)
+        nn.init.zeros_(self.place.weight)
 
     @property
     def early_layers(self) -> EarlyLayers:

@@ -162,8 +162,8 @@ def _between_convolutions(graph: onnx.GraphProto) -> list[str]:
     others.
     """
     convolutions = [node for node in graph.node if node.op_type == "Conv"]
-    before = _upstream(graph, convolutions)
-    after = _downstream(graph, convolutions[_last_opening(convolutions) :])
+    before = _reached(graph, convolutions, upstream=True)
+    after = _reached(graph, convolutions[_last_opening(convolutions) :], upstream=False)
     return [node.name for node in graph.node if node.op_type in _KINDS and node.name in before & after]
 
 
@@ -178,23 +178,14 @@ def _groups(convolution: onnx.NodeProto) -> int:
     return next((int(told.i) for told in convolution.attribute if told.name == "group"), 1)
 
 
-def _upstream(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto]) -> set[str]:
-    """Names of all nodes from which some nodes take something, over others too."""
-    wanted, found = {name for node in nodes for name in node.input}, set[str]()
-    for node in reversed(graph.node):
-        if wanted.intersection(node.output):
+def _reached(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto], *, upstream: bool) -> set[str]:
+    """Names of all nodes before some nodes, or after them."""
+    names, found = {name for node in nodes for name in (node.input if upstream else node.output)}, set[str]()
+    for node in reversed(graph.node) if upstream else graph.node:
+        here, beyond = (node.output, node.input) if upstream else (node.input, node.output)
+        if names.intersection(here):
             found.add(node.name)
-            wanted.update(node.input)
-    return found
-
-
-def _downstream(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto]) -> set[str]:
-    """Names of all nodes that take something from some nodes, over others too."""
-    made, found = {name for node in nodes for name in node.output}, set[str]()
-    for node in graph.node:
-        if made.intersection(node.input):
-            found.add(node.name)
-            made.update(node.output)
+            names.update(beyond)
     return found
 
 

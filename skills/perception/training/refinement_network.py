@@ -28,26 +28,13 @@ class RefinementNetwork(CropNetwork):
     """A crop network that begins with the proposal network's weights."""
 
     def __init__(self, classes: int, widths: Widths = _WIDTHS) -> None:
-        super().__init__()
-        self.classes = classes
+        known = _SQUEEZED * _CELLS_32 * _CELLS_32 + 2 * (classes + 4)
+        super().__init__(classes, known, _JOINED, widths.levels[0])
         self.detector = DetectorNetwork(classes, widths)
-        self.place = nn.Conv2d(1, widths.levels[0], 1, bias=False)
         self.squeeze = ConvUnit(widths.neck[2], _SQUEEZED)
-        self.join = nn.Sequential(
-            nn.Linear(_SQUEEZED * _CELLS_32 * _CELLS_32 + 2 * (classes + 4), _JOINED, bias=False),
-            nn.BatchNorm1d(_JOINED, eps=1e-3, momentum=0.03),
-            nn.ReLU(),
-            nn.Dropout(0.1),
-        )
-        self.scores = nn.Linear(_JOINED, classes)
-        self.sides = nn.Linear(_JOINED, 4)
         self.trust_first = nn.Parameter(torch.full((classes,), 0.5))
         self.trust_seen = nn.Parameter(torch.full((classes,), 0.5))
         self.nearer = nn.Parameter(torch.full((4,), 0.5))
-        for last in (self.scores, self.sides):
-            nn.init.zeros_(last.weight)
-            nn.init.zeros_(last.bias)
-        nn.init.zeros_(self.place.weight)
 
     @property
     def early_layers(self) -> Backbone:

@@ -45,11 +45,7 @@ def add_ball(mesh: Mesh) -> None:
     mesh.add_lathe("red", [(float(np.cos(a)), float(np.sin(a))) for a in angle])
 
 
-def add_prism(mesh: Mesh) -> None:
-    mesh.add_prism("red", [(1, 0), (0, 1), (-1, 0), (0, -1)], -1, 1)
-
-
-@pytest.mark.parametrize("add", [add_box, add_ball, add_prism])
+@pytest.mark.parametrize("add", [add_box, add_ball])
 def test_closed_shapes_look_outward(add: object) -> None:
     mesh = Mesh(MATERIALS)
     assert callable(add)

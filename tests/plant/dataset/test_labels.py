@@ -73,7 +73,7 @@ def test_what_stands_before_a_thing_takes_from_its_visibility(
 ) -> None:
     cube, cylinder = cubes
     behind = Placed(cube, RigidTransform([0.0, 0.3, cube.size_m[2] / 2]))
-    before = Placed(cylinder, RigidTransform([cube.size_m[0] / 2, 0.3 - cube.size_m[1], cylinder.size_m[2] / 2]))
+    before = Placed(cylinder, RigidTransform([cube.size_m[0] / 4, 0.3 - cube.size_m[1], cylinder.size_m[2] / 2]))
     found = {str(entry["instance"]): entry for entry in labels_of((behind, before), tmp_path)}
     assert found["cylinder_002"]["visibility"] > 0.97  # type: ignore[operator]
     assert 0.1 < found["cube_000"]["visibility"] < 0.9  # type: ignore[operator]

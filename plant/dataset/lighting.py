@@ -16,7 +16,7 @@ _PHYSICAL_GAIN = 2.5
 
 @dataclass(frozen=True)
 class Lighting:
-    """The renderer's parameters, and whether looks come from the glTF files (physical) or from OBJ."""
+    """The renderer's parameters, and whether the appearance comes from the glTF files (physical) or from OBJ."""
 
     style: str
     parameters: RenderEngineVtkParams

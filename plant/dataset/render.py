@@ -143,13 +143,13 @@ class Stage:
     def _add(
         self, frame: FrameId, shape: Shape, X_FG: RigidTransform, label: int = _BACKGROUND, colour: Rgba | None = None
     ) -> None:
-        looks = GeometryInstance(X_FG, shape, f"g{self._graph.model_inspector().num_geometries()}")
+        appearance = GeometryInstance(X_FG, shape, f"g{self._graph.model_inspector().num_geometries()}")
         properties = PerceptionProperties()
         properties.AddProperty("label", "id", RenderLabel(label))
         if colour is not None:
             properties.AddProperty("phong", "diffuse", colour)
-        looks.set_perception_properties(properties)
-        self._graph.RegisterGeometry(self._source, frame, looks)
+        appearance.set_perception_properties(properties)
+        self._graph.RegisterGeometry(self._source, frame, appearance)
 
     def hand_pose(self, view: View) -> RigidTransform:
         """Where the hand is: about the camera when it is in view, else far away."""

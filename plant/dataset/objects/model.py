@@ -66,12 +66,12 @@ class ObjectModel:
 
     @property
     def obj_path(self) -> Path:
-        """The looks as OBJ, for rendering with plain shading."""
+        """The visual geometry as OBJ, for rendering with plain shading."""
         return self.folder / f"{self.category}.obj"
 
     @property
     def gltf_path(self) -> Path:
-        """The looks as glTF, for rendering with physical shading."""
+        """The visual geometry as glTF, for rendering with physical shading."""
         return self.folder / f"{self.category}.gltf"
 
     @property

@@ -42,11 +42,11 @@ def _cell(model: ObjectModel, size: tuple[int, int]) -> Picture:
     params = RenderEngineVtkParams(default_clear_color=np.array([0.86, 0.87, 0.88]), lights=lights())
     scene.AddRenderer("vtk", MakeRenderEngineVtk(params))
     source = scene.RegisterSource("sheet")
-    looks = GeometryInstance(RigidTransform(), Mesh(str(model.obj_path), np.ones(3)), model.name)
+    appearance = GeometryInstance(RigidTransform(), Mesh(str(model.obj_path), np.ones(3)), model.name)
     properties = PerceptionProperties()
     properties.AddProperty("label", "id", RenderLabel(1))
-    looks.set_perception_properties(properties)
-    scene.RegisterAnchoredGeometry(source, looks)
+    appearance.set_perception_properties(properties)
+    scene.RegisterAnchoredGeometry(source, appearance)
     points = model.surface.points
     middle = (points.max(axis=0) + points.min(axis=0)) / 2
     radius = float(np.linalg.norm(points - middle, axis=1).max())

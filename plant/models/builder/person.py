@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plant.models.builder.looks import Looks
+from plant.models.builder.appearance import Appearance
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.pictures import cloth, to_picture
 from plant.models.builder.sdf import Model
@@ -35,8 +35,8 @@ def person() -> Model:
     return Model("person", "person.obj", [*legs, *feet, torso, *arms, head], comment="a standing person, welded")
 
 
-def person_looks() -> Looks:
-    """Looks: sweater, trousers, shoes, head with hair and face."""
+def person_appearance() -> Appearance:
+    """Appearance: sweater, trousers, shoes, head with hair and face."""
     mesh = Mesh(MATERIALS)
     _torso(mesh)
     for side in (-1, 1):
@@ -44,7 +44,7 @@ def person_looks() -> Looks:
         _arm(mesh, side)
     _head(mesh)
     knit = cloth(np.random.default_rng(21), (96, 96), (0.97, 0.97, 0.97), 0.04)
-    return Looks(mesh, {"knit.png": to_picture(knit)})
+    return Appearance(mesh, {"knit.png": to_picture(knit)})
 
 
 def _torso(mesh: Mesh) -> None:

@@ -10,7 +10,7 @@ from plant.models.builder.shapes import MassProperties, Shape, number
 
 @dataclass(frozen=True)
 class Model:
-    """One rigid body: its looks (a mesh file beside the SDF), collision shapes, mass and friction.
+    """One rigid body: its visual geometry (a mesh file beside the SDF), collision shapes, mass and friction.
 
     A model without mass properties is meant to be welded to the world; it gets a token mass.
     """

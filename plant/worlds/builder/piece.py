@@ -1,4 +1,4 @@
-"""A piece of furniture: looks and the primitive shapes that are solid about it.
+"""A piece of furniture: visual geometry and the primitive shapes that are solid about it.
 
 Its frame: the origin lies on the floor in the middle of its back; x to the right for one who stands before it and
 looks at it, y into the wall, z up. So its front is at negative y.

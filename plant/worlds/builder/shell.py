@@ -56,7 +56,7 @@ def _box(wall: Wall, a: float, b: float, z0: float, z1: float) -> Box:
 
 
 def shell_mesh(materials: Mapping[str, Material]) -> Mesh:
-    """The looks of the shell."""
+    """The visual geometry of the shell."""
     mesh = Mesh(materials)
     for one in ROOMS:
         r = one.inside

@@ -1,4 +1,4 @@
-"""Looks of the loose things: textured meshes and the pictures on them."""
+"""Appearance of the loose objects: textured meshes and the pictures on them."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ LABEL_SHAPE = (192, 384)
 
 
 @dataclass(frozen=True)
-class Looks:
+class Appearance:
     """A mesh in the frame of its model and the pictures that its materials name."""
 
     mesh: Mesh
     pictures: dict[str, Picture] = field(default_factory=dict)
 
 
-def coke_looks() -> Looks:
+def coke_appearance() -> Appearance:
     """A red can with a white wave and a silver lid."""
     mesh = Mesh(
         {
@@ -42,7 +42,7 @@ def coke_looks() -> Looks:
     mesh.add_lathe("rim", [(r - 0.0005, top - 0.011), (0.0275, top - 0.001), (0.0270, top), (0.0258, top)])
     mesh.add_lathe("lid", [(0.0258, top), (0.0250, top - 0.003), (0, top - 0.003)])
     mesh.add_box("tab", (-0.004, -0.008, top - 0.003), (0.016, 0.008, top - 0.0015))
-    return Looks(mesh, {"label.png": to_picture(_can_label())})
+    return Appearance(mesh, {"label.png": to_picture(_can_label())})
 
 
 def _can_label() -> FloatArray:
@@ -64,7 +64,7 @@ def _lettering(text: str, corner: tuple[int, int], font: int, thick: int) -> NDA
     return np.asarray(canvas > 127)
 
 
-def beer_looks() -> Looks:
+def beer_appearance() -> Appearance:
     """A green bottle with a cream label, a collar and a crown cap."""
     mesh = Mesh(
         {
@@ -84,7 +84,7 @@ def beer_looks() -> Looks:
     mesh.add_lathe("glass_light", [(neck, b + 0.205), (neck, b + 0.218)])
     cap = [(neck, 0.218), (0.0148, 0.2185), (0.0135, 0.228), (0.012, 0.23), (0, 0.23)]
     mesh.add_lathe("cap", [(radius, b + z) for radius, z in cap])
-    return Looks(mesh, {"label.png": to_picture(_bottle_label())})
+    return Appearance(mesh, {"label.png": to_picture(_bottle_label())})
 
 
 def _bottle_label() -> FloatArray:
@@ -99,7 +99,7 @@ def _bottle_label() -> FloatArray:
     return np.asarray(image)
 
 
-def cube_looks() -> Looks:
+def cube_appearance() -> Appearance:
     """A cube of blue painted wood with worn edges."""
     mesh = Mesh({"paint": Material(texture="paint.png")})
     half = o.CUBE_M / 2
@@ -110,10 +110,10 @@ def cube_looks() -> Looks:
     to_edge = np.minimum.reduce([rows, columns, 127 - rows, 127 - columns])
     worn = to_edge < 3 + noise(rng, (128, 128), (4, 4))
     image[worn] = image[worn] * 0.6 + np.array([0.12, 0.18, 0.32])
-    return Looks(mesh, {"paint.png": to_picture(image)})
+    return Appearance(mesh, {"paint.png": to_picture(image)})
 
 
-def hammer_looks() -> Looks:
+def hammer_appearance() -> Appearance:
     """A claw hammer: ash handle, dark steel head."""
     mesh = Mesh(
         {
@@ -135,7 +135,7 @@ def hammer_looks() -> Looks:
     for sign in (-1, 1):
         mesh.add_mesh(_claw(mesh, sign), p=(head_x, 0, 0))
     image = wood(np.random.default_rng(12), (96, 240), (0.83, 0.60, 0.30), 0.07)
-    return Looks(mesh, {"ash.png": to_picture(image)})
+    return Appearance(mesh, {"ash.png": to_picture(image)})
 
 
 def _handle_parts(half: float, head_x: float) -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:

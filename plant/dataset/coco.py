@@ -46,8 +46,8 @@ def annotation(
 ) -> dict[str, Any] | None:
     """One label without ids, or None when next to nothing is seen.
 
-    `visibility` is the share seen of what the thing alone would show in the picture, `truncation` the share of the
-    thing beyond the picture's edge. Too little seen, too small, all over the picture, without an outline, or
+    `visibility` is the share seen of what the object alone would show in the picture, `truncation` the share of the
+    object beyond the picture's edge. Too little seen, too small, all over the picture, without an outline, or
     `unseeable` for other reasons: `ignore` is 1, and `iscrowd`, by which COCO's tools pass over it.
     """
     area = int(mask.sum())
@@ -74,7 +74,7 @@ def annotation(
 
 
 def lost_in_the_dark(picture: NDArray[np.uint8], mask: Mask) -> bool:
-    """Whether nobody could see the thing of a mask in the picture, (H, W) or (H, W, 3): all black."""
+    """Whether nobody could see the object of a mask in the picture, (H, W) or (H, W, 3): all black."""
     seen = picture[mask].astype(np.float32)
     return bool(seen.mean() < DARKEST_MEAN and seen.std() < DARKEST_SPREAD)
 

@@ -1,4 +1,4 @@
-"""Puts a scene together: a room, things of the classes and others on its supports and floor, and people."""
+"""Puts a scene together: a room, objects of the classes and others on its supports and floor, and people."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from plant.worlds.placement import polygon_distance
 from skills.robot import FloatArray
 
 SELDOM_BY_CHANCE = ("person", "extinguisher")
-"""What stands apart from the clutter, and so is seldom in the views of other things."""
+"""What stands apart from the clutter, and so is seldom in the views of other objects."""
 CLASSES_PER_SCENE = 7
 CROWDED_SHARE, MOST_ROUNDS = 0.65, 4
 ONLY_DISTRACTORS_EVERY = 10
@@ -29,7 +29,7 @@ TOGETHER_SHARE, SPREAD_M = 0.6, 0.22
 
 @dataclass(frozen=True)
 class Placed:
-    """A thing in the room; `X_WO` is its pose. Distractors have class id 0."""
+    """An object in the room; `X_WO` is its pose. Distractors have class id 0."""
 
     model: ObjectModel
     X_WO: RigidTransform
@@ -37,7 +37,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Held:
-    """A thing between the robot's jaws: its pose in the hand's frame, and the jaw's opening (rad)."""
+    """An object between the robot's jaws: its pose in the hand's frame, and the jaw's opening (rad)."""
 
     model: ObjectModel
     X_HO: RigidTransform
@@ -51,7 +51,7 @@ class Scene:
     """
 
     room: Room
-    things: tuple[Placed, ...]
+    objects: tuple[Placed, ...]
     held: Held | None
     seats: tuple[tuple[float, float, float, float], ...]
     crowded: bool = False
@@ -75,7 +75,7 @@ def compose(rng: np.random.Generator, index: int, *, for_training: bool) -> Scen
     held = None
     if rng.random() < 0.3:
         held = _hold(rng, others[0] if bare else None, for_training=for_training)
-    return Scene(room, tuple(table.things), held, tuple(table.seats), rounds > 1)
+    return Scene(room, tuple(table.objects), held, tuple(table.seats), rounds > 1)
 
 
 def _class_models(rng: np.random.Generator, rounds: int, *, for_training: bool) -> list[ObjectModel]:
@@ -92,7 +92,7 @@ def _any_instance(rng: np.random.Generator, category: str, for_training: bool) -
 
 
 def _hold(rng: np.random.Generator, other: ObjectModel | None, *, for_training: bool) -> Held | None:
-    """A thing that fits between the jaws, its long side across them."""
+    """An object that fits between the jaws, its long side across them."""
     categories = [name for name in CLASSES if name not in SELDOM_BY_CHANCE]
     model = other or _any_instance(rng, str(rng.choice(categories)), for_training)
     size = np.array(model.size_m)
@@ -113,11 +113,11 @@ class _Table:
     def __init__(self, room: Room, rng: np.random.Generator, *, toppled: bool) -> None:
         self._room, self._rng, self._toppled = room, rng, toppled
         self._taken: list[tuple[float, FloatArray]] = []
-        self.things: list[Placed] = []
+        self.objects: list[Placed] = []
         self.seats: list[tuple[float, float, float, float]] = []
 
     def place(self, model: ObjectModel, supports: Sequence[Support]) -> None:
-        """Put a thing on a support or on the floor where it fits; leave it away when it fits nowhere."""
+        """Put an object on a support or on the floor where it fits; leave it away when it fits nowhere."""
         pose = choose(self._rng, model, resting_poses(model), toppled=self._toppled)
         points = model.surface.points @ pose.R.T
         outline = points[ConvexHull(points[:, :2]).vertices, :2]
@@ -159,7 +159,7 @@ class _Table:
         return (float(x), float(y), support.height_m, yaw)
 
     def _neighbour(self, height_m: float) -> FloatArray | None:
-        """Now and then a thing on the same level, to be put beside: clutter gathers."""
+        """Now and then an object on the same level, to be put beside: clutter gathers."""
         level = [outline for z, outline in self._taken if abs(z - height_m) < 0.01]
         if not level or self._rng.random() > TOGETHER_SHARE:
             return None
@@ -192,7 +192,7 @@ class _Table:
         whole = np.eye(3)
         whole[:2, :2] = _turn(yaw)
         turn = RotationMatrix.ProjectToRotationMatrix(whole @ R)
-        self.things.append(Placed(model, RigidTransform(turn, [x, y, z + height])))
+        self.objects.append(Placed(model, RigidTransform(turn, [x, y, z + height])))
         self._taken.append((z, outline))
         if model.kind == "sitting":
             self.seats.append((x, y, yaw, float(np.clip(_seat_height(model), 0.3, 0.6))))

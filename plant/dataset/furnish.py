@@ -22,7 +22,7 @@ _CLOTHS = ("cloth_grey", "cloth_sand", "cloth_slate", "cloth_white")
 
 @dataclass(frozen=True)
 class Top:
-    """Where things may lie in a piece's frame: (x0, y0, x1, y1) in metres, its height and the free height above."""
+    """Where objects may lie in a piece's frame: (x0, y0, x1, y1) in metres, its height and the free height above."""
 
     rect: Rect
     height_m: float
@@ -101,7 +101,7 @@ def cabinet(rng: np.random.Generator, m: Materials) -> Furnished:
 
 
 def shelf(rng: np.random.Generator, m: Materials) -> Furnished:
-    """Open shelves on which things stand."""
+    """Open shelves on which objects stand."""
     w, d, h, boards = _of(rng, 0.6, 1.4), _of(rng, 0.26, 0.45), _of(rng, 0.8, 1.9), int(rng.integers(2, 5))
     piece, material, side = Piece(m), str(rng.choice(_BODIES)), 0.025
     for x in (-w / 2, w / 2 - side):
@@ -117,7 +117,7 @@ def shelf(rng: np.random.Generator, m: Materials) -> Furnished:
 
 
 def stool(rng: np.random.Generator, m: Materials) -> Furnished:
-    """A stool, a box or a crate to put things on."""
+    """A stool, a box or a crate to put objects on."""
     w, h, piece = _of(rng, 0.3, 0.5), _of(rng, 0.3, 0.65), Piece(m)
     material = str(rng.choice(_TOPS))
     if rng.random() < 0.5:

@@ -1,4 +1,4 @@
-"""The robot's hand as its own camera sees it: simple jaws by the robot's own figures, with or without a thing."""
+"""The robot's hand as its own camera sees it: simple jaws by the robot's own figures, with or without an object."""
 
 from __future__ import annotations
 

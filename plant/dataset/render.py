@@ -85,10 +85,10 @@ def render_scene(seed: int, index: int) -> list[Shot]:
 
 
 def _views(rng: np.random.Generator, scene: Scene, count: int) -> list[View]:
-    """So many views: the things of the classes take turns; where there is none, others do."""
+    """So many views: the objects of the classes take turns; where there is none, others do."""
     specs = camera_specs()
-    things = [thing for thing in scene.things if thing.model.class_id] or list(scene.things)
-    turns = [thing for thing in things for _ in range(2 if thing.model.category in SELDOM_BY_CHANCE else 1)]
+    objects = [thing for thing in scene.objects if thing.model.class_id] or list(scene.objects)
+    turns = [thing for thing in objects for _ in range(2 if thing.model.category in SELDOM_BY_CHANCE else 1)]
     order = [turns[k] for k in rng.permutation(len(turns))]
     views: list[View] = []
     for attempt in range(3 * count):
@@ -116,7 +116,7 @@ class Stage:
         self._add(
             self._world, _mesh_file(folder, "room", scene.room.mesh, scene.room, self._physical), RigidTransform()
         )
-        for thing in scene.things:
+        for thing in scene.objects:
             self._add_thing(self._world, thing.model, thing.X_WO, in_hand=False)
         self._add_seats(scene)
         opening = _jaw_for(scene.held) if scene.held else opening_rad
@@ -169,7 +169,7 @@ class Stage:
 
 
 def _jaw_for(held: Held) -> float:
-    """The angle at which the finger about touches the thing."""
+    """The angle at which the finger about touches the object."""
     thick = float(np.sort(held.model.size_m)[0])
     return float(np.clip(thick / 0.10, 0.05, 1.2))
 
@@ -238,7 +238,7 @@ def label_view(
     X_WH: RigidTransform,
     picture: Picture,
 ) -> list[dict[str, Any]]:
-    """Labels of all things of the classes that show: masks from the label image, what they hide from silhouettes."""
+    """Labels of all objects of the classes that show: masks from the label image, what they hide from silhouettes."""
     found, X_CW = [], view.X_WC.inverse()
     for label in sorted(set(np.unique(labels).tolist()) & set(labelled)):
         model, X_FO, in_hand = labelled[label]
@@ -261,9 +261,9 @@ def label_view(
 
 
 def _opened_by_camera(points_C: NDArray[np.float64]) -> bool:
-    """Whether the camera, or what is nearer to it than it shows, is within the box of a thing's points (N, 3).
+    """Whether the camera, or what is nearer to it than it shows, is within the box of an object's points (N, 3).
 
-    Then the picture shows what is behind the thing, and the label image its inside.
+    Then the picture shows what is behind the object, and the label image its inside.
     """
     return bool(np.all(points_C.min(axis=0) < (0.0, 0.0, NEAR_M)) and np.all(points_C.max(axis=0) > 0.0))
 

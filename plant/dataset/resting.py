@@ -1,4 +1,4 @@
-"""How a thing rests on a plane: the stable faces of its convex hull."""
+"""How an object rests on a plane: the stable faces of its convex hull."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from skills.robot import FloatArray
 LEAST_MARGIN = 0.05
 _UPRIGHT = {"person": 1.0, "extinguisher": 0.9, "beer": 0.7, "coke": 0.72, "cylinder": 0.6}
 TOPPLED_SHARE: Final = 0.75
-"""How much more seldom things stand in pictures to learn from than is usual."""
+"""How much more seldom objects stand in pictures to learn from than is usual."""
 
 
 @dataclass(frozen=True)
 class Resting:
-    """A turn that lays the thing on a plane, the height of its origin over it, and how easily it stays (0..1).
+    """A turn that lays the object on a plane, the height of its origin over it, and how easily it stays (0..1).
 
     `upright` tells whether the model's own z axis points up.
     """
@@ -72,7 +72,7 @@ def _faces_below(hull: ConvexHull, com: FloatArray) -> list[tuple[FloatArray, fl
 
 
 def _margin(points: FloatArray, hull: ConvexHull, normal: FloatArray, offset: float, com: FloatArray) -> float:
-    """Tangent of the least tilt that topples the thing off a face; negative when it falls by itself."""
+    """Tangent of the least tilt that topples the object off a face; negative when it falls by itself."""
     corners = points[hull.vertices]
     touching = corners[corners @ normal > offset - 4e-4]
     height = offset - float(com @ normal)
@@ -96,7 +96,7 @@ def _to_down(normal: FloatArray) -> FloatArray:
 
 
 def choose(rng: np.random.Generator, model: ObjectModel, poses: Sequence[Resting], *, toppled: bool = False) -> Resting:
-    """One of the poses: upright as often as is usual for such things, else by how easily they stay.
+    """One of the poses: upright as often as is usual for such objects, else by how easily they stay.
 
     `toppled`: what usually stands lies more often than that, but people, so that it is learnt that way, too.
     """

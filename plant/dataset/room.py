@@ -25,7 +25,7 @@ _HANGINGS = (
 
 @dataclass(frozen=True)
 class Support:
-    """A rectangle on which things rest: its middle, half sizes, turn (rad), height and free height above (m)."""
+    """A rectangle on which objects rest: its middle, half sizes, turn (rad), height and free height above (m)."""
 
     centre: tuple[float, float]
     half: tuple[float, float]

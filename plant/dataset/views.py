@@ -1,4 +1,4 @@
-"""Where the robot's cameras are when they see a thing: hand and body cameras, heights, tilts, distances."""
+"""Where the robot's cameras are when they see an object: hand and body cameras, heights, tilts, distances."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def roll_deg(X_WC: RigidTransform) -> float:
 
 
 def view_of(rng: np.random.Generator, room: Room, thing: Placed, specs: Mapping[str, CameraSpec]) -> View | None:
-    """A view in which the thing stands somewhere in the picture, or None when none was found."""
+    """A view in which the object stands somewhere in the picture, or None when none was found."""
     in_body = rng.random() < BODY_SHARE
     for _ in range(TRIES):
         view = _body_view(rng, room, thing, specs) if in_body else _hand_view(rng, room, thing, specs["hand"])
@@ -77,7 +77,7 @@ def hand_view(rng: np.random.Generator, view: View) -> View:
 
 
 def _aim(thing: Placed) -> FloatArray:
-    """The middle of a thing; of a person a point of the upper body."""
+    """The middle of an object; of a person a point of the upper body."""
     points = thing.model.surface.points
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     if thing.model.category == "person":
@@ -86,7 +86,7 @@ def _aim(thing: Placed) -> FloatArray:
 
 
 def distance_to(rng: np.random.Generator, thing: Placed, focal: float) -> float:
-    """Evenly in its logarithm, from where the thing fills the picture to where it is but some pixels long."""
+    """Evenly in its logarithm, from where the object fills the picture to where it is but some pixels long."""
     size = float(max(thing.model.size_m))
     near = max(NEAREST_M, 0.55 * size)
     far = min(FARTHEST_M, focal * size / LEAST_PIXELS)
@@ -100,7 +100,7 @@ def _varied(rng: np.random.Generator, camera: Intrinsics) -> Intrinsics:
 
 
 def eye_about(rng: np.random.Generator, thing: Placed, aim: FloatArray, focal: float) -> FloatArray:
-    """A place (3,) of the hand camera to see a thing at `aim` from: mostly from above, people from about level."""
+    """A place (3,) of the hand camera to see an object at `aim` from: mostly from above, people from about level."""
     distance, around = distance_to(rng, thing, focal), float(rng.uniform(0, 2 * np.pi))
     above = float(np.radians(rng.uniform(-5, 75) if thing.model.category != "person" else rng.uniform(-25, 25)))
     direction = np.array([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)])
@@ -125,7 +125,7 @@ def off_centre(rng: np.random.Generator, X_WC: RigidTransform, camera: Intrinsic
 
 
 def _body_view(rng: np.random.Generator, room: Room, thing: Placed, specs: Mapping[str, CameraSpec]) -> View | None:
-    """The robot stands on the floor, turned so that one of its body cameras looks about towards the thing."""
+    """The robot stands on the floor, turned so that one of its body cameras looks about towards the object."""
     spec = specs[str(rng.choice([name for name in specs if name != "hand"]))]
     shrink = 1 if rng.random() < FULL_SIZE_SHARE else spec.picture_shrink
     camera = _varied(rng, spec.model_copy(update={"picture_shrink": shrink}).intrinsics())

@@ -60,7 +60,7 @@ HEIGHTS_M = (0.35, 1.05)
 
 @dataclass(frozen=True)
 class Asked:
-    """One question and what came of it; `off_m` is how far from the true middle the thing was said to be."""
+    """One question and what came of it; `off_m` is how far from the true middle the object was said to be."""
 
     world: str
     placement: int
@@ -76,7 +76,7 @@ class Asked:
 def ask(
     bench: SkillBench, surface: Surface, name: str, places: Sequence[NDArray[np.float64]]
 ) -> tuple[bool, float | None, str]:
-    """Whether a thing of a class is claimed to be there, how far off the nearest true place, and what was said."""
+    """Whether an object of a class is claimed to be there, how far off the nearest true place, and what was said."""
     run = bench.run(Detect, DetectInputs((name,), (surface,)))
     if run.outcome != "success":
         return False, None, run.message
@@ -88,7 +88,7 @@ def ask(
 def asked(
     world: str, number: int, bench: SkillBench, surface: Surface, name: str, places: Sequence[NDArray[np.float64]]
 ) -> Asked:
-    """Ask for a class whose things stand at some places, none where it is absent."""
+    """Ask for a class whose objects stand at some places, none where it is absent."""
     begun = time.perf_counter()
     claimed, off, message = ask(bench, surface, name, places)
     right = (
@@ -98,13 +98,13 @@ def asked(
 
 
 def middle(placed: Placed) -> NDArray[np.float64]:
-    """The middle of a thing's bounding box in the world."""
+    """The middle of an object's bounding box in the world."""
     points = placed.model.surface.points
     return np.asarray(placed.X_WO @ (0.5 * (points.min(axis=0) + points.max(axis=0))))
 
 
 def in_flat(seed: int, number: int) -> Iterator[Asked]:
-    """One placement in the flat: two classes and three other things on one surface."""
+    """One placement in the flat: two classes and three other objects on one surface."""
     rng = np.random.default_rng([seed, number, 11])
     world = open_world("flat")
     facts = knowledge_of(world).surfaces
@@ -115,8 +115,8 @@ def in_flat(seed: int, number: int) -> Iterator[Asked]:
     classes = [str(each) for each in rng.permutation(LYING_ABOUT)]
     there, absent = classes[:2], classes[2]
     models = [held_out_instance(rng, each) for each in (*there, *rng.choice(DISTRACTORS, 3))]
-    things = list(scattered(rng, models, surface, pose))
-    loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(things)]
+    objects = list(scattered(rng, models, surface, pose))
+    loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(objects)]
     built = build_diagram(
         directives=world.directives_path,
         models=loose,
@@ -134,7 +134,7 @@ def in_flat(seed: int, number: int) -> Iterator[Asked]:
         seed=number,
     )
     for each in there:
-        places = [middle(thing) for thing in things if thing.model.category == each]
+        places = [middle(thing) for thing in objects if thing.model.category == each]
         if places:
             yield asked("flat", number, bench, surface, each, places)
     yield asked("flat", number, bench, surface, absent, [])
@@ -147,7 +147,7 @@ def held_out_instance(rng: np.random.Generator, category: str) -> ObjectModel:
 def scattered(
     rng: np.random.Generator, models: Sequence[ObjectModel], surface: Surface, pose: Pose2D
 ) -> Iterator[Placed]:
-    """Things laid on a surface where they fit, clear of each other and not too far from the robot."""
+    """Objects laid on a surface where they fit, clear of each other and not too far from the robot."""
     corners = np.asarray(surface.polygon_W)
     taken: list[tuple[NDArray[np.float64], float]] = []
     for model in models:
@@ -211,7 +211,7 @@ def in_room(seed: int, index: int, number: int, detector: Detector) -> Iterator[
     chosen = next((each for each in _choices(rng, scene)), None)
     if chosen is None:
         return
-    surface, pose, things = chosen
+    surface, pose, objects = chosen
     with tempfile.TemporaryDirectory(prefix="errand-scene-") as folder:
         stage = DepthStage(replace(scene, held=None), random_lighting(rng, scene.room), Path(folder), 1.0)
         clock = VirtualClock()
@@ -220,25 +220,25 @@ def in_room(seed: int, index: int, number: int, detector: Detector) -> Iterator[
         bench = SkillBench(
             robot, clock, localiser=KnownPlace(pose), costmap=BlockCostmap(), detector=detector, seed=number
         )
-        categories = list(dict.fromkeys(thing.model.category for thing in things))
-        absent = [name for name in LYING_ABOUT if name not in {thing.model.category for thing in scene.things}]
+        categories = list(dict.fromkeys(thing.model.category for thing in objects))
+        absent = [name for name in LYING_ABOUT if name not in {thing.model.category for thing in scene.objects}]
         for name in categories[:2]:
-            alike = [thing for thing in scene.things if thing.model.category == name and _lies_on(thing, surface)]
+            alike = [thing for thing in scene.objects if thing.model.category == name and _lies_on(thing, surface)]
             yield asked("room", number, bench, surface, name, [middle(thing) for thing in alike])
         if absent:
             yield asked("room", number, bench, surface, str(rng.choice(absent)), [])
 
 
 def _choices(rng: np.random.Generator, scene: Scene) -> Iterator[tuple[Surface, Pose2D, list[Placed]]]:
-    """Supports before which the robot can stand, with the things of the classes on them."""
+    """Supports before which the robot can stand, with the objects of the classes on them."""
     for k in rng.permutation(len(scene.room.supports)):
         support = scene.room.supports[k]
         if not HEIGHTS_M[0] < support.height_m < HEIGHTS_M[1] or support.room_m < 0.4:
             continue
         surface = Surface("support", tuple(_corners(support)), support.height_m)
         for pose in _stands(scene, support):
-            things = [t for t in scene.things if t.model.category in LYING_ABOUT and _lies_on(t, surface)]
-            near = [t for t in things if math.hypot(*(middle(t)[:2] - [pose.x_m, pose.y_m])) < STAND_OFF_M + FRONT_M]
+            objects = [t for t in scene.objects if t.model.category in LYING_ABOUT and _lies_on(t, surface)]
+            near = [t for t in objects if math.hypot(*(middle(t)[:2] - [pose.x_m, pose.y_m])) < STAND_OFF_M + FRONT_M]
             if near:
                 yield surface, pose, near
 
@@ -278,7 +278,7 @@ def _lies_on(thing: Placed, surface: Surface) -> bool:
 
 
 def summary(results: Sequence[Asked]) -> dict[str, object]:
-    """Shares of things found and of absent things reported absent, by world."""
+    """Shares of objects found and of absent objects reported absent, by world."""
     told: dict[str, object] = {}
     for world in sorted({each.world for each in results}):
         there = [each for each in results if each.world == world and each.there]

@@ -1,11 +1,11 @@
-"""Labelled pictures of held-out things in the world `flat`, as the robot's cameras show them in the plant.
+"""Labelled pictures of held-out objects in the world `flat`, as the robot's cameras show them in the plant.
 
 `python -m tests.benchmarks.flat_pictures OUT --scenes 40 --seed 1` writes pictures and OUT/val.json, which
-`errand dataset score --data OUT/val.json` reads. In each scene things of the classes and others lie on four surfaces,
+`errand dataset score --data OUT/val.json` reads. In each scene objects of the classes and others lie on four surfaces,
 an extinguisher and a person stand on the floor; every tenth scene holds others only. Eight pictures are taken of each,
 three in five by the hand camera, the rest by the body's cameras; noise and light are the plant's.
 
-With `--foreign FOLDER` they are things that others modelled (`foreign_models.py`), which are written to that folder,
+With `--foreign FOLDER` they are objects that others modelled (`foreign_models.py`), which are written to that folder,
 and with `--scans STL_FOLDER` those that others scanned (`scanned_models.py`), too.
 """
 
@@ -70,7 +70,7 @@ Picture = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Supply:
-    """Where things come from: the categories that may lie about, those of no class, and one of a category by chance."""
+    """Where objects come from: the categories that may lie about, those of no class, and one of a category by chance."""
 
     lying_about: Sequence[str]
     others: Sequence[str]
@@ -81,7 +81,7 @@ HELD_OUT = Supply(LYING_ABOUT, DISTRACTORS, held_out_instance)
 
 
 def foreign(folder: Path, catalogues: Path, scans: Path | None) -> Supply:
-    """Things that others modelled, and where told to be those that others scanned, written to a folder."""
+    """Objects that others modelled, and where told to be those that others scanned, written to a folder."""
     models = supplied(folder, catalogues)
     for category, more in (scanned(folder, scans) if scans is not None else {}).items():
         models[category] = [*models.get(category, ()), *more]
@@ -94,16 +94,16 @@ def foreign(folder: Path, catalogues: Path, scans: Path | None) -> Supply:
 
 @dataclass(frozen=True)
 class Stage:
-    """The flat with things in it, by their labels in Drake's label images."""
+    """The flat with objects in it, by their labels in Drake's label images."""
 
     built: WorldDiagram
     query: QueryObject
-    things: Mapping[int, Placed]
+    objects: Mapping[int, Placed]
 
     @property
     def of_classes(self) -> dict[int, Placed]:
         """Those that are of the nine classes."""
-        return {label: thing for label, thing in self.things.items() if thing.model.class_id}
+        return {label: thing for label, thing in self.objects.items() if thing.model.class_id}
 
     def take(self, view: View) -> tuple[Picture, NDArray[np.int16]]:
         """Clean picture (H, W, 3) and labels (H, W)."""
@@ -115,9 +115,9 @@ class Stage:
 
 
 def furnished(rng: np.random.Generator, world: World, free: GridMap, supply: Supply, *, bare: bool) -> Stage:
-    """The flat with things on some surfaces and on the floor; of no class if `bare`."""
-    things = [*_on_surfaces(rng, world, supply, bare=bare), *(() if bare else _on_the_floor(rng, free, supply))]
-    loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(things)]
+    """The flat with objects on some surfaces and on the floor; of no class if `bare`."""
+    objects = [*_on_surfaces(rng, world, supply, bare=bare), *(() if bare else _on_the_floor(rng, free, supply))]
+    loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(objects)]
     built = build_diagram(
         directives=world.directives_path,
         models=loose,
@@ -128,7 +128,7 @@ def furnished(rng: np.random.Generator, world: World, free: GridMap, supply: Sup
     assert built.scene is not None
     query = built.scene.query_at(built.plant.GetPositions(built.plant.CreateDefaultContext()))
     bodies = [built.plant.GetBodyIndices(built.models[each.name])[0] for each in loose]
-    return Stage(built, query, {int(body): thing for body, thing in zip(bodies, things, strict=True)})
+    return Stage(built, query, {int(body): thing for body, thing in zip(bodies, objects, strict=True)})
 
 
 def _on_surfaces(rng: np.random.Generator, world: World, supply: Supply, *, bare: bool) -> Iterator[Placed]:
@@ -167,13 +167,13 @@ def _floor_points(free: GridMap, room_m: float) -> FloatArray:
 
 
 def views(rng: np.random.Generator, stage: Stage, free: GridMap) -> Iterator[View]:
-    """Views in which things of the classes show, by turns; other things where there are none."""
-    targets = list(stage.of_classes) or list(stage.things)
+    """Views in which objects of the classes show, by turns; other objects where there are none."""
+    targets = list(stage.of_classes) or list(stage.objects)
     order = rng.permutation(len(targets))
     floor = _floor_points(free, ROOM_FOR_FEET_M)
     for k in range(VIEWS):
         label = targets[order[k % len(order)]]
-        thing = stage.things[label]
+        thing = stage.objects[label]
         by_body = bool(rng.random() < BODY_SHARE)
         tried = (_body_view(rng, floor, thing) if by_body else _hand_view(rng, floor, thing) for _ in range(TRIES))
         view = next((each for each in tried if each is not None and _shows(stage, each, label)), None)
@@ -182,8 +182,8 @@ def views(rng: np.random.Generator, stage: Stage, free: GridMap) -> Iterator[Vie
 
 
 def _shows(stage: Stage, view: View, label: int) -> bool:
-    """Whether a thing shows in the picture; one of no class need only lie before the camera."""
-    thing = stage.things[label]
+    """Whether an object shows in the picture; one of no class need only lie before the camera."""
+    thing = stage.objects[label]
     aim = view.X_WC.inverse() @ middle(thing)
     u, v = project(np.asarray(aim)[None], view.intrinsics)[0]
     if aim[2] < 0.15 or not (0 <= u < view.intrinsics.width and 0 <= v < view.intrinsics.height):
@@ -192,9 +192,9 @@ def _shows(stage: Stage, view: View, label: int) -> bool:
 
 
 def _hand_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> View | None:
-    """The hand before the thing, within the reach of a robot that stands where there is room; None where there is not.
+    """The hand before the object, within the reach of a robot that stands where there is room; None where there is not.
 
-    The thing is anywhere in the picture, from as near as fits in to where it is but some pixels long.
+    The object is anywhere in the picture, from as near as fits in to where it is but some pixels long.
     """
     camera, aim = camera_specs()["hand"].intrinsics(), middle(thing)
     eye = eye_about(rng, thing, aim, camera.fx)
@@ -206,7 +206,7 @@ def _hand_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> Vi
 
 
 def _body_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> View:
-    """The robot stands so that one of its body cameras looks about towards the thing."""
+    """The robot stands so that one of its body cameras looks about towards the object."""
     specs, aim = camera_specs(), middle(thing)
     spec = specs[str(rng.choice([name for name in specs if name != "hand"]))]
     camera, X_BC = spec.intrinsics(), spec.X_link_camera()

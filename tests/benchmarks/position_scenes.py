@@ -1,6 +1,6 @@
-"""Pictures with depth and true boxes of the nine classes in generated rooms, to measure where things are said to be.
+"""Pictures with depth and true boxes of the nine classes in generated rooms, to measure where objects are said to be.
 
-The rooms, things and views are those of the data set's held-out part. The exposure is automatic, and depth is as noisy
+The rooms, objects and views are those of the data set's held-out part. The exposure is automatic, and depth is as noisy
 as the hand camera's, which finds none where it is dark.
 """
 
@@ -43,7 +43,7 @@ LEAST_LONG_PX, LEAST_SHORT_PX, LEAST_VISIBLE = 24, 8, 0.4
 
 @dataclass(frozen=True)
 class Truth:
-    """A thing in a picture: its box there, its true middle from the camera (m), extents, share seen."""
+    """An object in a picture: its box there, its true middle from the camera (m), extents, share seen."""
 
     detection: Detection
     instance: str
@@ -85,13 +85,13 @@ def shots(seed: int, scenes: int, views: int = VIEWS) -> Iterator[Shot]:
         scene = compose(rng, index, for_training=False)
         lighting = random_lighting(rng, scene.room)
         with tempfile.TemporaryDirectory(prefix="errand-scene-") as folder:
-            stage = DepthStage(Scene(scene.room, scene.things, None, scene.seats), lighting, Path(folder), 1.0)
+            stage = DepthStage(Scene(scene.room, scene.objects, None, scene.seats), lighting, Path(folder), 1.0)
             yield from _shots_of(rng, stage, scene, views)
 
 
 def _shots_of(rng: np.random.Generator, stage: DepthStage, scene: Scene, views: int) -> Iterator[Shot]:
-    things = [thing for thing in scene.things if thing.model.class_id]
-    order = [things[k] for k in rng.permutation(len(things))]
+    objects = [thing for thing in scene.objects if thing.model.class_id]
+    order = [objects[k] for k in rng.permutation(len(objects))]
     for number in range(min(views, 3 * len(order))):
         view = _hand_view(rng, scene, order[number % len(order)])
         if view is not None:

@@ -14,7 +14,7 @@ __all__ = ["in_one_colour", "plainly_painted"]
 
 
 def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: float = 0.5) -> Finished:
-    """The same thing with every picture on it replaced by its mean colour (so often), or by any plain one."""
+    """The same object with every picture on it replaced by its mean colour (so often), or by any plain one."""
     own = rng.random() < own_colours
     painted: dict[str, Material] = {}
     for name, material in made.mesh.materials.items():
@@ -29,7 +29,7 @@ def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: fl
 
 
 def in_one_colour(made: Finished, rng: np.random.Generator) -> tuple[Finished, str]:
-    """The same thing in a single plain colour, as it comes from a drawing; what one would call that."""
+    """The same object in a single plain colour, as it comes from a drawing; what one would call that."""
     word = str(rng.choice(list(COLOURS)))
     colour = COLOURS[word]
     if rng.random() < 0.6:

@@ -1,7 +1,7 @@
-"""Which cells of the network answer for which thing.
+"""Which cells of the network answer for which object.
 
 Task-aligned assignment after Feng et al., "TOOD: Task-aligned One-stage Object Detection" (2021): of the cells whose
-middles lie in a thing's box, those answer for it that score its class high and overlap its box well already.
+middles lie in an object's box, those answer for it that score its class high and overlap its box well already.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _TINY = 1e-9
 
 @dataclass(frozen=True)
 class AssignOptions:
-    """How many cells answer for a thing at most, the weights of score and overlap, and how small a box is at least
+    """How many cells answer for an object at most, the weights of score and overlap, and how small a box is at least
     taken to be (in pixels) when asking which cells lie in it."""
 
     most_cells: int = 10
@@ -31,10 +31,10 @@ class AssignOptions:
 
 @dataclass(frozen=True)
 class Assigned:
-    """For each cell of each picture (N, A): the row of its thing or -1; how well it does, from 0 to 1; whether to be
+    """For each cell of each picture (N, A): the row of its object or -1; how well it does, from 0 to 1; whether to be
     left out of the loss."""
 
-    things: Tensor
+    objects: Tensor
     quality: Tensor
     left_out: Tensor
 
@@ -51,7 +51,7 @@ def assign(
     present: Tensor,
     options: AssignOptions,
 ) -> Assigned:
-    """Assign the cells of N pictures to at most G things each.
+    """Assign the cells of N pictures to at most G objects each.
 
     scores (N, A, K) from 0 to 1, boxes (N, A, 4), middles (A, 2); truth (N, G, 4), classes (N, G), ignored (N, G) and
     present (N, G), which is false for rows that only fill up.
@@ -63,12 +63,12 @@ def assign(
     metric = metric * (inside & ~ignored[..., None])
     chosen = _best(metric, options.most_cells) & (metric > 0)
     rival = torch.where(chosen, overlaps + _TINY, overlaps.new_tensor(-1.0))
-    best, things = rival.max(dim=1)
-    mine = chosen & (things[:, None, :] == torch.arange(truth.shape[1])[None, :, None].to(things.device))
+    best, objects = rival.max(dim=1)
+    mine = chosen & (objects[:, None, :] == torch.arange(truth.shape[1])[None, :, None].to(objects.device))
     quality = _quality(metric * mine, overlaps * mine)
     taken = best >= 0
     left_out = (inside & ignored[..., None]).any(dim=1) & ~taken
-    return Assigned(torch.where(taken, things, things.new_tensor(-1)), quality * taken, left_out)
+    return Assigned(torch.where(taken, objects, objects.new_tensor(-1)), quality * taken, left_out)
 
 
 def _inside(middles: Tensor, truth: Tensor, least_side_px: float) -> Tensor:
@@ -80,13 +80,13 @@ def _inside(middles: Tensor, truth: Tensor, least_side_px: float) -> Tensor:
 
 
 def _best(metric: Tensor, count: int) -> Tensor:
-    """True for the `count` highest cells of each thing."""
+    """True for the `count` highest cells of each object."""
     rows = metric.topk(min(count, metric.shape[2]), dim=2).indices
     return torch.zeros_like(metric, dtype=torch.bool).scatter_(2, rows, True)
 
 
 def _quality(metric: Tensor, overlaps: Tensor) -> Tensor:
-    """Each cell's metric, scaled so that a thing's best cell has its best overlap, (N, A)."""
+    """Each cell's metric, scaled so that an object's best cell has its best overlap, (N, A)."""
     highest = metric.amax(dim=2, keepdim=True)
     best = overlaps.amax(dim=2, keepdim=True)
     return (metric / (highest + _TINY) * best).amax(dim=1)

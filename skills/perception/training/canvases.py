@@ -1,6 +1,6 @@
 """Canvases to learn from: windows on pictures at about the scale at which the detector will see them, or four in one.
 
-Windows about things rather than whole pictures, after Singh et al., "SNIPER" (2018): most of a picture of a room holds
+Windows about objects rather than whole pictures, after Singh et al., "SNIPER" (2018): most of a picture of a room holds
 nothing to be found, and learning from windows costs a quarter of the time. Four in one after Bochkovskiy et al.,
 "YOLOv4" (2020).
 """
@@ -32,7 +32,7 @@ _RIGHT_ANGLE: Final = np.pi / 2
 class CanvasOptions:
     """Size of a canvas in pixels and how it is made.
 
-    `mosaic` is the share of canvases of four pictures, `focused` the share of windows about a thing where there is
+    `mosaic` is the share of canvases of four pictures, `focused` the share of windows about an object where there is
     one. Scales are drawn evenly in their logarithm. `changed` is the share of canvases with other light and colours.
     `whole` takes whole pictures, turned and scaled only a little.
     """
@@ -91,7 +91,7 @@ def _four(options: CanvasOptions, random: np.random.Generator) -> list[Cell]:
 
 
 def _window(labels: Labels, cell: Cell, options: CanvasOptions, random: np.random.Generator) -> Floats:
-    """A window about a thing, or anywhere, at a random scale at which the thing mostly fits."""
+    """A window about an object, or anywhere, at a random scale at which the object mostly fits."""
     scale = float(np.exp(random.uniform(*np.log(options.scales))))
     thing = _chosen(labels, options, random)
     if thing is None:
@@ -115,7 +115,7 @@ def _somewhere(random: np.random.Generator) -> Floats:
 
 
 def _chosen(labels: Labels, options: CanvasOptions, random: np.random.Generator) -> Floats | None:
-    """The outline of some thing that counts."""
+    """The outline of some object that counts."""
     counting = np.flatnonzero(~labels.ignored)
     if not len(counting) or random.random() >= options.focused:
         return None

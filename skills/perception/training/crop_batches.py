@@ -67,19 +67,19 @@ class CropFeed:
         )
 
     def _rows(self, first: int, count: int) -> NDArray[np.int64]:
-        """Rows of the table: those on things and the others by turns."""
-        things, others = np.flatnonzero(self.table.classes >= 0), np.flatnonzero(self.table.classes < 0)
+        """Rows of the table: those on objects and the others by turns."""
+        objects, others = np.flatnonzero(self.table.classes >= 0), np.flatnonzero(self.table.classes < 0)
         many = round(count * _ON_THINGS)
         number = first // count
         return np.concatenate(
             [
-                things[shuffled(self.seed, number * many, many, len(things))],
+                objects[shuffled(self.seed, number * many, many, len(objects))],
                 others[shuffled(self.seed + 1, number * (count - many), count - many, len(others))],
             ]
         )
 
     def _crop(self, row: int, random: np.random.Generator) -> tuple[Picture, Floats]:
-        """A crop, and (2, 4) the region's box and the thing's in it."""
+        """A crop, and (2, 4) the region's box and the object's in it."""
         table = self.table
         affine, region = changed_map(table.boxes[row], random)
         crop = self.store.scales(int(table.pictures[row])).cut(affine.astype(np.float64), (CROP_PX, CROP_PX))

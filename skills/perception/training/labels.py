@@ -1,4 +1,4 @@
-"""Labelled pictures as the renderer writes them (COCO), with the outline of each thing, so that they can be turned."""
+"""Labelled pictures as the renderer writes them (COCO), with the outline of each object, so that they can be turned."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class TrainingDataError(ValueError):
 
 @dataclass(frozen=True)
 class Labels:
-    """Things of one picture: convex outlines (K, 2) in pixels, class indices (N,), how much of each is seen, and more.
+    """Objects of one picture: convex outlines (K, 2) in pixels, class indices (N,), how much of each is seen, and more.
 
-    `seen` (N,) is the share of the whole thing that the picture shows; `ignored` (N,) marks what is neither to be
+    `seen` (N,) is the share of the whole object that the picture shows; `ignored` (N,) marks what is neither to be
     found nor to be left.
     """
 

@@ -27,7 +27,7 @@ class LossOptions:
 
 @dataclass(frozen=True)
 class TruthBatch:
-    """The things of N pictures, filled up to G rows: boxes (N, G, 4), classes, ignored and present (N, G)."""
+    """The objects of N pictures, filled up to G rows: boxes (N, G, 4), classes, ignored and present (N, G)."""
 
     boxes: Tensor
     classes: Tensor
@@ -65,8 +65,8 @@ def losses(logits: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch, op
     wanted = _wanted_scores(logits, truth, assigned)
     each = torch.nn.functional.binary_cross_entropy_with_logits(logits, wanted, reduction="none").sum(dim=2)
     score_loss = (each * ~assigned.left_out).sum() / total
-    answering = assigned.things >= 0
-    targets = truth.boxes.gather(1, assigned.things.clamp(min=0)[..., None].expand(-1, -1, 4))[answering]
+    answering = assigned.objects >= 0
+    targets = truth.boxes.gather(1, assigned.objects.clamp(min=0)[..., None].expand(-1, -1, 4))[answering]
     box_each = (1.0 - complete_overlap(boxes[answering], targets)) * assigned.quality[answering]
     return Losses(score_loss, options.box_weight * box_each.sum() / total)
 
@@ -85,7 +85,7 @@ def crop_losses(logits: Tensor, boxes: Tensor, wanted: Tensor, classes: Tensor) 
 
 def _wanted_scores(logits: Tensor, truth: TruthBatch, assigned: Assigned) -> Tensor:
     """Quality at the class of each answering cell, nought elsewhere."""
-    classes = truth.classes.gather(1, assigned.things.clamp(min=0))
+    classes = truth.classes.gather(1, assigned.objects.clamp(min=0))
     return torch.zeros_like(logits).scatter_(2, classes[..., None], assigned.quality[..., None])
 
 

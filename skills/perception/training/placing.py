@@ -1,4 +1,4 @@
-"""Where parts of pictures go on a canvas, and what of their things is seen there. Pure geometry."""
+"""Where parts of pictures go on a canvas, and what of their objects is seen there. Pure geometry."""
 
 from __future__ import annotations
 

@@ -29,10 +29,10 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class ProposalTable:
-    """R regions: picture's number (R,), box (R, 4) in the letterbox, logits (R, K), and the thing there.
+    """R regions: picture's number (R,), box (R, 4) in the letterbox, logits (R, K), and the object there.
 
-    `classes` (R,) are those of the things with which regions share NEAR or more, or -1; `wanted` (R, 4) are the things'
-    boxes, and the region's own where there is no thing.
+    `classes` (R,) are those of the objects with which regions share NEAR or more, or -1; `wanted` (R, 4) are the objects'
+    boxes, and the region's own where there is no object.
     """
 
     pictures: NDArray[np.int64]
@@ -89,8 +89,8 @@ def table_of(look: Callable[[Scales], Proposals], pictures: Iterable[tuple[Scale
 
 def _rows(regions: Proposals, number: int, labels: Labels) -> ProposalTable:
     """The regions of one picture."""
-    things = label_boxes(labels)
-    shared, inside = (_overlaps(regions.boxes, things, crowd=crowd) for crowd in (False, True))
+    objects = label_boxes(labels)
+    shared, inside = (_overlaps(regions.boxes, objects, crowd=crowd) for crowd in (False, True))
     left_out = ((shared >= NEAR) | (inside >= _WITHIN_IGNORED)) & labels.ignored[None, :]
     counting = np.where(labels.ignored[None, :], 0.0, shared)
     best = counting.max(axis=1, initial=0.0)
@@ -99,18 +99,18 @@ def _rows(regions: Proposals, number: int, labels: Labels) -> ProposalTable:
     wanted, classes = regions.boxes.copy(), np.full(len(regions), -1)
     if near.any():
         chosen = counting.argmax(axis=1)[near]
-        wanted[near], classes[near] = things[chosen], labels.classes[chosen]
+        wanted[near], classes[near] = objects[chosen], labels.classes[chosen]
     return ProposalTable(
         np.full(int(kept.sum()), number), regions.boxes[kept], regions.logits[kept], wanted[kept], classes[kept]
     )
 
 
-def _overlaps(boxes: Floats, things: Floats, *, crowd: bool) -> NDArray[np.float64]:
+def _overlaps(boxes: Floats, objects: Floats, *, crowd: bool) -> NDArray[np.float64]:
     """Shared area / area of both (N, M), or of the box alone for a `crowd`."""
-    if not len(boxes) or not len(things):
-        return np.zeros((len(boxes), len(things)))
-    first, second = (np.hstack([one[:, :2], one[:, 2:] - one[:, :2]]).astype(np.float64) for one in (boxes, things))
-    return np.asarray(coco_mask.iou(first, second, [int(crowd)] * len(things)))
+    if not len(boxes) or not len(objects):
+        return np.zeros((len(boxes), len(objects)))
+    first, second = (np.hstack([one[:, :2], one[:, 2:] - one[:, :2]]).astype(np.float64) for one in (boxes, objects))
+    return np.asarray(coco_mask.iou(first, second, [int(crowd)] * len(objects)))
 
 
 def label_boxes(labels: Labels) -> Floats:

@@ -62,7 +62,7 @@ class Budget:
 class Schedule:
     """A warm-up of so many steps, then half a cosine from the highest rate to the last.
 
-    Crops that hold little but a thing come first, since most things are learnt from in the same time there; then wider
+    Crops that hold little but an object come first, since most objects are learnt from in the same time there; then wider
     windows; whole pictures, as the detector will see them, last. What goes on from learnt weights needs no crops:
     see `refining`.
     """

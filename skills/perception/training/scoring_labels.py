@@ -19,10 +19,10 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Label:
-    """A thing in a picture: its class, and its box (u0, v0, u1, v1) in pixels.
+    """An object in a picture: its class, and its box (u0, v0, u1, v1) in pixels.
 
-    `crowd` marks a region in which any number of detections of the class is passed over, `ignore` a thing that need
-    not be found and may be. `visibility` is the share of the whole thing that is seen (what lies beyond the picture's
+    `crowd` marks a region in which any number of detections of the class is passed over, `ignore` an object that need
+    not be found and may be. `visibility` is the share of the whole object that is seen (what lies beyond the picture's
     edge is not), `distance_m` how far it is, where known.
     """
 

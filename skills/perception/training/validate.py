@@ -36,7 +36,7 @@ class Examination:
 def examination(folder: Path, split: str, class_names: Sequence[str], most: int | None = None) -> Examination:
     """The pictures of `train` or `val`, or about `most` of them, evenly chosen. Raises TrainingDataError.
 
-    Those of crowded scenes are left out, since in them more of what is seen is a thing than elsewhere.
+    Those of crowded scenes are left out, since in them more of what is seen is an object than elsewhere.
     """
     file = folder / f"{split}.json"
     try:

@@ -37,8 +37,8 @@ def empty_room() -> Room:
     return Room((6.0, 6.0, 2.5), mesh, (), (), (), False)
 
 
-def labels_of(things: tuple[Placed, ...], folder: Path) -> list[dict[str, object]]:
-    scene = Scene(empty_room(), things, None, ())
+def labels_of(objects: tuple[Placed, ...], folder: Path) -> list[dict[str, object]]:
+    scene = Scene(empty_room(), objects, None, ())
     stage = Stage(scene, Lighting("plain", render_parameters()), folder, 1.0)
     view = View("hand", look_at(EYE, (0, 0, 0.05)), CAMERA, False, False)
     clean, labels = stage.take(view)

@@ -1,4 +1,4 @@
-"""Scenes: things rest stably where they are, nothing overlaps, training and validation share nothing."""
+"""Scenes: objects rest stably where they are, nothing overlaps, training and validation share nothing."""
 
 from __future__ import annotations
 
@@ -137,9 +137,9 @@ def test_degrading_is_the_same_for_the_same_seed() -> None:
 
 def test_a_scene_for_validation_holds_held_out_instances_only_and_nothing_overlaps() -> None:
     scene = compose(np.random.default_rng(3), 5, for_training=False)
-    assert any(thing.model.class_id for thing in scene.things)
-    assert all(thing.model.held_out for thing in scene.things)
-    outlines = [(*thing_outline(thing), thing.model.name) for thing in scene.things]
+    assert any(thing.model.class_id for thing in scene.objects)
+    assert all(thing.model.held_out for thing in scene.objects)
+    outlines = [(*thing_outline(thing), thing.model.name) for thing in scene.objects]
     for k, (low, points, name) in enumerate(outlines):
         for other_low, other_points, other in outlines[:k]:
             if abs(low - other_low) < 0.2:
@@ -154,8 +154,8 @@ def thing_outline(thing: Placed) -> tuple[float, np.ndarray]:
 
 def test_every_tenth_scene_holds_distractors_only() -> None:
     scene = compose(np.random.default_rng(3), 9, for_training=True)
-    assert scene.things
-    assert all(thing.model.class_id == 0 for thing in scene.things)
+    assert scene.objects
+    assert all(thing.model.class_id == 0 for thing in scene.objects)
     assert scene.held is None or scene.held.model.class_id == 0
 
 
@@ -166,7 +166,7 @@ def test_a_crowded_scene_holds_more_than_the_same_one_without(monkeypatch: pytes
     for share in (0.0, 1.0):
         monkeypatch.setattr("plant.dataset.compose.CROWDED_SHARE", share)
         scene = compose(np.random.default_rng(3), 0, for_training=True)
-        held[scene.crowded] = Counter(thing.model.category for thing in scene.things)
+        held[scene.crowded] = Counter(thing.model.category for thing in scene.objects)
     assert sum(held[True].values()) > 1.5 * sum(held[False].values())
     assert set(held[True]) >= {"beer", "coke", "hammer", "screwdriver", "wrench", "cylinder", "cube", "mug"}
     assert held[True]["person"] <= 1

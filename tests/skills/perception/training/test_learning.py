@@ -76,28 +76,28 @@ def test_cells_that_fit_a_thing_best_answer_for_it() -> None:
     middles, boxes = at_every_cell(16.0)
     scores = torch.full((1, len(middles), 2), 0.5)
     found = assigned(scores, boxes, middles, targets((20, 20, 36, 36), classes=(1,)))
-    answering = torch.nonzero(found.things[0] == 0).flatten()
+    answering = torch.nonzero(found.objects[0] == 0).flatten()
     assert 1 <= len(answering) <= 4
     overlaps = overlap(torch.tensor([20.0, 20, 36, 36]), boxes)[0]
     assert overlaps[answering].min() >= overlaps.topk(6).values[-1]
     assert found.quality[0].max() == pytest.approx(float(overlaps[answering].max()), abs=1e-4)
-    assert (found.quality[0][found.things[0] < 0] == 0).all()
+    assert (found.quality[0][found.objects[0] < 0] == 0).all()
 
 
 def test_a_cell_in_two_things_answers_for_the_one_it_fits_better() -> None:
     middles, boxes = at_every_cell(16.0)
     scores = torch.full((1, len(middles), 2), 0.5)
     found = assigned(scores, boxes, middles, targets((0, 0, 64, 64), (20, 20, 36, 36)))
-    assert set(found.things[0].tolist()) == {-1, 0, 1}
+    assert set(found.objects[0].tolist()) == {-1, 0, 1}
     at_28 = torch.nonzero((middles == 28).all(dim=1)).flatten()
-    assert found.things[0, at_28].tolist() == [1]
+    assert found.objects[0, at_28].tolist() == [1]
 
 
 def test_a_thing_smaller_than_a_cell_still_gets_one() -> None:
     middles, boxes = at_every_cell(8.0)
     scores = torch.full((1, len(middles), 1), 0.5)
     found = assigned(scores, boxes, middles, targets((15, 15, 17, 17)))
-    assert (found.things[0] == 0).any()
+    assert (found.objects[0] == 0).any()
 
 
 def test_cells_in_what_is_ignored_are_left_out_of_the_loss() -> None:
@@ -105,7 +105,7 @@ def test_cells_in_what_is_ignored_are_left_out_of_the_loss() -> None:
     logits = torch.full((1, len(middles), 1), 3.0)
     found = assigned(logits.sigmoid(), boxes, middles, targets((0, 0, 64, 64), ignored=True))
     assert found.left_out.all()
-    assert (found.things < 0).all()
+    assert (found.objects < 0).all()
     lost = losses(logits, boxes, middles, truth_of([targets((0, 0, 64, 64), ignored=True)]), LossOptions())
     assert float(lost.total) == 0.0
     assert float(losses(logits, boxes, middles, truth_of([targets()]), LossOptions()).total) > 1.0

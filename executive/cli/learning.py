@@ -15,7 +15,7 @@ from executive.mission.errors import InputError
 from skills.perception.training.labels import TrainingDataError, read_split
 from skills.perception.training.schedule import Budget, Report
 
-__all__ = ["budget_of", "check_folders", "check_libraries", "check_time", "learnt", "tell_learnt"]
+__all__ = ["budget_of", "check_folders", "check_libraries", "check_time", "print_trained", "trained"]
 
 NEEDED: Final = ("torch", "onnx", "pycocotools")
 RENDER: Final = "make one: errand dataset render --out DIR --images 8000"
@@ -44,7 +44,7 @@ def check_libraries(needed: Sequence[str] = NEEDED, work: str = "training") -> N
 
 
 def budget_of(data: Path, minutes: float | None, epochs: int | None, *, unless_said_minutes: float) -> Budget:
-    """How long to learn. Raises InputError."""
+    """How long to train. Raises InputError."""
     if epochs is None:
         return Budget(seconds=60.0 * (unless_said_minutes if minutes is None else minutes))
     try:
@@ -53,14 +53,14 @@ def budget_of(data: Path, minutes: float | None, epochs: int | None, *, unless_s
         raise InputError(error.message, mend=error.mend) from error
 
 
-def learnt(
+def trained(
     work: Callable[[Callable[[Report], None]], Path], out: Path, console: Console
 ) -> tuple[Path, dict[str, float]]:
     """The ONNX file that some work makes, and its last figures, with a bar of progress. Raises InputError."""
     figures = dict[str, float]()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
-        task = bar.add_task("learning", total=1.0)
+        task = bar.add_task("training", total=1.0)
 
         def told(report: Report) -> None:
             new_percent = int(100 * report.progress) > int(100 * bar.tasks[task].completed)
@@ -79,7 +79,7 @@ def learnt(
             raise InputError(f"{out}: cannot be written ({error})", mend="name another folder, or make room") from error
 
 
-def tell_learnt(console: Console, model: Path, figures: dict[str, float], *, as_json: bool) -> None:
+def print_trained(console: Console, model: Path, figures: dict[str, float], *, as_json: bool) -> None:
     """Say which file was written, and how good it is."""
     console.print(f"{model}: {_line(figures)}")
     if as_json:
@@ -88,7 +88,7 @@ def tell_learnt(console: Console, model: Path, figures: dict[str, float], *, as_
 
 def _told(report: Report) -> str:
     scores, boxes = report.losses
-    return f"learning, {report.pictures_per_s:.0f}/s, losses {scores:.2f} {boxes:.2f}"
+    return f"training, {report.pictures_per_s:.0f}/s, losses {scores:.2f} {boxes:.2f}"
 
 
 def _line(figures: dict[str, float]) -> str:

@@ -1,4 +1,4 @@
-"""`errand dataset refine`: a refinement or classifier network learns to judge what those before it find."""
+"""`errand dataset refine`: a refinement or classifier network is trained to judge what those before it find."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated, Final
 import typer
 from rich.console import Console
 
-from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, learnt, tell_learnt
+from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, print_trained, trained
 from executive.cli.output import console_for, refusals
 from executive.mission.errors import InputError
 from skills.perception.detector.cascade_files import MODEL_FILE
@@ -32,10 +32,10 @@ def refine_command(
     ] = False,
     minutes: Annotated[
         float | None,
-        typer.Option(min=0.01, help="How long to learn; an hour and a half unless said.", show_default=False),
+        typer.Option(min=0.01, help="How long to train; an hour and a half unless said.", show_default=False),
     ] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how many crops for each picture.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all that is drawn by chance.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all random draws.")] = 1,
     rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="The highest learning rate.")] = REFINEMENT_RATE,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the folder's checkpoint stands.")] = False,
     start: Annotated[
@@ -62,7 +62,7 @@ def refine_command(
             schedule=Schedule(rate),
         )
         file, figures = _refined(options, console)
-    tell_learnt(console, file, figures, as_json=as_json)
+    print_trained(console, file, figures, as_json=as_json)
 
 
 def _first(model: Path | None) -> Path:
@@ -77,4 +77,4 @@ def _refined(options: RefineOptions, console: Console) -> tuple[Path, dict[str, 
     """The ONNX file and its figures. Raises InputError."""
     from skills.perception.training.refine import refine
 
-    return learnt(partial(refine, options), options.out, console)
+    return trained(partial(refine, options), options.out, console)

@@ -1,4 +1,4 @@
-"""`errand dataset train`: the detector learns from a data set's pictures."""
+"""`errand dataset train`: the detector is trained on a data set's pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated, Final
 import typer
 from rich.console import Console
 
-from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, learnt, tell_learnt
+from executive.cli.learning import budget_of, check_folders, check_libraries, check_time, print_trained, trained
 from executive.cli.output import console_for, refusals
 from skills.perception.training.schedule import HIGHEST_RATE, REFINING_RATE, Schedule, TrainOptions
 
@@ -22,10 +22,10 @@ def train_command(
     data: Annotated[Path, typer.Option(help="Folder of a data set that `errand dataset render` made.")],
     out: Annotated[Path, typer.Option(help="Folder for checkpoints, figures and the ONNX file.")],
     minutes: Annotated[
-        float | None, typer.Option(min=0.01, help="How long to learn; four hours unless said.", show_default=False)
+        float | None, typer.Option(min=0.01, help="How long to train; four hours unless said.", show_default=False)
     ] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Instead: how often to see each picture.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all that is drawn by chance.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first weights and of all random draws.")] = 1,
     rate: Annotated[
         float | None,
         typer.Option(
@@ -58,11 +58,11 @@ def train_command(
             schedule=Schedule.refining(rate or REFINING_RATE) if start else Schedule(rate or HIGHEST_RATE),
         )
         model, figures = _trained(options, console)
-    tell_learnt(console, model, figures, as_json=as_json)
+    print_trained(console, model, figures, as_json=as_json)
 
 
 def _trained(options: TrainOptions, console: Console) -> tuple[Path, dict[str, float]]:
     """The ONNX file and its figures. Raises InputError."""
     from skills.perception.training.train import train
 
-    return learnt(partial(train, options), options.out, console)
+    return trained(partial(train, options), options.out, console)

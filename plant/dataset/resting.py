@@ -18,7 +18,7 @@ from skills.robot import FloatArray
 LEAST_MARGIN = 0.05
 _UPRIGHT = {"person": 1.0, "extinguisher": 0.9, "beer": 0.7, "coke": 0.72, "cylinder": 0.6}
 TOPPLED_SHARE: Final = 0.75
-"""How much more seldom objects stand in pictures to learn from than is usual."""
+"""How much more seldom objects stand in pictures to train on than is usual."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _to_down(normal: FloatArray) -> FloatArray:
 def choose(rng: np.random.Generator, model: ObjectModel, poses: Sequence[Resting], *, toppled: bool = False) -> Resting:
     """One of the poses: upright as often as is usual for such objects, else by how easily they stay.
 
-    `toppled`: what usually stands lies more often than that, but people, so that it is learnt that way, too.
+    `toppled`: what usually stands lies more often than that, but people, so that it is trained that way, too.
     """
     standing = [pose for pose in poses if pose.upright]
     lying = [pose for pose in poses if not pose.upright]

@@ -1,7 +1,7 @@
-"""Canvases to learn from: windows on pictures at about the scale at which the detector will see them, or four in one.
+"""Canvases to train on: windows on pictures at about the scale at which the detector will see them, or four in one.
 
 Windows about objects rather than whole pictures, after Singh et al., "SNIPER" (2018): most of a picture of a room holds
-nothing to be found, and learning from windows costs a quarter of the time. Four in one after Bochkovskiy et al.,
+nothing to be found, and training on windows costs a quarter of the time. Four in one after Bochkovskiy et al.,
 "YOLOv4" (2020).
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.perception.detector.letterbox import HEIGHT_PX, PADDING, WIDTH_PX
-from skills.perception.training.labels import Labels, LearningPicture
+from skills.perception.training.labels import Labels, TrainingPicture
 from skills.perception.training.photometry import as_seen_otherwise
 from skills.perception.training.placing import Cell, Targets, joined, placed, turning
 from skills.perception.training.store import PictureStore
@@ -58,7 +58,7 @@ class Canvas:
 class CanvasMaker:
     """Makes canvases of stored pictures. The same random source gives the same canvas."""
 
-    pictures: Sequence[LearningPicture]
+    pictures: Sequence[TrainingPicture]
     store: PictureStore
 
     def make(self, index: int, options: CanvasOptions, random: np.random.Generator) -> Canvas:

@@ -1,7 +1,7 @@
 """The classifier network: judges what the refinement network saw in a crop, with a backbone pretrained on ImageNet.
 
 It begins with the refinement network's opinion, to which it adds. In use it adds three quarters of what it would: it is
-surer of what it has learnt from than of what is new. (As the mean of weights before and after learning, after Wortsman
+surer of what it has trained on than of what is new. (As the mean of weights before and after learning, after Wortsman
 et al., "Robust fine-tuning of zero-shot models", 2022, but of the last layers alone.)
 """
 
@@ -49,7 +49,7 @@ class ClassifierNetwork(CropNetwork):
         return self.trust * before + self.scores(known), moved(boxes, _SIDES_SCALE * self.sides(known).float())
 
     def stop_learning(self) -> None:
-        """Add only a part of what it adds while learning: `USED`."""
+        """Add only a part of what it adds in training: `USED`."""
         self.add(USED)
 
     @torch.no_grad()

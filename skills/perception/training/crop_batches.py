@@ -1,4 +1,4 @@
-"""Crops about regions, turned, mirrored, shifted and with other light, as batches to learn from."""
+"""Crops about regions, turned, mirrored, shifted and with other light, as batches to train on."""
 
 from __future__ import annotations
 

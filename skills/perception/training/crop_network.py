@@ -52,7 +52,7 @@ class CropNetwork(nn.Module):
         raise NotImplementedError
 
     def stop_learning(self) -> None:
-        """Change what is to be otherwise in use than while learning: nothing, unless said."""
+        """Change what is to be otherwise in use than in training: nothing, unless said."""
 
     def forward(self, crops: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, K) and boxes (N, 4) as x0 y0 x1 y1 in pixels of the crop."""

@@ -1,6 +1,6 @@
 """Convolutions of each channel by itself, with gradients of their own.
 
-The library's gradients of their weights, and those of the input with stride 2, would take most of the time of learning
+The library's gradients of their weights, and those of the input with stride 2, would take most of the time of training
 on processor cores.
 """
 

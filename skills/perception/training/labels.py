@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skills.perception.detector.letterbox import Letterbox
 
-__all__ = ["Labels", "LearningPicture", "TrainingDataError", "category_names", "digest_of", "read_split"]
+__all__ = ["Labels", "TrainingDataError", "TrainingPicture", "category_names", "digest_of", "read_split"]
 
 Floats = NDArray[np.float32]
 LEAST_SEEN: Final = 0.25
@@ -23,7 +23,7 @@ _MOST_CORNERS: Final = 24
 
 
 class TrainingDataError(ValueError):
-    """The folder of a data set cannot be learnt from; the text says where and why, `mend` what to do."""
+    """The folder of a data set cannot be trained on; the text says where and why, `mend` what to do."""
 
     def __init__(self, message: str, *, mend: str) -> None:
         self.message, self.mend = message, mend
@@ -48,7 +48,7 @@ class Labels:
 
 
 @dataclass(frozen=True)
-class LearningPicture:
+class TrainingPicture:
     """A picture's file and its labels, in pixels of the letterbox."""
 
     file: Path
@@ -61,7 +61,7 @@ def category_names(folder: Path) -> tuple[str, ...]:
     return tuple(str(entry["name"]) for entry in sorted(document["categories"], key=lambda entry: int(entry["id"])))
 
 
-def read_split(folder: Path, split: str) -> tuple[LearningPicture, ...]:
+def read_split(folder: Path, split: str) -> tuple[TrainingPicture, ...]:
     """All pictures of `train` or `val`. Raises TrainingDataError."""
     return tuple(_read(folder, entry, labels) for entry, labels in _entries(folder, split))
 
@@ -96,10 +96,10 @@ def _document(path: Path) -> Mapping[str, Any]:
     return found
 
 
-def _read(folder: Path, image: Mapping[str, Any], labels: Sequence[Mapping[str, Any]]) -> LearningPicture:
+def _read(folder: Path, image: Mapping[str, Any], labels: Sequence[Mapping[str, Any]]) -> TrainingPicture:
     try:
         scale = np.array(Letterbox(int(image["width"]), int(image["height"])).scale_xy, dtype=np.float32)
-        return LearningPicture(folder / str(image["file_name"]), _labels(labels, scale))
+        return TrainingPicture(folder / str(image["file_name"]), _labels(labels, scale))
     except (KeyError, TypeError, ValueError) as error:
         place = f"{folder}: picture {image.get('file_name')}"
         raise TrainingDataError(f"{place}: its labels are damaged ({error!r})", mend="render it anew") from error

@@ -1,4 +1,4 @@
-"""EfficientNet-Lite0, a backbone with weights that were learnt on ImageNet.
+"""EfficientNet-Lite0, a backbone with weights that were trained on ImageNet.
 
 After Tan and Le, "EfficientNet" (2019), in the form without squeeze-and-excitation and with ReLU6 that suits 8 bits;
 its blocks after Sandler et al., "MobileNetV2" (2018). The weights are those of the package
@@ -160,7 +160,7 @@ class LiteBackbone(EarlyLayers):
         self.one = 1.0
 
     def begin_with_imagenet(self) -> None:
-        """Take over the weights that were learnt on ImageNet. Raises TrainingDataError when they are not installed."""
+        """Take over the weights that were trained on ImageNet. Raises TrainingDataError when they are not installed."""
         self._take(torch.load(io.BytesIO(_weights_of_imagenet()), map_location="cpu", weights_only=True))
 
     def _take(self, kept: Mapping[str, Tensor]) -> None:

@@ -82,7 +82,7 @@ class CrossStage(nn.Module):
 
 
 class Residual(nn.Module):
-    """Two 3x3 convolutions added to the input, from 0 on, which it passes on unchanged until it has learnt something.
+    """Two 3x3 convolutions added to the input, from 0 on, which it passes on unchanged until it is trained.
 
     After He et al., "Deep Residual Learning" (2015); that the last normalisation begins at nought, after Goyal et al.,
     "Accurate, Large Minibatch SGD" (2017).

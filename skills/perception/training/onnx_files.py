@@ -20,10 +20,10 @@ __all__ = [
     "compact",
     "facts_of",
     "in_full",
-    "learnt_weights",
     "offsets_fact",
     "offsets_in",
     "shorten_names",
+    "trained_weights",
     "with_float32_weights",
     "write_sealed",
 ]
@@ -33,7 +33,7 @@ QUANTISED: Final = "eight_bits"
 OFFSETS: Final = "score_offsets"
 """What it tells there of what was added to the logits of each class."""
 _SEAL: Final = "sha256"
-_LEARNT: Final = "network."
+_TRAINED: Final = "network."
 _SCALE: Final = "_scale"
 _ZERO_POINT: Final = "_zero_point"
 _QUANTISED: Final = "_quantized"
@@ -66,13 +66,13 @@ def facts_of(model: onnx.ModelProto) -> dict[str, str]:
     return {entry.key: entry.value for entry in model.metadata_props if entry.key != _SEAL}
 
 
-def learnt_weights(model: onnx.ModelProto) -> dict[str, NDArray[np.floating]]:
-    """What a network has learnt, by the names that weights have in it; those of 8 bits as what they stand for."""
+def trained_weights(model: onnx.ModelProto) -> dict[str, NDArray[np.floating]]:
+    """What a network has trained, by the names that weights have in it; those of 8 bits as what they stand for."""
     kept = {in_full(one.name): onnx.numpy_helper.to_array(one) for one in model.graph.initializer}
     whole = {name.removesuffix(_QUANTISED): name for name in kept if name.endswith(_QUANTISED)}
     plain = (name for name in kept if not name.endswith((_SCALE, _ZERO_POINT, _QUANTISED)))
-    learnt = {name: kept[name] for name in plain} | {name: _dequantised(kept, name) for name in whole}
-    return {name: values for name, values in learnt.items() if name.startswith(_LEARNT)}
+    trained = {name: kept[name] for name in plain} | {name: _dequantised(kept, name) for name in whole}
+    return {name: values for name, values in trained.items() if name.startswith(_TRAINED)}
 
 
 def _dequantised(kept: Mapping[str, NDArray[Any]], name: str) -> NDArray[np.floating]:

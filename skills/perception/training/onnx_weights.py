@@ -1,4 +1,4 @@
-"""Learning goes on from a network's ONNX file, in which normalisation is part of the layers before it already."""
+"""Training goes on from a network's ONNX file, in which normalisation is part of the layers before it already."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from skills.perception.training.crop_network import CropNetwork
 from skills.perception.training.export import normalised_layers
 from skills.perception.training.labels import TrainingDataError
 from skills.perception.training.network import Backbone, DetectorNetwork
-from skills.perception.training.onnx_files import learnt_weights, offsets_in
+from skills.perception.training.onnx_files import offsets_in, trained_weights
 from skills.perception.training.refinement_network import RefinementNetwork
 
 __all__ = ["settle", "take_over", "take_over_classifier", "take_over_refinement"]
@@ -87,7 +87,7 @@ def _take(network: nn.Module, file: Path, told: Network, score_biases: Sequence[
 
 def _content(file: Path) -> dict[str, Tensor]:
     """Weights by the names that they have in the network."""
-    kept = learnt_weights(onnx.load(file)).items()
+    kept = trained_weights(onnx.load(file)).items()
     return {name.removeprefix(_BEFORE): torch.tensor(values.astype(np.float32)) for name, values in kept}
 
 

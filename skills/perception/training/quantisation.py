@@ -2,8 +2,8 @@
 
     python -m skills.perception.training.quantisation DIR/errand_detector.onnx --data PICTURES --out FOLDER
 
-Weights have 8 bits in the file, those of each output in steps of their own; learning can go on from them. What passes
-between layers gets its range from some pictures that were learnt from. The first convolution, which sees the picture
+Weights have 8 bits in the file, those of each output in steps of their own; training can go on from them. What passes
+between layers gets its range from some pictures that were trained on. The first convolution, which sees the picture
 (with a separable one right after it), and the last ones, which tell scores and boxes, stay as they are. After Jacob et
 al., "Quantization and Training of Neural Networks for Efficient Integer-Arithmetic-Only Inference" (2018). Needs no
 torch.
@@ -61,7 +61,7 @@ def quantised_detector(file: Path, data: Path, out: Path) -> Path:
     """Write the network of a file, and those beside it, into a folder; gives the first's file.
 
     Those that are quantised already stay as they are. Ranges are measured on pictures of the data set `data` that
-    were learnt from. Raises TrainingDataError for files that cannot be used, or when there is nothing to do.
+    were trained on. Raises TrainingDataError for files that cannot be used, or when there is nothing to do.
     """
     try:
         model = load_model(file)

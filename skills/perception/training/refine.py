@@ -21,7 +21,7 @@ from skills.perception.detector.network_file import ModelFileError
 from skills.perception.training.crop_batches import CropFeed
 from skills.perception.training.crop_learner import CropLearner
 from skills.perception.training.export import export_crops
-from skills.perception.training.labels import LearningPicture, TrainingDataError, category_names, digest_of, read_split
+from skills.perception.training.labels import TrainingDataError, TrainingPicture, category_names, digest_of, read_split
 from skills.perception.training.loop import CHECKPOINT, Loop, Stepped, figures_of
 from skills.perception.training.onnx_files import offsets_fact
 from skills.perception.training.proposal_table import ProposalTable, proposals_in, refined_in, table_of
@@ -87,7 +87,7 @@ def _copy(model: Path, file: Path, options: RefineOptions) -> None:
 
 
 def _proposals_of(
-    options: RefineOptions, names: tuple[str, ...], pictures: tuple[LearningPicture, ...], store: PictureStore
+    options: RefineOptions, names: tuple[str, ...], pictures: tuple[TrainingPicture, ...], store: PictureStore
 ) -> ProposalTable:
     """What the networks before find in the training pictures. Raises TrainingDataError."""
     try:

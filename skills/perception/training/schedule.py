@@ -46,7 +46,7 @@ class Phase:
 
 @dataclass(frozen=True)
 class Budget:
-    """How long to learn: so many pictures, or so many seconds of learning; whichever is given."""
+    """How long to train: so many pictures, or so many seconds of training; whichever is given."""
 
     pictures: int | None = None
     seconds: float | None = None
@@ -62,8 +62,8 @@ class Budget:
 class Schedule:
     """A warm-up of so many steps, then half a cosine from the highest rate to the last.
 
-    Crops that hold little but an object come first, since most objects are learnt from in the same time there; then wider
-    windows; whole pictures, as the detector will see them, last. What goes on from learnt weights needs no crops:
+    Crops that hold little but an object come first, since most objects are trained on in the same time there; then wider
+    windows; whole pictures, as the detector will see them, last. What goes on from trained weights needs no crops:
     see `refining`.
     """
 
@@ -76,7 +76,7 @@ class Schedule:
 
     @staticmethod
     def refining(highest_rate: float = REFINING_RATE) -> Schedule:
-        """For weights that have been learnt already: the larger windows, then whole pictures.
+        """For weights that have been trained already: the larger windows, then whole pictures.
 
         In seven minutes at a rate of 2e-3 a quarter of the mean average precision was lost; at 8e-4 little of it.
         """

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX, fill_letterbox
 from skills.perception.detector.scales import Scales, halved
-from skills.perception.training.labels import LearningPicture, TrainingDataError
+from skills.perception.training.labels import TrainingDataError, TrainingPicture
 
 __all__ = ["PictureStore", "open_store", "read_picture", "read_scales"]
 
@@ -51,7 +51,7 @@ def read_scales(file: Path) -> Scales:
     return Scales(filled, halved(filled))
 
 
-def open_store(folder: Path, pictures: Sequence[LearningPicture]) -> PictureStore:
+def open_store(folder: Path, pictures: Sequence[TrainingPicture]) -> PictureStore:
     """The store of these pictures in a folder, filled first where it holds none or others. Raises TrainingDataError."""
     folder.mkdir(parents=True, exist_ok=True)
     told = hashlib.sha256("\n".join(str(picture.file) for picture in pictures).encode()).hexdigest()
@@ -71,7 +71,7 @@ def _mapped(folder: Path, count: int, mode: str) -> PictureStore:
     return PictureStore(array(_FULL, 1), array(_HALF, 2))
 
 
-def _fill(store: PictureStore, pictures: Sequence[LearningPicture]) -> None:
+def _fill(store: PictureStore, pictures: Sequence[TrainingPicture]) -> None:
     for k, picture in enumerate(pictures):
         scales = read_scales(picture.file)
         store.full[k], store.half[k] = scales.full, scales.half

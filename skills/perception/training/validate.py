@@ -26,7 +26,7 @@ CALIBRATED_BY: Final = 3600
 
 @dataclass(frozen=True)
 class Examination:
-    """Pictures of a data set that are not learnt from, their labels, and the classes."""
+    """Pictures of a data set that are not trained on, their labels, and the classes."""
 
     folder: Path
     pictures: Sequence[LabelledPicture]

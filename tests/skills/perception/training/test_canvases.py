@@ -6,7 +6,7 @@ import pytest
 
 from skills.perception.detector.letterbox import HEIGHT_PX, PADDING, WIDTH_PX
 from skills.perception.training.canvases import Canvas, CanvasMaker, CanvasOptions
-from skills.perception.training.labels import Labels, LearningPicture
+from skills.perception.training.labels import Labels, TrainingPicture
 from skills.perception.training.store import PictureStore
 
 SEEDS = range(12)
@@ -24,7 +24,7 @@ def maker() -> CanvasMaker:
     full = np.full((2, HEIGHT_PX, WIDTH_PX, 3), 60, dtype=np.uint8)
     x0, y0, x1, y1 = BOX
     full[:, y0:y1, x0:x1] = 250
-    picture = LearningPicture(Path("none.jpg"), labels(*BOX))
+    picture = TrainingPicture(Path("none.jpg"), labels(*BOX))
     return CanvasMaker([picture, picture], PictureStore(full, full[:, ::2, ::2]))
 
 

@@ -42,7 +42,7 @@ def batch_of(count: int) -> CropBatch:
     return CropBatch(crops, boxes, logits, boxes + 4.0, torch.arange(count) % (len(NAMES) + 1) - 1)
 
 
-def learnt(seed: int = 1) -> ClassifierNetwork:
+def trained(seed: int = 1) -> ClassifierNetwork:
     """A network that says something of its own."""
     torch.manual_seed(seed)
     network = ClassifierNetwork(len(NAMES))
@@ -76,10 +76,10 @@ def test_it_begins_with_imagenets_weights_and_learns_all_but_the_early_layers() 
     after = learner.network.state_dict()
     still = {name for name in before if name.startswith(("backbone.stem.", "backbone.stage8."))}
     assert all(torch.equal(before[name], after[name]) for name in still)
-    learnt = {name for name in before if name.startswith(("backbone.stage16.", "backbone.stage32."))}
-    learnt = {name for name in learnt if name.endswith(".0.weight")}
-    assert len(learnt) == 3 * 11
-    assert not any(torch.equal(before[name], after[name]) for name in learnt)
+    trained = {name for name in before if name.startswith(("backbone.stage16.", "backbone.stage32."))}
+    trained = {name for name in trained if name.endswith(".0.weight")}
+    assert len(trained) == 3 * 11
+    assert not any(torch.equal(before[name], after[name]) for name in trained)
 
 
 def test_crops_are_learnt_by_heart() -> None:
@@ -91,7 +91,7 @@ def test_crops_are_learnt_by_heart() -> None:
 
 
 def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_it(tmp_path: Path) -> None:
-    network, file, (crops, boxes, logits) = learnt(), tmp_path / "t.onnx", given(3)
+    network, file, (crops, boxes, logits) = trained(), tmp_path / "t.onnx", given(3)
     shift = (0.5, 0.0, -0.5)
     export_crops(
         network,
@@ -124,7 +124,7 @@ def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_
 
 
 def test_in_use_it_adds_a_part_of_what_it_adds_while_learning() -> None:
-    network, (crops, boxes, logits) = learnt(), given(3)
+    network, (crops, boxes, logits) = trained(), given(3)
     with torch.no_grad():
         learning, learning_boxes = network(crops, boxes, logits)
         network.stop_learning()
@@ -136,7 +136,7 @@ def test_in_use_it_adds_a_part_of_what_it_adds_while_learning() -> None:
 
 def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_path: Path) -> None:
     file = tmp_path / "t.onnx"
-    export_crops(learnt(), file, form=CLASSIFIER_FORMAT, class_names=NAMES, facts={})
+    export_crops(trained(), file, form=CLASSIFIER_FORMAT, class_names=NAMES, facts={})
     model = onnx.load(file)
     assert "Pad" not in {node.op_type for node in model.graph.node}
     crops, boxes, logits = given(8)
@@ -153,7 +153,7 @@ def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_pa
 
 
 def test_normalisation_becomes_part_of_the_layers() -> None:
-    network, (crops, boxes, logits) = learnt(), given(2)
+    network, (crops, boxes, logits) = trained(), given(2)
     with torch.no_grad():
         for mine, theirs in zip(fused(network)(crops, boxes, logits), network(crops, boxes, logits), strict=True):
             assert torch.allclose(mine, theirs, atol=1e-2)

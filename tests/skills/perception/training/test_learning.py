@@ -164,8 +164,8 @@ def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
     assert file.stat().st_size < 12_000_000
 
 
-def learnt(learner: ProposalLearner, steps: int) -> list[float]:
-    """Losses while learning four pictures with a bright rectangle each."""
+def trained(learner: ProposalLearner, steps: int) -> list[float]:
+    """Losses in training four pictures with a bright rectangle each."""
     canvases = []
     for k in range(4):
         picture = np.full((64, 64, 3), 40, dtype=np.uint8)
@@ -177,21 +177,21 @@ def learnt(learner: ProposalLearner, steps: int) -> list[float]:
 
 def test_four_pictures_are_learnt_by_heart() -> None:
     learner = ProposalLearner.new(len(NAMES), 1, CPU)
-    found = learnt(learner, 60)
+    found = trained(learner, 60)
     assert np.mean(found[-5:]) < 0.25 * np.mean(found[:5])
 
 
 def test_a_resumed_training_goes_on_to_the_bit(tmp_path: Path) -> None:
     torch.set_num_threads(1)
     whole = ProposalLearner.new(len(NAMES), 1, CPU)
-    learnt(whole, 6)
+    trained(whole, 6)
     part = ProposalLearner.new(len(NAMES), 1, CPU)
-    learnt(part, 3)
+    trained(part, 3)
     part.progress.taken = 12
     part.save(tmp_path / "checkpoint.pt")
     resumed = ProposalLearner.new(len(NAMES), 2, CPU)
     resumed.restore(tmp_path / "checkpoint.pt")
-    learnt(resumed, 3)
+    trained(resumed, 3)
     assert resumed.progress.taken == 12
     for mine, theirs in ((whole.network, resumed.network), (whole.average, resumed.average)):
         pairs = zip(mine.state_dict().values(), theirs.state_dict().values(), strict=True)

@@ -16,7 +16,7 @@ from onnxruntime import InferenceSession  # noqa: E402
 
 from skills.perception.detector.cascade_files import classifier_file, load_model, refinement_file  # noqa: E402
 from skills.perception.training.labels import TrainingDataError  # noqa: E402
-from skills.perception.training.onnx_files import learnt_weights  # noqa: E402
+from skills.perception.training.onnx_files import trained_weights  # noqa: E402
 from skills.perception.training.quantisation import main, quantised, quantised_detector  # noqa: E402
 
 
@@ -135,7 +135,7 @@ def test_a_separable_convolution_right_after_the_first_stays_as_it_is_too() -> N
 def test_weights_are_told_as_they_were_but_for_half_a_step_of_8_bits(
     plain: "onnx.ModelProto", made: "onnx.ModelProto"
 ) -> None:
-    before, after = learnt_weights(plain), learnt_weights(made)
+    before, after = trained_weights(plain), trained_weights(made)
     assert set(before) == set(after)
     for name, values in before.items():
         largest = np.abs(values).max(axis=tuple(range(1, values.ndim)), keepdims=True)

@@ -19,7 +19,7 @@ from skills.perception.training.crop_batches import CropFeed  # noqa: E402
 from skills.perception.training.crop_learner import CropLearner  # noqa: E402
 from skills.perception.training.crop_network import covered, moved  # noqa: E402
 from skills.perception.training.export import export, export_crops  # noqa: E402
-from skills.perception.training.labels import Labels, LearningPicture, TrainingDataError  # noqa: E402
+from skills.perception.training.labels import Labels, TrainingDataError, TrainingPicture  # noqa: E402
 from skills.perception.training.learner import ProposalLearner  # noqa: E402
 from skills.perception.training.losses import crop_losses  # noqa: E402
 from skills.perception.training.network import Residual  # noqa: E402
@@ -35,14 +35,14 @@ def new_learner(seed: int) -> CropLearner:
     return CropLearner.new(len(CLASSES), seed, CPU, classifier=False)
 
 
-def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> LearningPicture:
+def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> TrainingPicture:
     corners = [np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)], np.float32) for u0, v0, u1, v1 in boxes]
     count = len(corners)
     labels = Labels(tuple(corners), np.arange(count), np.ones(count, np.float32), np.full(count, ignored))
-    return LearningPicture(Path("none"), labels)
+    return TrainingPicture(Path("none"), labels)
 
 
-def table(file: Path, picture: LearningPicture, *things: tuple[str, float, tuple[float, ...]]) -> ProposalTable:
+def table(file: Path, picture: TrainingPicture, *things: tuple[str, float, tuple[float, ...]]) -> ProposalTable:
     look = partial(proposals_in, load_model(write_model(file)))
     seen = picture_of(*things)
     return table_of(look, [(Scales(seen, halved(seen)), picture.labels)])

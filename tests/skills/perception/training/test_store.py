@@ -4,15 +4,15 @@ import cv2
 import numpy as np
 import pytest
 
-from skills.perception.training.labels import Labels, LearningPicture, TrainingDataError
+from skills.perception.training.labels import Labels, TrainingDataError, TrainingPicture
 from skills.perception.training.store import open_store
 
 NOTHING = Labels((), np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros(0, bool))
 
 
-def picture(file: Path, value: int) -> LearningPicture:
+def picture(file: Path, value: int) -> TrainingPicture:
     cv2.imwrite(str(file), np.full((240, 320), value, dtype=np.uint8))
-    return LearningPicture(file, NOTHING)
+    return TrainingPicture(file, NOTHING)
 
 
 def test_pictures_are_kept_at_the_networks_size_and_at_half(tmp_path: Path) -> None:
@@ -34,5 +34,5 @@ def test_a_damaged_picture_is_named(tmp_path: Path) -> None:
     file = tmp_path / "a.jpg"
     file.write_bytes(b"no picture")
     with pytest.raises(TrainingDataError, match=r"a\.jpg"):
-        open_store(tmp_path / "kept", [LearningPicture(file, NOTHING)])
+        open_store(tmp_path / "kept", [TrainingPicture(file, NOTHING)])
     assert not (tmp_path / "kept" / "pictures.txt").exists()

@@ -69,11 +69,11 @@ def _rendered(out: Path, images: int, seed: int, jobs: int, console: Console) ->
     with Progress(*columns, console=console) as bar:
         task = bar.add_task("scenes", total=None)
 
-        def told(done: int, total: int) -> None:
+        def show(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)
 
         try:
-            return render(out, images=images, seed=seed, jobs=jobs, progress=told)
+            return render(out, images=images, seed=seed, jobs=jobs, progress=show)
         except DatasetError as error:
             raise InputError(error.message, mend=error.mend) from error
 

@@ -41,13 +41,13 @@ class Looked:
         found = [
             {"class": one.class_name, "score": round(one.score, 4), "box": _rounded(one.box)} for one in self.found
         ]
-        told: dict[str, Any] = {"file": str(self.file), "detections": found, "ms": round(self.ms, 3)}
-        return told if self.error is None else {**told, "error": str(self.error)}
+        values: dict[str, Any] = {"file": str(self.file), "detections": found, "ms": round(self.ms, 3)}
+        return values if self.error is None else {**values, "error": str(self.error)}
 
 
 def detect(
     images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Pictures: PNG, JPEG, WebP, TIFF, BMP.")],
-    threshold: Annotated[float, typer.Option(min=0.0, max=1.0, help="The least score that is told.")] = 0.5,
+    threshold: Annotated[float, typer.Option(min=0.0, max=1.0, help="The least score that is reported.")] = 0.5,
     model: Annotated[Path | None, typer.Option(help="Another detector's file; else the one of Errand.")] = None,
     draw: Annotated[Path | None, typer.Option(help="A folder for the pictures with boxes drawn.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
@@ -129,8 +129,8 @@ def _drawing_names(images: Sequence[Path], folder: Path) -> dict[int, Path]:
 def _show(console: Console, looked: Sequence[Looked]) -> None:
     table = Table("picture", "class", "score", "box (u0, v0, u1, v1)", "ms")
     for one in looked:
-        told = [(d.class_name, f"{d.score:.2f}", ", ".join(f"{value:.0f}" for value in d.box)) for d in one.found]
-        rows = told or [("cannot be read" if one.error else "nothing", "", "")]
+        values = [(d.class_name, f"{d.score:.2f}", ", ".join(f"{value:.0f}" for value in d.box)) for d in one.found]
+        rows = values or [("cannot be read" if one.error else "nothing", "", "")]
         for k, row in enumerate(rows):
             table.add_row(str(one.file) if k == 0 else "", *row, f"{one.ms:.1f}" if k == 0 and not one.error else "")
     console.print(table, markup=False)

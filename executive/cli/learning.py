@@ -62,7 +62,7 @@ def trained(
     with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
         task = bar.add_task("training", total=1.0)
 
-        def told(report: Report) -> None:
+        def show(report: Report) -> None:
             new_percent = int(100 * report.progress) > int(100 * bar.tasks[task].completed)
             bar.update(task, completed=report.progress, description=_told(report))
             if new_percent and not console.is_terminal:
@@ -72,7 +72,7 @@ def trained(
                 console.print(f"{report.progress:4.0%}  {_line(report.figures)}")
 
         try:
-            return work(told), figures
+            return work(show), figures
         except TrainingDataError as error:
             raise InputError(error.message, mend=error.mend) from error
         except OSError as error:

@@ -70,18 +70,18 @@ def score_command(
         work = _work(data, pictures or data.parent, limit, detector, views)
         found = _all_found(work, console)
         names = work.detector.class_names
-        told = {"all": score(work.pictures, found, names)}
+        scores = {"all": score(work.pictures, found, names)}
         for camera, (shown, seen) in by_camera(work.pictures, found).items():
-            told[camera] = score(shown, seen, BODY_CLASSES if camera == BODY else names)
+            scores[camera] = score(shown, seen, BODY_CLASSES if camera == BODY else names)
         speed = _pictures_per_second(work)
         order = _worst_first(work, found)[: worst or (WORST if drawing else 0)]
         if drawing is not None:
             write_picture(drawing, contact_sheet([_shown(work, found, k) for k in order]))
     named = [{"file": work.pictures[k].file, "error": round(_error(work, found, k), 3)} for k in order]
     if as_json:
-        print_json({"data": str(data), **scores_json(told, speed), **({"worst": named} if named else {})})
+        print_json({"data": str(data), **scores_json(scores, speed), **({"worst": named} if named else {})})
     else:
-        show_scores(console, told, speed)
+        show_scores(console, scores, speed)
         for one in named:
             console.print(f"{one['error']:7.3f}  {one['file']}", markup=False)
 
@@ -128,9 +128,9 @@ def _all_found(work: _Work, console: Console) -> list[Found]:
 
 def _found(work: _Work, group: range) -> list[Found]:
     """What is in some pictures. Those that stand on their heads are turned first, as on the robot."""
-    taken, told = [_read(work, k) for k in group], [work.pictures[k] for k in group]
-    upright = [turned(picture) if one.on_its_head else picture for picture, one in zip(taken, told, strict=True)]
-    seen = zip(_looked(work.detector, upright, work.views), taken, told, strict=True)
+    taken, labelled = [_read(work, k) for k in group], [work.pictures[k] for k in group]
+    upright = [turned(picture) if one.on_its_head else picture for picture, one in zip(taken, labelled, strict=True)]
+    seen = zip(_looked(work.detector, upright, work.views), taken, labelled, strict=True)
     return [turned_back(found, *picture.shape[1::-1]) if one.on_its_head else found for found, picture, one in seen]
 
 
@@ -148,10 +148,10 @@ def _groups(count: int) -> list[range]:
 
 def _read(work: _Work, k: int) -> Picture:
     """A picture of the size that its labels are for. Raises InputError."""
-    picture, told = read_picture(work.files[k]), work.pictures[k].size_px
+    picture, expected = read_picture(work.files[k]), work.pictures[k].size_px
     size = picture.shape[1], picture.shape[0]
-    if told is not None and told != size:
-        what = f"it has {size[0]} x {size[1]} pixels, and its labels are for {told[0]} x {told[1]}"
+    if expected is not None and expected != size:
+        what = f"it has {size[0]} x {size[1]} pixels, and its labels are for {expected[0]} x {expected[1]}"
         raise InputError(what, mend="label it as it is, or put back the picture that was labelled", file=work.files[k])
     return picture
 
@@ -177,8 +177,8 @@ def _error(work: _Work, found: Sequence[Found], k: int) -> float:
 
 
 def _shown(work: _Work, found: Sequence[Found], k: int) -> Shown:
-    told = judged(work.pictures[k], found[k], work.detector.class_names)
-    return Shown(work.pictures[k].file, _read(work, k), told)
+    judgement = judged(work.pictures[k], found[k], work.detector.class_names)
+    return Shown(work.pictures[k].file, _read(work, k), judgement)
 
 
 def _png(sheet: Path | None) -> Path | None:

@@ -14,26 +14,26 @@ from skills.perception.training.scoring import Bin, ClassScore, Score
 __all__ = ["scores_json", "show_scores"]
 
 
-def scores_json(told: Mapping[str, Score], pictures_per_second: float) -> dict[str, Any]:
+def scores_json(scores: Mapping[str, Score], pictures_per_second: float) -> dict[str, Any]:
     """All figures as JSON values: of all pictures, and by camera where the data set tells of cameras."""
-    cameras = {name: _json(one) for name, one in told.items() if name != "all"}
-    return {**_json(told["all"]), "frames_per_second": round(pictures_per_second, 1), "by_camera": cameras}
+    cameras = {name: _json(one) for name, one in scores.items() if name != "all"}
+    return {**_json(scores["all"]), "frames_per_second": round(pictures_per_second, 1), "by_camera": cameras}
 
 
-def _json(told: Score) -> dict[str, Any]:
+def _json(score: Score) -> dict[str, Any]:
     """The figures of some pictures; null where there are none."""
     return {
-        "pictures": told.pictures,
-        "mAP50": _rounded(told.map50),
-        "mAP50-95": _rounded(told.map50_95),
-        "precision": _rounded(told.precision),
-        "recall": _rounded(told.recall),
-        "per_class": {one.name: _class_json(one) for one in told.classes},
-        "distractor_pictures": told.distractor_pictures,
-        "false_per_100_distractor_pictures": _rounded(told.false_per_100_distractor_pictures),
-        "by_size_px": _bins_json(told.by_size_px),
-        "by_distance_m": _bins_json(told.by_distance_m),
-        "by_visibility": _bins_json(told.by_visibility),
+        "pictures": score.pictures,
+        "mAP50": _rounded(score.map50),
+        "mAP50-95": _rounded(score.map50_95),
+        "precision": _rounded(score.precision),
+        "recall": _rounded(score.recall),
+        "per_class": {one.name: _class_json(one) for one in score.classes},
+        "distractor_pictures": score.distractor_pictures,
+        "false_per_100_distractor_pictures": _rounded(score.false_per_100_distractor_pictures),
+        "by_size_px": _bins_json(score.by_size_px),
+        "by_distance_m": _bins_json(score.by_distance_m),
+        "by_visibility": _bins_json(score.by_visibility),
     }
 
 
@@ -59,36 +59,36 @@ def _bins_json(bins: Sequence[Bin]) -> list[dict[str, Any]]:
     ]
 
 
-def show_scores(console: Console, told: Mapping[str, Score], pictures_per_second: float) -> None:
+def show_scores(console: Console, scores: Mapping[str, Score], pictures_per_second: float) -> None:
     """Print the tables of each camera, or of all pictures, and the speed."""
-    for name, one in told.items():
-        if name != "all" or len(told) == 1:
+    for name, one in scores.items():
+        if name != "all" or len(scores) == 1:
             _show(console, name, one)
     console.print(f"{pictures_per_second:.0f} pictures a second")
 
 
-def _show(console: Console, camera: str, told: Score) -> None:
+def _show(console: Console, camera: str, score: Score) -> None:
     """Print tables and a line on the rest."""
     if camera != "all":
         console.print(f"{camera} camera" if camera == "hand" else f"{camera} cameras")
     table = Table("class", "labels", "AP50", "AP50-95", "precision", "recall")
-    for one in told.classes:
+    for one in score.classes:
         figures = (one.ap50, one.ap50_95, one.precision, one.recall)
         table.add_row(one.name, str(one.labels), *(_shown(value) for value in figures))
     table.add_section()
-    labels = sum(one.labels for one in told.classes)
-    figures = (told.map50, told.map50_95, told.precision, told.recall)
+    labels = sum(one.labels for one in score.classes)
+    figures = (score.map50, score.map50_95, score.precision, score.recall)
     table.add_row("all", str(labels), *(_shown(value) for value in figures))
     console.print(table)
     for name, bins in (
-        ("longer side, px", told.by_size_px),
-        ("distance, m", told.by_distance_m),
-        ("visibility", told.by_visibility),
+        ("longer side, px", score.by_size_px),
+        ("distance, m", score.by_distance_m),
+        ("visibility", score.by_visibility),
     ):
         _show_bins(console, name, bins)
-    false = _shown(told.false_per_100_distractor_pictures, digits=1)
+    false = _shown(score.false_per_100_distractor_pictures, digits=1)
     console.print(
-        f"{told.pictures} pictures, {told.distractor_pictures} of them with nothing to find: {false} false detections "
+        f"{score.pictures} pictures, {score.distractor_pictures} of them with nothing to find: {false} false detections "
         "in a hundred of those"
     )
 

@@ -1,4 +1,4 @@
-"""What an object alone would cover: its triangles drawn without anything before them, also beyond the picture's edge."""
+"""What an object alone would cover: its triangles drawn with nothing before them, also beyond the picture's edge."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ Picture = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Supply:
-    """Where objects come from: the categories that may lie about, those of no class, and one of a category by chance."""
+    """Where objects come from: the categories that may lie about, those of no class, and a random one of a category."""
 
     lying_about: Sequence[str]
     others: Sequence[str]

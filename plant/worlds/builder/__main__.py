@@ -19,7 +19,7 @@ PACKAGE = "package://errand/worlds/flat/furniture"
 
 
 def build(folder: Path) -> None:
-    """Write visual geometry, models, directives and maps into a world's folder. The same source gives the same bytes."""
+    """Write meshes, models, directives and maps into a world's folder. The same source gives the same bytes."""
     palette, pieces = materials(), layout(materials())
     for name, picture in pictures().items():
         write_png(folder / "furniture" / name, picture)

@@ -44,8 +44,8 @@ class ClassifierNetwork(CropNetwork):
         """Logits (N, K) and boxes (N, 4) of what the early layers make of crops."""
         at16, at32 = self.backbone.late(at8 + self.place(covered(boxes)))
         before = logits.clamp(-MOST_LOGIT, MOST_LOGIT)
-        told = [self.squeeze16(at16).flatten(1), self.squeeze32(at32).flatten(1), before, boxes / CROP_PX]
-        known = self.join(torch.cat(told, dim=1))
+        seen = [self.squeeze16(at16).flatten(1), self.squeeze32(at32).flatten(1), before, boxes / CROP_PX]
+        known = self.join(torch.cat(seen, dim=1))
         return self.trust * before + self.scores(known), moved(boxes, _SIDES_SCALE * self.sides(known).float())
 
     def stop_learning(self) -> None:

@@ -35,7 +35,7 @@ class Loop:
     """Trains until the time is over.
 
     `step` trains on one batch, given the share of the time that is done. `written` writes the ONNX file and returns its
-    figures; it is told whether this is the last time.
+    figures; its argument says whether this is the last time.
     """
 
     state: Learner[Any]

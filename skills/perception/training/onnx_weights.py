@@ -34,10 +34,10 @@ def take_over(network: DetectorNetwork, file: Path) -> None:
     Every normalisation passes on what it gets and adds the file's bias, until `settle`. Raises TrainingDataError.
     """
     try:
-        told = load_model(file, networks=1).proposal
+        source = load_model(file, networks=1).proposal
     except ModelFileError as error:
         raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
-    _take(network, file, told, [head.scores.bias for head in network.heads])
+    _take(network, file, source, [head.scores.bias for head in network.heads])
     _take_shares(network.backbone)
 
 
@@ -55,10 +55,10 @@ def take_over_classifier(network: ClassifierNetwork, file: Path) -> None:
 
 def _take_crop_network(network: CropNetwork, file: Path, load: Callable[[Path], Network]) -> None:
     try:
-        told = load(file)
+        source = load(file)
     except ModelFileError as error:
         raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
-    _take(network, file, told, [network.scores.bias])
+    _take(network, file, source, [network.scores.bias])
 
 
 @torch.no_grad()
@@ -68,9 +68,9 @@ def _take_shares(backbone: Backbone) -> None:
 
 
 @torch.no_grad()
-def _take(network: nn.Module, file: Path, told: Network, score_biases: Sequence[Tensor]) -> None:
+def _take(network: nn.Module, file: Path, source: Network, score_biases: Sequence[Tensor]) -> None:
     kept, left = _content(file), dict(network.named_parameters())
-    offsets = offsets_in(told.metadata, len(told.class_names))
+    offsets = offsets_in(source.metadata, len(source.class_names))
     try:
         for name, unit in normalised_layers(network):
             _fill(unit[0].weight, kept[f"{name}.0.weight"])

@@ -31,7 +31,7 @@ Floats = NDArray[np.float32]
 class ProposalTable:
     """R regions: picture's number (R,), box (R, 4) in the letterbox, logits (R, K), and the object there.
 
-    `classes` (R,) are those of the objects with which regions share NEAR or more, or -1; `wanted` (R, 4) are the objects'
+    `classes` (R,) are those of the objects with which regions share NEAR or more, or -1; `wanted` (R, 4) are their
     boxes, and the region's own where there is no object.
     """
 

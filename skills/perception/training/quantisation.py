@@ -175,7 +175,7 @@ def _last_opening(convolutions: Sequence[onnx.NodeProto]) -> int:
 
 def _groups(convolution: onnx.NodeProto) -> int:
     """In how many groups a convolution takes its channels."""
-    return next((int(told.i) for told in convolution.attribute if told.name == "group"), 1)
+    return next((int(one.i) for one in convolution.attribute if one.name == "group"), 1)
 
 
 def _reached(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto], *, upstream: bool) -> set[str]:

@@ -51,8 +51,8 @@ class RefinementNetwork(CropNetwork):
         levels = self.detector.neck(self.detector.backbone.late(at8 + self.place(covered(boxes))))
         seen_logits, seen_boxes = surest_about(boxes, *self.detector.from_levels(levels))
         seen_logits = seen_logits.clamp(-MOST_LOGIT, MOST_LOGIT)
-        told = [self.squeeze(levels[2]).flatten(1), first_logits, seen_logits, boxes / CROP_PX, seen_boxes / CROP_PX]
-        known = self.join(torch.cat(told, dim=1))
+        seen = [self.squeeze(levels[2]).flatten(1), first_logits, seen_logits, boxes / CROP_PX, seen_boxes / CROP_PX]
+        known = self.join(torch.cat(seen, dim=1))
         found = self.trust_first * first_logits + self.trust_seen * seen_logits + self.scores(known)
         nearer = boxes + self.nearer * (seen_boxes - boxes)
         return found, moved(nearer, _SIDES_SCALE * self.sides(known).float())

@@ -62,8 +62,8 @@ class Budget:
 class Schedule:
     """A warm-up of so many steps, then half a cosine from the highest rate to the last.
 
-    Crops that hold little but an object come first, since most objects are trained on in the same time there; then wider
-    windows; whole pictures, as the detector will see them, last. What goes on from trained weights needs no crops:
+    Crops that hold little but an object come first, since they show most objects in the same time; then wider windows;
+    whole pictures, as the detector will see them, last. What goes on from trained weights needs no crops:
     see `refining`.
     """
 

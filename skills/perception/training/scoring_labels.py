@@ -56,7 +56,7 @@ class Label:
 
 @dataclass(frozen=True)
 class LabelledPicture:
-    """A picture's file, as named by its data set, all that is known to be in it, and its width and height if told.
+    """A picture's file, as named by its data set, all that is known to be in it, and its width and height if known.
 
     `camera` is the name of its camera, and `on_its_head` whether that hung upside down, where the data set tells.
     """
@@ -118,14 +118,16 @@ def _category_names(document: Mapping[str, Any], class_names: Sequence[str]) -> 
     """Our name of each category id, None for a class that is none of ours. Raises ValueError when all are."""
     ours = {name.casefold(): name for name in class_names}
     entries = list(_entries(document, "categories"))
-    told = {
+    categories = {
         _number_of(one, "id", "categories", k): str(_value(one, "name", "categories", k))
         for k, one in enumerate(entries)
     }
-    names = {number: ours.get(name.strip().casefold()) for number, name in told.items()}
+    names = {number: ours.get(name.strip().casefold()) for number, name in categories.items()}
     if not any(names.values()):
         known = ", ".join(class_names)
-        raise ValueError(f"categories: none of {', '.join(told.values()) or 'them'} is a class that is known ({known})")
+        raise ValueError(
+            f"categories: none of {', '.join(categories.values()) or 'them'} is a class that is known ({known})"
+        )
     return names
 
 
@@ -142,8 +144,8 @@ def _label(entry: Mapping[str, Any], name: str, k: int) -> Label:
             distance_m=_number(entry.get("distance_m")),
         )
     except (TypeError, ValueError) as error:
-        told = f"bbox is four numbers (x, y, width, height), not {box!r}, or another of its fields is none"
-        raise ValueError(f"annotations[{k}]: {told}") from error
+        why = f"bbox is four numbers (x, y, width, height), not {box!r}, or another of its fields is none"
+        raise ValueError(f"annotations[{k}]: {why}") from error
 
 
 def _share_seen(entry: Mapping[str, Any]) -> float | None:

@@ -54,12 +54,12 @@ def read_scales(file: Path) -> Scales:
 def open_store(folder: Path, pictures: Sequence[TrainingPicture]) -> PictureStore:
     """The store of these pictures in a folder, filled first where it holds none or others. Raises TrainingDataError."""
     folder.mkdir(parents=True, exist_ok=True)
-    told = hashlib.sha256("\n".join(str(picture.file) for picture in pictures).encode()).hexdigest()
+    digest = hashlib.sha256("\n".join(str(picture.file) for picture in pictures).encode()).hexdigest()
     done = folder / _DONE
-    if not done.is_file() or done.read_text() != told:
+    if not done.is_file() or done.read_text() != digest:
         done.unlink(missing_ok=True)
         _fill(_mapped(folder, len(pictures), "w+"), pictures)
-        done.write_text(told)
+        done.write_text(digest)
     return _mapped(folder, len(pictures), "r")
 
 

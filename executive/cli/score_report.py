@@ -88,8 +88,8 @@ def _show(console: Console, camera: str, score: Score) -> None:
         _show_bins(console, name, bins)
     false = _shown(score.false_per_100_distractor_pictures, digits=1)
     console.print(
-        f"{score.pictures} pictures, {score.distractor_pictures} of them with nothing to find: {false} false detections "
-        "in a hundred of those"
+        f"{score.pictures} pictures, {score.distractor_pictures} of them with nothing to find: {false} false "
+        "detections in a hundred of those"
     )
 
 

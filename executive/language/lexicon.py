@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import yaml
 
-__all__ = ["Lexicon", "PrepositionRole", "VerbKind", "lexicon"]
+__all__ = ["Lexicon", "PrepositionRole", "VerbKind", "lexicon", "read_table"]
 
 Phrase = tuple[str, ...]
 
@@ -90,12 +90,17 @@ class Lexicon:
     gives: frozenset[str]
     hands: frozenset[str]
     calls: frozenset[str]
+    titles: frozenset[str]
+    units: frozenset[str]
+    vague_numbers: frozenset[str]
+    definite: frozenset[str]
+    numbers: Mapping[str, int]
 
 
 @cache
 def lexicon() -> Lexicon:
     """The dictionaries that come with the package."""
-    verbs, words = _read("verbs.yaml"), _read("words.yaml")
+    verbs, words = read_table("verbs.yaml"), read_table("words.yaml")
     read = {**verbs, **words}
     plain: dict[str, Any] = {
         each.name: _KINDS[each.type](read[each.name]) for each in fields(Lexicon) if each.type in _KINDS
@@ -109,13 +114,12 @@ def lexicon() -> Lexicon:
             for phrase in phrases
         },
         short_forms=words["short_forms"],
+        numbers={word: int(number) for word, number in words["numbers"].items()},
         corrections={tuple(p.split()): soft for soft in (False, True) for p in words["corrections"][_SOFTNESS[soft]]},
         light_nouns={verb: frozenset(nouns) for verb, nouns in words["light_nouns"].items()},
     )
 
 
-# Plain words: "on" is no truth value.
-_Loader: Final = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _SOFTNESS: Final = {False: "certain", True: "soft"}
 
 
@@ -123,9 +127,11 @@ def _phrases(texts: Iterable[str]) -> frozenset[Phrase]:
     return frozenset(tuple(text.split()) for text in texts)
 
 
-def _read(name: str) -> dict[str, Any]:
+@cache
+def read_table(name: str) -> dict[str, Any]:
+    """A table of this package: all that is no list or mapping is text, "on" and "no" among it."""
     text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-    data: dict[str, Any] = yaml.load(text, Loader=_Loader)
+    data: dict[str, Any] = yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
     return data
 
 

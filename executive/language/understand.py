@@ -5,20 +5,20 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from executive.language.foreign import foreign_reason
 from executive.language.normalise import clean
 from executive.language.parser import DependencyParser
-from executive.language.questions import ClarifyingQuestion
+from executive.language.questions import Answerer, ClarifyingQuestion, with_answer
 from executive.language.reference import Memory
-from executive.language.similar import Mended, WordFacts, mend_spelling
+from executive.language.similar import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
 from executive.language.wake import strip_wake
 from executive.mission.command import Command
 from executive.mission.knowledge import Knowledge
 
-__all__ = ["Status", "Understanding", "parse_lines", "understand"]
+__all__ = ["Status", "Understanding", "parse_lines", "understand", "understand_asking"]
 
 
 class Status(enum.Enum):
@@ -69,7 +69,7 @@ def understand(
     require_wake: bool,
     robot_name: str | None = None,
     memory: Memory | None = None,
-    mend: bool = True,
+    correct: bool = True,
 ) -> Understanding:
     """The commands that `sentence` asks for.
 
@@ -80,7 +80,7 @@ def understand(
         require_wake: whether a sentence without the wake phrase is not for this robot.
         robot_name: the name to listen to; by default the one in `knowledge`.
         memory: what was spoken of before, for "it" and "there".
-        mend: whether misspelled names are taken for known ones, where that is safe.
+        correct: whether misspelled names are taken for known ones where that is safe.
     """
     name = robot_name or (knowledge.robot.name if knowledge else "robot")
     wake = strip_wake(clean(sentence), name, knowledge.robot.others if knowledge else ())
@@ -91,11 +91,11 @@ def understand(
         reason = f'the robot\'s name was not said; begin with "Hey {name}"'
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
     facts = parser if isinstance(parser, WordFacts) else None
-    mended = Mended(wake.text)
-    if mend and knowledge is not None and facts is not None:
-        mended = mend_spelling(wake.text, knowledge, facts)
-    trace = trace_sentence(mended.text, parser=parser, knowledge=knowledge, memory=memory)
-    refusal, notes = trace.refusal, (*mended.notes, *trace.notes)
+    corrected = Corrected(wake.text)
+    if correct and knowledge is not None and facts is not None:
+        corrected = correct_spelling(wake.text, knowledge, facts)
+    trace = trace_sentence(corrected.text, parser=parser, knowledge=knowledge, memory=memory)
+    refusal, notes = trace.refusal, (*corrected.notes, *trace.notes)
     if refusal is None:
         return Understanding(sentence, Status.OK, trace.commands, notes=notes, memory=trace.memory, trace=trace)
     status = Status.QUESTION if refusal.question else Status.REFUSED
@@ -109,3 +109,37 @@ def parse_lines(
     """Understand each line for itself, in order; an empty line is refused, not skipped."""
     for line in lines:
         yield understand(line.rstrip("\r\n"), parser=parser, knowledge=knowledge, require_wake=require_wake)
+
+
+def understand_asking(
+    sentence: str,
+    *,
+    answer: Answerer,
+    parser: DependencyParser,
+    knowledge: Knowledge,
+    require_wake: bool,
+    robot_name: str | None = None,
+    correct: bool = True,
+) -> Understanding:
+    """What a sentence means once its questions are answered; `text` is the sentence with the answers in their places.
+
+    The arguments are those of `understand`. A question that is left open, or whose answer is not understood, is what
+    comes back.
+    """
+
+    def meaning(text: str) -> Understanding:
+        return understand(
+            text, parser=parser, knowledge=knowledge, require_wake=require_wake, robot_name=robot_name, correct=correct
+        )
+
+    meant = meaning(sentence)
+    for _ in range(_MOST_QUESTIONS):
+        said = None if meant.question is None else answer(meant.question)
+        if meant.question is None or said is None:
+            break
+        sentence = with_answer(sentence, meant.question, said)
+        meant = meaning(sentence)
+    return meant
+
+
+_MOST_QUESTIONS: Final = 3

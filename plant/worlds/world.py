@@ -195,13 +195,13 @@ def _read(path: Path, schema: type[ModelT]) -> ModelT:
         raise WorldError(f"{path}: cannot be read ({error.strerror}); every world needs this file") from error
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise WorldError(f"{path}:{line}: broken YAML, {error.problem}; mend the syntax there") from error
+        raise WorldError(f"{path}:{line}: broken YAML, {error.problem}; correct the syntax there") from error
     except ValidationError as error:
         raise WorldError(f"{path}:{_complaint(root, error)}") from error
 
 
 def _complaint(root: yaml.Node | None, error: ValidationError) -> str:
-    """Line, key and mend of the first fault; unknown keys first, since they often explain a missing one."""
+    """Line, key and hint of the first fault; unknown keys first, since they often explain a missing one."""
     faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     where, message = faults[0]["loc"], faults[0]["msg"]
     if faults[0]["type"] == "extra_forbidden":

@@ -22,7 +22,7 @@ KNOWN_KEYS = (*REQUIRED_KEYS, "negate", "mode", "height_band_m")
 
 
 class MapError(ValueError):
-    """A map that cannot be used; the text begins with file:line and ends with the mend."""
+    """A map that cannot be used; the text begins with file:line and ends with the hint."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def signed_distance(occupied: BoolGrid, resolution_m: float) -> NDArray[np.float
 
 
 def load_grid_map(path: Path) -> GridMap:
-    """Read a map_server YAML file and the picture that it names. Raises MapError with file:line and the mend."""
+    """Read a map_server YAML file and the picture that it names. Raises MapError with file:line and the hint."""
     lines = _key_lines(path)
     values = _Values(path, yaml.safe_load(path.read_text()), lines)
     values.refuse_unknown()
@@ -154,7 +154,7 @@ def _key_lines(path: Path) -> dict[str, int]:
         raise MapError(f"{path}:1: cannot be read ({error.strerror}); check the map's path") from error
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise MapError(f"{path}:{line}: {error.problem}; mend the YAML there") from error
+        raise MapError(f"{path}:{line}: {error.problem}; correct the YAML there") from error
     if not isinstance(node, yaml.MappingNode):
         raise MapError(f"{path}:1: must be a mapping with the keys {', '.join(REQUIRED_KEYS)}")
     return {key.value: key.start_mark.line + 1 for key, _ in node.value}

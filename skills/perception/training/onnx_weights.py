@@ -25,7 +25,7 @@ __all__ = ["settle", "take_over", "take_over_classifier", "take_over_refinement"
 
 _BEFORE = "network."
 _BYTES = 255.0
-_MEND = "begin anew without it"
+_HINT = "begin anew without it"
 
 
 def take_over(network: DetectorNetwork, file: Path) -> None:
@@ -36,7 +36,7 @@ def take_over(network: DetectorNetwork, file: Path) -> None:
     try:
         source = load_model(file, networks=1).proposal
     except ModelFileError as error:
-        raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
+        raise TrainingDataError(f"{file}: {error.message}", hint=_HINT) from error
     _take(network, file, source, [head.scores.bias for head in network.heads])
     _take_shares(network.backbone)
 
@@ -57,7 +57,7 @@ def _take_crop_network(network: CropNetwork, file: Path, load: Callable[[Path], 
     try:
         source = load(file)
     except ModelFileError as error:
-        raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
+        raise TrainingDataError(f"{file}: {error.message}", hint=_HINT) from error
     _take(network, file, source, [network.scores.bias])
 
 
@@ -82,7 +82,7 @@ def _take(network: nn.Module, file: Path, source: Network, score_biases: Sequenc
         for bias in score_biases:
             bias.sub_(torch.tensor(offsets))
     except (KeyError, ValueError) as error:
-        raise TrainingDataError(f"{file}: holds another network ({error})", mend=_MEND) from error
+        raise TrainingDataError(f"{file}: holds another network ({error})", hint=_HINT) from error
 
 
 def _content(file: Path) -> dict[str, Tensor]:

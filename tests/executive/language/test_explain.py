@@ -4,8 +4,7 @@ import pytest
 
 from executive.language import explain, understand
 from executive.language.explain import tree_lines
-from executive.language.explain_svg import arcs_svg
-from executive.language.explain_text import explanation_lines
+from executive.language.explain_views import arcs_svg, explanation_lines
 
 SVG = "{http://www.w3.org/2000/svg}"
 SENTENCE = "could you give Robin the hammer from the workshop, and bring two cokes here"
@@ -40,8 +39,8 @@ def test_each_action_has_its_roles(explained):
     assert bring.recipient == "start"
 
 
-def test_drafts_keep_the_spoken_names_and_commands_the_worlds(explained):
-    assert "Take [Nothing] to [Nothing] and do [grasp] to [2 cokes]" in explained.drafts
+def test_command_frames_keep_the_spoken_names_and_commands_the_worlds(explained):
+    assert "Take [Nothing] to [Nothing] and do [grasp] to [2 cokes]" in explained.frames
     assert "Take [Nothing] to [kitchen] and do [grasp] to [2 coke]" in explained.commands
 
 
@@ -59,8 +58,8 @@ def test_pronouns_are_told(parser):
         ("...", "clauses"),
         ("bring me a cup and sing", "understanding"),
         ("bring it", "reference"),
-        ("bring me the news", "reach"),
-        ("put the cup", "drafts"),
+        ("bring me the news", "feasibility"),
+        ("put the cup", "command frames"),
     ],
 )
 def test_the_step_that_refused_is_named(parser, sentence, step):
@@ -78,7 +77,17 @@ def test_a_name_that_the_world_lacks_is_refused_at_grounding(parser, knowledge):
 def test_the_text_has_all_steps_and_the_tree(explained):
     lines = list(explanation_lines(explained))
     headings = [line for line in lines if not line.startswith(" ")]
-    wanted = ["heard", "in plain words", "words", "dependencies", "subject", "parts", "actions", "drafts", "commands"]
+    wanted = [
+        "heard",
+        "in plain words",
+        "words",
+        "dependencies",
+        "subject",
+        "parts",
+        "actions",
+        "command frames",
+        "commands",
+    ]
     assert headings == [f"{name}:" for name in wanted]
     assert "  ├─ obj: hammer (NOUN)" in lines
 

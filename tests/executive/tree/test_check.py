@@ -14,6 +14,7 @@ from executive.tree.estimate import Route, load_estimates
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
 from skills.navigate.footprint import Footprint
+from skills.navigate.planner import LatticePlanner
 from skills.robot import Pose2D
 
 START = Pose2D(0.0, 0.0, 0.0)
@@ -95,7 +96,7 @@ def test_a_place_out_of_reach_is_refused_at_its_line(check):
     checked = check(GO.format("bedroom"), GO.format("kitchen"), ways=StraightRoutes(far_m=1.0))
     ((line, message),) = told(checked)
     assert (line, "no way to" in message) == (2, True)
-    assert checked.errors[0].mend
+    assert checked.errors[0].hint
 
 
 def test_a_search_goes_on_when_one_surface_is_out_of_reach(check):
@@ -163,7 +164,9 @@ def walled():
 
 
 def test_ways_are_planned_on_the_map_for_the_whole_body(walled):
-    ways = PlannedRoutes(walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]))
+    ways = PlannedRoutes(
+        walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]), LatticePlanner()
+    )
     here = Pose2D(-1.0, -1.0, 0.0)
     assert ways.route(here, Pose2D(-1.0, 1.0, 0.0)).length_m == pytest.approx(2.0, abs=0.3)
     for _ in range(2):

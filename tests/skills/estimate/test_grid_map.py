@@ -71,10 +71,10 @@ def test_unknown_ground_is_blocked_for_planning(tmp_path):
         ("negate: 0", "negative: 0", 4, "unknown key"),
         ("free_thresh: 0.196", "free_thresh: 0.9", 6, "below occupied_thresh"),
         ("image: room.pgm", "image: hall.pgm", 1, "hall.pgm"),
-        ("negate: 0", "negate: [0", 5, "mend the YAML"),
+        ("negate: 0", "negate: [0", 5, "correct the YAML"),
     ],
 )
-def test_errors_name_file_line_and_mend(tmp_path, old, new, line, words):
+def test_errors_name_file_line_and_hint(tmp_path, old, new, line, words):
     path = write_map(tmp_path, YAML.replace(old, new))
     with pytest.raises(MapError) as error:
         load_grid_map(path)

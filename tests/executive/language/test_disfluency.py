@@ -1,15 +1,15 @@
 import pytest
 
+from executive.language.disfluency import repair_disfluencies
 from executive.language.items import spoken_words
 from executive.language.lexicon import lexicon
-from executive.language.mending import mended
 from executive.language.phrases import noun_phrases
 from executive.language.reading import split_items
 
 
-def mend(parser, text):
+def hint(parser, text):
     tokens = parser.parse(text)
-    return spoken_words(mended(split_items(tokens, noun_phrases(tokens), lexicon())))
+    return spoken_words(repair_disfluencies(split_items(tokens, noun_phrases(tokens), lexicon())))
 
 
 @pytest.mark.parametrize(
@@ -29,9 +29,9 @@ def mend(parser, text):
     ],
 )
 def test_what_is_taken_back_is_gone(parser, text, meant):
-    assert mend(parser, text) == meant
+    assert hint(parser, text) == meant
 
 
 @pytest.mark.parametrize("text", ["bring the cup not", "bring the cup , no", "is the cup not here"])
 def test_what_takes_back_nothing_is_an_unknown_word(parser, text):
-    assert {"not", "no"} & set(mend(parser, text).split())
+    assert {"not", "no"} & set(hint(parser, text).split())

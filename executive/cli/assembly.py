@@ -48,7 +48,7 @@ def run_entry(
     stack = stack or default_stack()
     if tree.robot_name not in simulation.robots:
         known = ", ".join(simulation.robots)
-        raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", mend=f"known: {known}")
+        raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
     try:
         scan_map, keepout_map = load_grid_map(world.scan_map_path), load_grid_map(world.keepout_map_path)
     except (MapError, OSError) as error:
@@ -73,7 +73,7 @@ def _built(component: DetectorComponent) -> Detector:
     try:
         return component.build()
     except ModelFileError as error:
-        raise InputError(error.message, mend=error.mend, file=error.file) from error
+        raise InputError(error.message, hint=error.hint, file=error.file) from error
 
 
 def take_up_plant(simulation: Simulation, path: Path, *, label: str | None) -> None:

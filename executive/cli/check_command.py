@@ -106,13 +106,13 @@ def to_json(checked: Sequence[CheckedFile]) -> dict[str, Any]:
 
 def _error_json(error: InputError) -> dict[str, Any]:
     file = None if error.file is None else str(error.file)
-    return {"file": file, "line": error.line, "message": error.message, "hint": error.mend}
+    return {"file": file, "line": error.line, "message": error.message, "hint": error.hint}
 
 
 def _placed(file: Path, errors: Sequence[InputError]) -> tuple[InputError, ...]:
     """The errors, in the order of their lines; one that names no place stands at the head of the file."""
     placed = [
-        error if error.file is not None else InputError(error.message, mend=error.mend, file=file, line=1)
+        error if error.file is not None else InputError(error.message, hint=error.hint, file=file, line=1)
         for error in errors
     ]
     return tuple(sorted(placed, key=lambda error: (str(error.file) != str(file), str(error.file), error.line or 0)))

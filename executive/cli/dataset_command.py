@@ -75,7 +75,7 @@ def _rendered(out: Path, images: int, seed: int, jobs: int, console: Console) ->
         try:
             return render(out, images=images, seed=seed, jobs=jobs, progress=show)
         except DatasetError as error:
-            raise InputError(error.message, mend=error.mend) from error
+            raise InputError(error.message, hint=error.hint) from error
 
 
 def _show(console: Console, out: Path, summary: Summary, seconds: float) -> None:

@@ -28,7 +28,7 @@ def detector_of(file: Path | None, options: DetectorOptions) -> OnnxDetector:
     try:
         return load_detector(file or MODEL_FILE, options)
     except ModelFileError as error:
-        raise InputError(error.message, mend=error.mend, file=error.file) from error
+        raise InputError(error.message, hint=error.hint, file=error.file) from error
 
 
 def drawn(picture: Picture, found: Sequence[Detection]) -> Picture:

@@ -96,9 +96,9 @@ def take_up(store: MissionStore, mission: StoredMission) -> TakenUp:
     """
     prepared = prepare(as_it_was(mission, store.path))
     if prepared.request.fingerprint != mission.request.fingerprint:
-        mend = f"go back to the version that began it, or `errand queue remove {mission.id}` and give it again"
+        hint = f"go back to the version that began it, or `errand queue remove {mission.id}` and give it again"
         what = f"mission {mission.id} was begun with another version of errand, of the world or of the skills"
-        raise InputError(what, mend=mend, file=store.path)
+        raise InputError(what, hint=hint, file=store.path)
     memory = store.memory(mission.id)
     resumed, recollection = resumed_tree(prepared.tree, memory)
     journal = _journal(store, mission).remembering(recollection)
@@ -122,7 +122,7 @@ def as_it_was(mission: StoredMission, store: Path) -> Request:
         file.write_text(text, encoding="utf-8")
     except OSError as error:
         what = f"the file of mission {mission.id} has changed, and its old text cannot be laid beside it"
-        raise InputError(f"{what} ({error.strerror})", mend="put the old file back", file=file) from error
+        raise InputError(f"{what} ({error.strerror})", hint="put the old file back", file=file) from error
     return replace(mission.request, file=file)
 
 

@@ -25,22 +25,22 @@ def check_folders(data: Path, out: Path, resume: bool) -> None:
     """Raises InputError."""
     for name in ("train.json", "val.json"):
         if not (data / name).is_file():
-            raise InputError(f"{data / name}: there is no such file of a data set", mend=RENDER)
+            raise InputError(f"{data / name}: there is no such file of a data set", hint=RENDER)
     if (out / "checkpoint.pt").exists() and not resume:
-        raise InputError(f"{out}: holds a training already", mend="go on with it by --resume, or name another --out")
+        raise InputError(f"{out}: holds a training already", hint="go on with it by --resume, or name another --out")
 
 
 def check_time(minutes: float | None, epochs: int | None) -> None:
     """Raises InputError."""
     if minutes is not None and epochs is not None:
-        raise InputError("--minutes and --epochs are both given", mend="give one of them")
+        raise InputError("--minutes and --epochs are both given", hint="give one of them")
 
 
 def check_libraries(needed: Sequence[str] = NEEDED, work: str = "training") -> None:
     """Raises InputError."""
     missing = [name for name in needed if importlib.util.find_spec(name) is None]
     if missing:
-        raise InputError(f"{work} needs {' and '.join(missing)}", mend="pip install '.[train]'")
+        raise InputError(f"{work} needs {' and '.join(missing)}", hint="pip install '.[train]'")
 
 
 def budget_of(data: Path, minutes: float | None, epochs: int | None, *, unless_said_minutes: float) -> Budget:
@@ -50,7 +50,7 @@ def budget_of(data: Path, minutes: float | None, epochs: int | None, *, unless_s
     try:
         return Budget(pictures=epochs * len(read_split(data, "train")))
     except TrainingDataError as error:
-        raise InputError(error.message, mend=error.mend) from error
+        raise InputError(error.message, hint=error.hint) from error
 
 
 def trained(
@@ -74,9 +74,9 @@ def trained(
         try:
             return work(show), figures
         except TrainingDataError as error:
-            raise InputError(error.message, mend=error.mend) from error
+            raise InputError(error.message, hint=error.hint) from error
         except OSError as error:
-            raise InputError(f"{out}: cannot be written ({error})", mend="name another folder, or make room") from error
+            raise InputError(f"{out}: cannot be written ({error})", hint="name another folder, or make room") from error
 
 
 def print_trained(console: Console, model: Path, figures: dict[str, float], *, as_json: bool) -> None:

@@ -48,7 +48,7 @@ def listen(
     """Recognise what is said in wav files or at the microphone, and show the commands that it means."""
     with refusals():
         if mic == bool(files):
-            raise InputError("errand listen takes wav files or --mic", mend="try: errand listen request.wav")
+            raise InputError("errand listen takes wav files or --mic", hint="try: errand listen request.wav")
         knowledge = knowledge_of(open_world(world or DEFAULT_WORLD))
         listener = listener_for(
             knowledge, open_words=open_words, require_wake=not no_wake, vocabulary=vocabulary, robot_name=robot
@@ -98,7 +98,7 @@ def heard_sentence(wav: Path, listener: Listener) -> str:
     """
     recording = listener.file(wav)
     if not recording.heard:
-        raise InputError(recording.reason or "", mend="speak louder, or nearer to the microphone", file=wav)
+        raise InputError(recording.reason or "", hint="speak louder, or nearer to the microphone", file=wav)
     return " ".join(one.meant.understanding.text for one in recording.decisive)
 
 
@@ -111,7 +111,7 @@ def hear_request(
         InputError: there is another request, the extra `speech` is not installed, or see `heard_sentence`.
     """
     if other is not None:
-        raise InputError("--listen stands alone", mend="leave out --say and the mission file")
+        raise InputError("--listen stands alone", hint="leave out --say and the mission file")
     listener = listener_for(knowledge_of(open_world(world or DEFAULT_WORLD)), require_wake=require_wake)
     sentence = heard_sentence(wav, listener)
     console.print(Text(f"heard: {sentence}"))

@@ -37,9 +37,9 @@ def parse(
     """Show the commands that a sentence means."""
     with refusals():
         if (sentence is None) == (file is None):
-            raise InputError("errand parse takes one sentence or --file", mend='try: errand parse "go to the kitchen"')
+            raise InputError("errand parse takes one sentence or --file", hint='try: errand parse "go to the kitchen"')
         if svg is not None and sentence is None:
-            raise InputError("--svg draws one sentence", mend='try: errand parse "go to the kitchen" --svg arcs.svg')
+            raise InputError("--svg draws one sentence", hint='try: errand parse "go to the kitchen" --svg arcs.svg')
         knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))
         parser = load_parser()
         lines = [sentence] if sentence is not None else _lines_of(file)
@@ -85,11 +85,11 @@ def _echo(lines: Iterable[str], as_json: bool) -> None:
 
 def _draw(meaning: Understanding, file: Path) -> None:
     if meaning.trace is None or not meaning.trace.tokens:
-        raise InputError("there are no words to draw", mend="give a sentence in English words", file=file)
+        raise InputError("there are no words to draw", hint="give a sentence in English words", file=file)
     try:
         file.write_text(arcs_svg(explain(meaning.trace).tokens), encoding="utf-8")
     except OSError as error:
-        raise InputError(f"cannot write it ({error})", mend="name a file in a folder that exists", file=file) from error
+        raise InputError(f"cannot write it ({error})", hint="name a file in a folder that exists", file=file) from error
 
 
 def _lines_of(file: Path | None) -> list[str]:
@@ -97,4 +97,4 @@ def _lines_of(file: Path | None) -> list[str]:
     try:
         return file.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read it ({error})", mend="name a text file in UTF-8", file=file) from error
+        raise InputError(f"cannot read it ({error})", hint="name a text file in UTF-8", file=file) from error

@@ -50,22 +50,22 @@ def write_picture(file: Path, picture: Picture) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(content.tobytes() if encoded else b"")
     except OSError as error:
-        mend = "name a folder in which files can be written"
-        raise InputError(f"cannot write it ({error.strerror})", mend=mend, file=file) from error
+        hint = "name a folder in which files can be written"
+        raise InputError(f"cannot write it ({error.strerror})", hint=hint, file=file) from error
 
 
 def _too_large(file: Path, pixels: str) -> InputError:
     most = f"{MOST_PIXELS // 1_000_000} million are the most that is read"
-    return InputError(f"it has {pixels} pixels, and {most}", mend="make it smaller", file=file)
+    return InputError(f"it has {pixels} pixels, and {most}", hint="make it smaller", file=file)
 
 
 def _content(file: Path) -> bytes:
     try:
         return file.read_bytes()
     except IsADirectoryError as error:
-        raise InputError("it is a folder", mend=f"name the pictures in it, such as {file}/*.png", file=file) from error
+        raise InputError("it is a folder", hint=f"name the pictures in it, such as {file}/*.png", file=file) from error
     except OSError as error:
-        raise InputError(f"cannot read it ({error.strerror})", mend="name a picture file", file=file) from error
+        raise InputError(f"cannot read it ({error.strerror})", hint="name a picture file", file=file) from error
 
 
 def _decoded(content: bytes) -> Picture | None:
@@ -89,10 +89,10 @@ def _silent() -> Iterator[None]:
 
 def _unreadable(file: Path, content: bytes) -> InputError:
     if not content:
-        return InputError("it is empty", mend="name a picture file", file=file)
+        return InputError("it is empty", hint="name a picture file", file=file)
     if cv2.haveImageReader(str(file)):
-        return InputError("the picture is damaged or cut off", mend="copy or make it anew", file=file)
-    return InputError("it is no picture", mend="name a file in PNG, JPEG, WebP, TIFF or BMP", file=file)
+        return InputError("the picture is damaged or cut off", hint="copy or make it anew", file=file)
+    return InputError("it is no picture", hint="name a file in PNG, JPEG, WebP, TIFF or BMP", file=file)
 
 
 def _size(content: bytes) -> tuple[int, int]:

@@ -29,7 +29,7 @@ def run_queue(missions: MissionStore, console: Console, *, quiet: bool) -> list[
     broken = missions.missions(MissionState.RUNNING)
     if broken:
         what = f"mission {broken[-1].id} ({broken[-1].request.name}) was broken off"
-        raise InputError(what, mend="`errand resume` goes on with it and then with the queue", file=missions.path)
+        raise InputError(what, hint="`errand resume` goes on with it and then with the queue", file=missions.path)
     while queued := [each for each in missions.missions(MissionState.QUEUED) if each.queued]:
         results.append(start_of(missions, queued[0], console, quiet=quiet))
         if results[-1]["outcome"] == MissionState.CANCELLED.value:

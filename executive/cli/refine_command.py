@@ -69,7 +69,7 @@ def _first(model: Path | None) -> Path:
     """Raises InputError."""
     file = model or MODEL_FILE
     if not file.is_file():
-        raise InputError("there is no such file", mend="name a detector's ONNX file with --model", file=file)
+        raise InputError("there is no such file", hint="name a detector's ONNX file with --model", file=file)
     return file
 
 

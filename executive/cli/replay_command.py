@@ -40,7 +40,7 @@ def _write(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", mend="name another file", file=path) from error
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error
 
 
 def _serve(history: History, recording: Path | None, port: int, view_for_s: float | None) -> None:
@@ -55,7 +55,7 @@ def served(content: PageContent, port: int) -> PageServer:
     try:
         return PageServer(content, port=port)
     except OSError as error:
-        raise InputError(f"cannot serve at port {port} ({error.strerror})", mend="name another --port") from error
+        raise InputError(f"cannot serve at port {port} ({error.strerror})", hint="name another --port") from error
 
 
 def wait(limit_s: float | None) -> None:

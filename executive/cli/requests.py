@@ -57,7 +57,7 @@ def prepare(
             not understood, or the mission cannot be carried out.
     """
     if not request.only_commands and (request.file is None) == (request.sentence is None):
-        raise InputError("a mission file or --say is needed, and not both", mend='try: --say "Hey Alice, ..."')
+        raise InputError("a mission file or --say is needed, and not both", hint='try: --say "Hey Alice, ..."')
     if request.file is not None:
         return _filed(request, request.file, ask)
     world = open_world(request.world or request.world_name or DEFAULT_WORLD)
@@ -90,7 +90,7 @@ def _own_world(loaded: MissionFile) -> World:
     try:
         return open_world(loaded.world)
     except InputError as error:
-        raise loaded.error(("world",), error.message, error.mend) from error
+        raise loaded.error(("world",), error.message, error.hint) from error
 
 
 def _commanded(request: Request, world: World) -> Mission:
@@ -98,7 +98,7 @@ def _commanded(request: Request, world: World) -> Mission:
     try:
         read = [parse_command(command) for command in request.commands]
     except ValueError as error:
-        raise InputError(f"the mission '{request.name}' cannot be read: {error}", mend="give it again") from error
+        raise InputError(f"the mission '{request.name}' cannot be read: {error}", hint="give it again") from error
     return replace(mission_from_commands(read, world=world.name, robot_name=request.robot), name=request.name)
 
 

@@ -48,13 +48,13 @@ def _broken_off(missions: MissionStore, number: int | None) -> StoredMission:
         if broken:
             return broken[-1]
         queued = missions.missions(MissionState.QUEUED)
-        mend = "`errand queue run` does what is queued" if queued else "`errand queue list` shows how missions ended"
-        raise InputError("no mission was broken off", mend=mend, file=missions.path)
+        hint = "`errand queue run` does what is queued" if queued else "`errand queue list` shows how missions ended"
+        raise InputError("no mission was broken off", hint=hint, file=missions.path)
     chosen = missions.mission(number)
     if chosen.state not in _MAY_GO_ON:
         known = listing((state.value for state in _MAY_GO_ON), last="or")
         raise InputError(
-            f"mission {number} is {chosen.state.value}", mend=f"name one that is {known}", file=missions.path
+            f"mission {number} is {chosen.state.value}", hint=f"name one that is {known}", file=missions.path
         )
     return chosen
 

@@ -91,14 +91,14 @@ def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, v
     try:
         labelled = pictures_of_coco(_document(data), detector.class_names)[:limit]
     except ValueError as error:
-        raise InputError(str(error), mend="name a COCO file with --data", file=data) from error
+        raise InputError(str(error), hint="name a COCO file with --data", file=data) from error
     files = tuple(folder / picture.file for picture in labelled)
     missing = [file for file in files if not file.is_file()]
     if missing:
         what = f"{len(missing)} of {len(files)} pictures are not there"
-        raise InputError(what, mend="name the folder from which their names count with --pictures", file=missing[0])
+        raise InputError(what, hint="name the folder from which their names count with --pictures", file=missing[0])
     if not files:
-        raise InputError("it names no pictures", mend="name a COCO file with pictures with --data", file=data)
+        raise InputError("it names no pictures", hint="name a COCO file with pictures with --data", file=data)
     return _Work(labelled, files, detector, views)
 
 
@@ -108,7 +108,7 @@ def _document(data: Path) -> Any:
         return json.loads(data.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(
-            f"cannot read it ({error.strerror})", mend="name a COCO file with --data", file=data
+            f"cannot read it ({error.strerror})", hint="name a COCO file with --data", file=data
         ) from error
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"it is no JSON ({error})") from error
@@ -184,5 +184,5 @@ def _shown(work: _Work, found: Sequence[Found], k: int) -> Shown:
 def _png(sheet: Path | None) -> Path | None:
     """Raises InputError for a name that does not end in .png."""
     if sheet is not None and sheet.suffix.lower() != ".png":
-        raise InputError("the sheet is a PNG", mend=f"call it {sheet.with_suffix('.png').name}", file=sheet)
+        raise InputError("the sheet is a PNG", hint=f"call it {sheet.with_suffix('.png').name}", file=sheet)
     return sheet

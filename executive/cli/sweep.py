@@ -23,9 +23,9 @@ def seed_range(text: str) -> tuple[int, ...]:
     try:
         seeds = tuple(seed for part in text.split(",") for seed in _span(part))
     except ValueError as error:
-        raise InputError(f"'{text}' is no range of seeds", mend="write it like 1-20 or 1,4,7") from error
+        raise InputError(f"'{text}' is no range of seeds", hint="write it like 1-20 or 1,4,7") from error
     if not seeds:
-        raise InputError(f"'{text}' holds no seed", mend="write it like 1-20")
+        raise InputError(f"'{text}' holds no seed", hint="write it like 1-20")
     return seeds
 
 

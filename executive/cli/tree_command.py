@@ -81,7 +81,7 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
     if text is not None and text.endswith(LOG_SUFFIX):
         return read_history(Path(text)).trees(at_s)[-1]
     if at_s is not None:
-        raise InputError("--at is for logs", mend="name a log.mcap that a run has written")
+        raise InputError("--at is for logs", hint="name a log.mcap that a run has written")
     prepared = prepare(_request(text, say, world))
     for note in prepared.mission.notes:
         typer.echo(note, err=True)
@@ -90,12 +90,12 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
 
 def _request(text: str | None, say: str | None, world: str | None) -> Request:
     if text is not None and say is not None:
-        raise InputError("a sentence and --say were given", mend="leave one of them out")
+        raise InputError("a sentence and --say were given", hint="leave one of them out")
     if text is not None and (text.endswith((".yaml", ".yml")) or _is_file(text)):
         return Request(file=Path(text), world=world)
     sentence = say if text is None else text
     if sentence is None:
-        raise InputError("a mission file, a sentence or a log is needed", mend='try: errand tree "go to the kitchen"')
+        raise InputError("a mission file, a sentence or a log is needed", hint='try: errand tree "go to the kitchen"')
     return Request(sentence, world=world)
 
 
@@ -111,4 +111,4 @@ def _write(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", mend="name another file", file=path) from error
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error

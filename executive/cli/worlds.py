@@ -20,7 +20,7 @@ def _world_error(name: str, error: Exception) -> InputError:
     if not isinstance(error, OSError) and not str(error).startswith("unknown world"):
         return InputError(str(error))
     known = f"known are {', '.join(known_worlds())}, and folders with a world.dmd.yaml"
-    return InputError(f"unknown world '{name[:60]}'", mend=suggestion(name, known_worlds(), known))
+    return InputError(f"unknown world '{name[:60]}'", hint=suggestion(name, known_worlds(), known))
 
 
 def knowledge_of(world: World) -> Knowledge:

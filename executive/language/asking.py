@@ -22,7 +22,7 @@ def understand_asking(
     knowledge: Knowledge,
     require_wake: bool,
     robot_name: str | None = None,
-    mend: bool = True,
+    correct: bool = True,
 ) -> Understanding:
     """What a sentence means once its questions are answered; `text` is the sentence with the answers in their places.
 
@@ -32,7 +32,7 @@ def understand_asking(
 
     def meaning(text: str) -> Understanding:
         return understand(
-            text, parser=parser, knowledge=knowledge, require_wake=require_wake, robot_name=robot_name, mend=mend
+            text, parser=parser, knowledge=knowledge, require_wake=require_wake, robot_name=robot_name, correct=correct
         )
 
     meant = meaning(sentence)

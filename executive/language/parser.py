@@ -112,7 +112,7 @@ def load_parser() -> SpacyParser:
     spec = importlib.util.find_spec(_MODEL_PACKAGE)
     folders = [] if spec is None or spec.origin is None else sorted(Path(spec.origin).parent.glob("en_core_web_*"))
     if not folders:
-        raise InputError(f"the language model {_MODEL_PACKAGE!r} is missing", mend="install it with 'make env'")
+        raise InputError(f"the language model {_MODEL_PACKAGE!r} is missing", hint="install it with 'make env'")
     return SpacyParser(folders[-1])
 
 

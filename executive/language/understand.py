@@ -69,7 +69,7 @@ def understand(
     require_wake: bool,
     robot_name: str | None = None,
     memory: Memory | None = None,
-    mend: bool = True,
+    correct: bool = True,
 ) -> Understanding:
     """The commands that `sentence` asks for.
 
@@ -80,7 +80,7 @@ def understand(
         require_wake: whether a sentence without the wake phrase is not for this robot.
         robot_name: the name to listen to; by default the one in `knowledge`.
         memory: what was spoken of before, for "it" and "there".
-        mend: whether misspelled names are taken for known ones, where that is safe.
+        correct: whether misspelled names are taken for known ones where that is safe.
     """
     name = robot_name or (knowledge.robot.name if knowledge else "robot")
     wake = strip_wake(clean(sentence), name, knowledge.robot.others if knowledge else ())
@@ -92,7 +92,7 @@ def understand(
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
     facts = parser if isinstance(parser, WordFacts) else None
     mended = Mended(wake.text)
-    if mend and knowledge is not None and facts is not None:
+    if correct and knowledge is not None and facts is not None:
         mended = mend_spelling(wake.text, knowledge, facts)
     trace = trace_sentence(mended.text, parser=parser, knowledge=knowledge, memory=memory)
     refusal, notes = trace.refusal, (*mended.notes, *trace.notes)

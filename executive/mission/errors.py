@@ -1,4 +1,4 @@
-"""The one error that a user's bad input gives: it names the place and the mend."""
+"""The one error that a user's bad input gives: it names the place and the hint."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class SourceLine:
 class InputError(Exception):
     """Something that the user wrote cannot be used.
 
-    `message` says what is wrong, `mend` what to do about it; `file` and `line` (from 1) name the place where known.
+    `message` says what is wrong, `hint` what to do about it; `file` and `line` (from 1) name the place where known.
     `others` are more errors that were found at once.
     """
 
@@ -29,29 +29,29 @@ class InputError(Exception):
         self,
         message: str,
         *,
-        mend: str = "",
+        hint: str = "",
         file: Path | str | None = None,
         line: int | None = None,
         others: Iterable[InputError] = (),
     ) -> None:
         self.message = message
         self.others = tuple(others)
-        self.mend = mend
+        self.hint = hint
         self.file = None if file is None else Path(file)
         self.line = line
         super().__init__(str(self))
 
     @classmethod
-    def at(cls, source: SourceLine | None, message: str, *, mend: str = "") -> InputError:
+    def at(cls, source: SourceLine | None, message: str, *, hint: str = "") -> InputError:
         """An error in a line, where that is known."""
         if source is None:
-            return cls(message, mend=mend)
-        return cls(message, mend=mend, file=source.file, line=source.line)
+            return cls(message, hint=hint)
+        return cls(message, hint=hint, file=source.file, line=source.line)
 
     def __str__(self) -> str:
-        """One line: "file:line: what; mend"."""
+        """One line: "file:line: what; hint"."""
         place = "" if self.file is None else f"{self.file}: " if self.line is None else f"{self.file}:{self.line}: "
-        return " ".join(f"{place}{self.message}{'; ' if self.mend else ''}{self.mend}".split())
+        return " ".join(f"{place}{self.message}{'; ' if self.hint else ''}{self.hint}".split())
 
     def within(self, file: Path, line: int) -> InputError:
         """The same error, and the line of the file that brought it about by using the file in which it is.
@@ -60,9 +60,9 @@ class InputError(Exception):
         """
         others = [other.within(file, line) for other in self.others]
         if self.file is None:
-            return InputError(self.message, mend=self.mend, file=file, line=line, others=others)
+            return InputError(self.message, hint=self.hint, file=file, line=line, others=others)
         text = f"{self.message} (used by {file}:{line})"
-        return InputError(text, mend=self.mend, file=self.file, line=self.line, others=others)
+        return InputError(text, hint=self.hint, file=self.file, line=self.line, others=others)
 
 
 class Problems:
@@ -89,7 +89,7 @@ class Problems:
         """Raise the first, with the others; do nothing when there is none."""
         if self._errors:
             first, *others = self._errors
-            raise InputError(first.message, mend=first.mend, file=first.file, line=first.line, others=others)
+            raise InputError(first.message, hint=first.hint, file=first.file, line=first.line, others=others)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str | None:
@@ -100,7 +100,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str | None:
 
 
 def suggestion(word: str, known: Iterable[str], otherwise: str | None = None) -> str:
-    """The mend for a word that is not known: the one that was probably meant, else `otherwise`, else all there are."""
+    """The hint for a word that is not known: the one that was probably meant, else `otherwise`, else all there are."""
     names = list(known)
     near = did_you_mean(word, names)
     return f"did you mean '{near}'?" if near else f"known are {listing(names)}" if otherwise is None else otherwise

@@ -188,7 +188,7 @@ def load_knowledge(path: Path | str) -> Knowledge:
     """Read a world's `knowledge.yaml`.
 
     Raises:
-        InputError: with file, line and mend, for broken YAML, unknown or missing keys, wrong values, and names that
+        InputError: with file, line and hint, for broken YAML, unknown or missing keys, wrong values, and names that
             are used but nowhere defined or mean two things.
     """
     return knowledge_of_source(read_yaml(path))
@@ -238,5 +238,5 @@ def _doubles(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
                 for word in (name, *facts.aliases):
                     other = seen.setdefault(word.lower(), name)
                     if other != name:
-                        mend = "give one of them another name"
-                        yield source.error((kind, name), f"{word!r} means both {other!r} and {name!r}", mend)
+                        hint = "give one of them another name"
+                        yield source.error((kind, name), f"{word!r} means both {other!r} and {name!r}", hint)

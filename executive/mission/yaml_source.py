@@ -1,4 +1,4 @@
-"""YAML files that remember their lines, checked against a pydantic model; errors name the place and the mend."""
+"""YAML files that remember their lines, checked against a pydantic model; errors name the place and the hint."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class YamlSource:
         known = next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.lines), None)
         return self.first_line if known is None else self.lines[known]
 
-    def error(self, path: KeyPath, message: str, mend: str = "") -> InputError:
+    def error(self, path: KeyPath, message: str, hint: str = "") -> InputError:
         """An error at `path`."""
-        return InputError(message, mend=mend, file=self.path, line=self.line(path))
+        return InputError(message, hint=hint, file=self.path, line=self.line(path))
 
 
 def read_yaml(path: Path | str) -> YamlSource:
@@ -55,28 +55,28 @@ def read_yaml(path: Path | str) -> YamlSource:
         data = None if root is None else _plain(root)
         places = list(_walk(root, ()))
     except OSError as error:
-        raise InputError(f"cannot read it ({error.strerror})", mend="name a file that exists", file=file) from error
+        raise InputError(f"cannot read it ({error.strerror})", hint="name a file that exists", file=file) from error
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
-        raise InputError("it is no UTF-8 text", mend="save it as UTF-8", file=file, line=line) from error
+        raise InputError("it is no UTF-8 text", hint="save it as UTF-8", file=file, line=line) from error
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = 1 if mark is None else mark.line + 1
         what = f"broken YAML: {error.problem or error.context}"
-        raise InputError(what, mend="mend the indentation, brackets or quotes here", file=file, line=line) from error
+        raise InputError(what, hint="mend the indentation, brackets or quotes here", file=file, line=line) from error
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         what = f"broken YAML: the character {chr(error.character)!r} cannot stand in a text"
-        raise InputError(what, mend="remove it", file=file, line=line) from error
+        raise InputError(what, hint="remove it", file=file, line=line) from error
     except (yaml.YAMLError, ValueError) as error:
-        raise InputError(f"broken YAML: {error}", mend="mend it", file=file, line=1) from error
+        raise InputError(f"broken YAML: {error}", hint="mend it", file=file, line=1) from error
     except RecursionError as error:
-        raise InputError("it is nested too deeply", mend="write it flatter", file=file, line=1) from error
+        raise InputError("it is nested too deeply", hint="write it flatter", file=file, line=1) from error
     lines: dict[KeyPath, int] = {}
     for key_path, line in places:
         if key_path in lines:
             what = f"key {key_path[-1]!r} stands twice (first in line {lines[key_path]})"
-            raise InputError(what, mend="remove one of the two", file=file, line=line)
+            raise InputError(what, hint="remove one of the two", file=file, line=line)
         lines[key_path] = line
     return YamlSource(file, data, lines)
 
@@ -86,7 +86,7 @@ def _text(file: Path) -> str:
     size = file.stat().st_size
     if size > MAX_BYTES:
         what = f"it is too large ({size} bytes; at most {MAX_BYTES} are read)"
-        raise InputError(what, mend="split it into files that use each other", file=file, line=1)
+        raise InputError(what, hint="split it into files that use each other", file=file, line=1)
     return file.read_text(encoding="utf-8")
 
 
@@ -106,7 +106,7 @@ def _refuse_aliases(text: str, file: Path) -> None:
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
             what = f"the alias '*{event.anchor}' cannot be used here"
-            raise InputError(what, mend="write it out", file=file, line=_line(event))
+            raise InputError(what, hint="write it out", file=file, line=_line(event))
 
 
 def _line(event: yaml.Event) -> int:
@@ -137,13 +137,13 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
         InputError: the first thing that does not fit the model, with its line and what would fit; the rest in `others`.
     """
     if not isinstance(source.data, dict):
-        mend = f"begin with the keys {listing(_field_names(model))}"
-        raise InputError("the file holds no mapping of keys to values", mend=mend, file=source.path, line=1)
+        hint = f"begin with the keys {listing(_field_names(model))}"
+        raise InputError("the file holds no mapping of keys to values", hint=hint, file=source.path, line=1)
     try:
         return model.model_validate(source.data)
     except ValidationError as error:
         first, *others = [_input_error(model, source, fault) for fault in _telling(error.errors(), source)]
-        raise InputError(first.message, mend=first.mend, file=first.file, line=first.line, others=others) from error
+        raise InputError(first.message, hint=first.hint, file=first.file, line=first.line, others=others) from error
 
 
 def _telling(errors: list[ErrorDetails], source: YamlSource) -> list[ErrorDetails]:
@@ -166,19 +166,19 @@ def _path(error: ErrorDetails) -> KeyPath:
 
 
 def _input_error(model: type[BaseModel], source: YamlSource, error: ErrorDetails) -> InputError:
-    """A pydantic error, told with its place and its mend."""
+    """A pydantic error, told with its place and its hint."""
     path = _path(error)
     where = ".".join(str(part) for part in path)
     known = _field_names(_model_at(model, path[:-1]))
     if error["type"] == "extra_forbidden":
-        mend = suggestion(str(path[-1]), known, f"known keys are {listing(known)}")
-        return source.error(path, f"unknown key {path[-1]!r}", mend)
+        hint = suggestion(str(path[-1]), known, f"known keys are {listing(known)}")
+        return source.error(path, f"unknown key {path[-1]!r}", hint)
     if error["type"] == "missing":
         parent = ".".join(str(part) for part in path[:-1]) or "the file"
         return source.error(path[:-1], f"key {path[-1]!r} is missing in {parent}", f"add {path[-1]!r}")
     what = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
-    mend = _nearest_word(error) or f"it reads {error['input']!r} now"[:120]
-    return source.error(path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", mend)
+    hint = _nearest_word(error) or f"it reads {error['input']!r} now"[:120]
+    return source.error(path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", hint)
 
 
 def _nearest_word(error: ErrorDetails) -> str | None:

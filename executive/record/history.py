@@ -46,11 +46,11 @@ class History:
             elif event.topic == ACTIVITY and found:
                 _latest(found, event.data.get("robot"))[event.data["node"]] = logged_activity(event.data)
         if not found:
-            raise InputError("the log holds no tree", mend="it ended before the mission began", file=self.file)
+            raise InputError("the log holds no tree", hint="it ended before the mission began", file=self.file)
         try:
             return tuple(logged_view(data["root"], states) for data, states in found)
         except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"the log's tree is broken ({error})", mend="run it again", file=self.file) from error
+            raise InputError(f"the log's tree is broken ({error})", hint="run it again", file=self.file) from error
 
 
 def read_history(path: Path) -> History:

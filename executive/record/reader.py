@@ -36,9 +36,9 @@ def read_events(path: Path) -> tuple[Event, ...]:
         with path.open("rb") as file:
             return tuple(_events(NonSeekingReader(file)))
     except OSError as error:
-        raise InputError(f"cannot read it ({error.strerror})", mend="name a log that exists", file=path) from error
+        raise InputError(f"cannot read it ({error.strerror})", hint="name a log that exists", file=path) from error
     except _DAMAGE as error:
-        raise InputError("it is no event log", mend="name a log.mcap that a run has written", file=path) from error
+        raise InputError("it is no event log", hint="name a log.mcap that a run has written", file=path) from error
 
 
 def _events(reader: NonSeekingReader) -> Iterator[Event]:

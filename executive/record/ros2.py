@@ -59,7 +59,7 @@ def write_ros2(events: Iterable[Event], path: Path) -> int:
                     count += 1
             writer.finish()
     except OSError as error:
-        raise InputError(f"cannot write it ({error.strerror})", mend="name another file", file=path) from error
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=path) from error
     return count
 
 

@@ -376,5 +376,5 @@ class Control:
     def _refuse_unknown(self, path_id: str) -> None:
         if self._begun and path_id not in self._known:
             near = difflib.get_close_matches(path_id, self._known, n=1)
-            mend = f"; did you mean '{near[0]}'?" if near else ""
-            raise ValueError(f"the run has no node '{path_id}'{mend}")
+            hint = f"; did you mean '{near[0]}'?" if near else ""
+            raise ValueError(f"the run has no node '{path_id}'{hint}")

@@ -27,7 +27,7 @@ Matrix = npt.NDArray[np.float16]
 
 _UP, _DOWN, _BASE = ".up", ".down", "base"
 _FILE: Final = "noise_adapter.npz"
-_MEND: Final = f"make a new one: python -m executive.speech.training --out executive/speech/{_FILE}"
+_HINT: Final = f"make a new one: python -m executive.speech.training --out executive/speech/{_FILE}"
 
 
 @dataclass(frozen=True)
@@ -109,4 +109,4 @@ def read_adapter(content: bytes, *, base: str) -> Adapter:
 
 
 def _unfit(what: str) -> InputError:
-    return InputError(f"the recogniser's adapter to noise {what}", mend=_MEND)
+    return InputError(f"the recogniser's adapter to noise {what}", hint=_HINT)

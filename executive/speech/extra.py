@@ -10,7 +10,7 @@ from executive.mission.errors import InputError
 
 __all__ = ["speech_module"]
 
-_MEND: Final = "install the extra that listens: pip install 'spot-errand[speech]'"
+_HINT: Final = "install the extra that listens: pip install 'spot-errand[speech]'"
 
 
 def speech_module(name: str) -> ModuleType:
@@ -22,4 +22,4 @@ def speech_module(name: str) -> ModuleType:
     try:
         return import_module(name)
     except ImportError as error:
-        raise InputError(f"speech needs {name.split('.')[0]}, which is not installed", mend=_MEND) from error
+        raise InputError(f"speech needs {name.split('.')[0]}, which is not installed", hint=_HINT) from error

@@ -68,7 +68,7 @@ class Listener:
 
         heard = tuple(filter(None, map(self.hear, together(self.utterances(measured()), self.rules.most_s))))
         if not loudness.count:
-            raise InputError("it holds no sound", mend="record again", file=wav)
+            raise InputError("it holds no sound", hint="record again", file=wav)
         return Recording(str(wav), heard, loudness)
 
     def utterances(self, blocks: Iterable[Samples]) -> Iterator[Utterance]:

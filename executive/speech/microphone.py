@@ -18,7 +18,7 @@ from executive.speech.sound import RATE_HZ, Samples, level_db
 __all__ = ["Hearing", "follow", "microphone_blocks"]
 
 BLOCK_S: Final = 0.1
-_MEND: Final = "install alsa-utils, or record to a wav file and give that"
+_HINT: Final = "install alsa-utils, or record to a wav file and give that"
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def microphone_blocks(*, which: Callable[[str], str | None] = shutil.which) -> G
     """
     program = which("arecord")
     if program is None:
-        raise InputError("a microphone needs the program arecord", mend=_MEND)
+        raise InputError("a microphone needs the program arecord", hint=_HINT)
     form = ("--quiet", "--format=S16_LE", f"--rate={RATE_HZ}", "--channels=1", "--file-type=raw")
     with subprocess.Popen((program, *form), stdout=subprocess.PIPE, stderr=subprocess.PIPE) as recorder:
         assert recorder.stdout is not None and recorder.stderr is not None
@@ -70,6 +70,6 @@ def microphone_blocks(*, which: Callable[[str], str | None] = shutil.which) -> G
             while len(raw := recorder.stdout.read(size)) == size:
                 yield np.frombuffer(raw, "<i2").astype(np.float32) / 32768.0
             told = " ".join(recorder.stderr.read().decode(errors="replace").split())
-            raise InputError(f"the microphone is not heard ({told})", mend="plug one in, or give a wav file")
+            raise InputError(f"the microphone is not heard ({told})", hint="plug one in, or give a wav file")
         finally:
             recorder.terminate()

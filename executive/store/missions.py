@@ -83,8 +83,8 @@ class MissionStore:
         rows = self._rows("SELECT * FROM mission WHERE id = ?", number)
         if not rows:
             known = [str(mission.id) for mission in self.missions()]
-            mend = f"known are {listing(known)}" if known else "the store is empty; queue one first"
-            raise InputError(f"there is no mission {number}", mend=mend, file=self.path)
+            hint = f"known are {listing(known)}" if known else "the store is empty; queue one first"
+            raise InputError(f"there is no mission {number}", hint=hint, file=self.path)
         return _mission(rows[0])
 
     def missions(self, *states: MissionState) -> tuple[StoredMission, ...]:
@@ -126,8 +126,8 @@ class MissionStore:
             board = {row["key"]: from_text(row["text"]) for row in values}
             return Memory({row["path_id"]: _step(row) for row in steps}, board, self.mission(number).pose)
         except ValueError as error:
-            mend = f"`errand queue remove {number}`, and give the mission again"
-            raise InputError(f"mission {number} cannot be taken up: {error}", mend=mend, file=self.path) from error
+            hint = f"`errand queue remove {number}`, and give the mission again"
+            raise InputError(f"mission {number} cannot be taken up: {error}", hint=hint, file=self.path) from error
 
     def journal(self, number: int) -> StoreJournal:
         """Keeps notes of a mission's run."""
@@ -144,9 +144,9 @@ class MissionStore:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
                 file.seek(0)
-                mend = "wait until it is done, or give another folder by --out or another --store"
+                hint = "wait until it is done, or give another folder by --out or another --store"
                 what = f"process {file.read() or '?'} runs a mission of this store"
-                raise InputError(what, mend=mend, file=self.path) from error
+                raise InputError(what, hint=hint, file=self.path) from error
             file.truncate(0)
             file.write(str(os.getpid()))
             file.flush()

@@ -140,9 +140,9 @@ class SkillTestFile(_Strict):
         """The line at which a test stands, from 1."""
         return 1 if self._source is None else self._source.line(("tests", index))
 
-    def error(self, path: tuple[str | int, ...], message: str, mend: str) -> InputError:
+    def error(self, path: tuple[str | int, ...], message: str, hint: str) -> InputError:
         """An error in what stands at `path`."""
-        return InputError(message, mend=mend) if self._source is None else self._source.error(path, message, mend)
+        return InputError(message, hint=hint) if self._source is None else self._source.error(path, message, hint)
 
     def ports(self, index: int) -> dict[str, Any]:
         """The input ports of one test as they stand in the file."""
@@ -155,15 +155,15 @@ class SkillTestFile(_Strict):
             found = gathered(values, skill.Inputs)
             missing = [name for name in required(skill.Inputs) if name not in found]
             if missing:
-                mend = f"give it a {describe_type(hints[missing[0]])}"
-                raise PortValueError((), f"input port '{missing[0]}' has no value", mend)
+                hint = f"give it a {describe_type(hints[missing[0]])}"
+                raise PortValueError((), f"input port '{missing[0]}' has no value", hint)
             given = {port: port_value(value, hints[port], knowledge, at) for port, (at, value) in found.items()}
         except PortValueError as error:
             own = not self.with_ or (bool(error.path) and error.path[0] in self.tests[index].with_)
             where = ("tests", index, "with") if own else ("with",)
             port = ".".join(map(str, error.path))
             what = f"{port}: {error.message}" if port else error.message
-            raise self.error((*where, *error.path), what, error.mend) from error
+            raise self.error((*where, *error.path), what, error.hint) from error
         return skill.Inputs(**given)
 
 
@@ -172,20 +172,20 @@ def load_skill_tests(
 ) -> SkillTestFile:
     """Read a file of skill tests and check it against the registered skills.
 
-    Raises InputError: with file, line and mend: broken YAML, unknown keys, no such skill, port or fault, wrong values.
+    Raises InputError: with file, line and hint: broken YAML, unknown keys, no such skill, port or fault, wrong values.
     """
     source = read_yaml(path)
     file = validate(SkillTestFile, source)
     file._source = source
     if file.skill not in skills:
-        mend = suggestion(file.skill, skills, f"registered are {listing(skills)}")
-        raise file.error(("skill",), f"there is no skill '{file.skill}'", mend)
+        hint = suggestion(file.skill, skills, f"registered are {listing(skills)}")
+        raise file.error(("skill",), f"there is no skill '{file.skill}'", hint)
     for index, test in enumerate(file.tests):
         file.inputs(index, skills[file.skill])
         for number, words in enumerate(test.faults):
             try:
                 parse_fault(words, kinds)
             except ValueError as error:
-                what, _, mend = str(error).partition("; ")
-                raise file.error(("tests", index, "faults", number), what, mend) from error
+                what, _, hint = str(error).partition("; ")
+                raise file.error(("tests", index, "faults", number), what, hint) from error
     return file

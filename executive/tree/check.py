@@ -102,7 +102,7 @@ def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilit
         yield _at(part, tree, message, f"it knows {listing(known)} by sight")
 
 
-def _at(part: StepPart, tree: CompiledTree, message: str, mend: str) -> InputError:
+def _at(part: StepPart, tree: CompiledTree, message: str, hint: str) -> InputError:
     """An error at the line that the part comes from."""
     source = next((node.source for node in tree.root.walk() if node.path_id == part.path_id), None)
-    return InputError.at(source, message, mend=mend)
+    return InputError.at(source, message, hint=hint)

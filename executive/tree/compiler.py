@@ -61,7 +61,7 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
     carried out; with the file and line where known, and all that was found in `others`.
     """
     if not mission.steps:
-        raise InputError(f"the mission '{mission.name}' has no commands", mend="add at least one step")
+        raise InputError(f"the mission '{mission.name}' has no commands", hint="add at least one step")
     body, parts = assemble(mission, knowledge=knowledge, registry=registry)
     start = start_key(mission.robot_name, mission.name)
     root = watched(PlanBuilder(knowledge, registry, body.path_id, start, Command(), mission.source), body)

@@ -189,8 +189,8 @@ def _skill(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     try:
         route = walk.planner.route(walk.pose, goal)
     except ValueError as error:
-        mend = "name another place or pose, or mend the world's map"
-        raise _CannotError(InputError.at(node.source, str(error).rstrip("."), mend=mend)) from error
+        hint = "name another place or pose, or mend the world's map"
+        raise _CannotError(InputError.at(node.source, str(error).rstrip("."), hint=hint)) from error
     walk.pose = goal
     drive = walk.estimates.drive
     duration_s = drive.overhead_s + drive.per_metre_s * route.progress_m

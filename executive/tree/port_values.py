@@ -32,11 +32,11 @@ Path = tuple[str | int, ...]
 
 
 class PortValueError(ValueError):
-    """A value that does not fit its port; `path` leads to the part of it that does not, `mend` says what would."""
+    """A value that does not fit its port; `path` leads to the part of it that does not, `hint` says what would."""
 
-    def __init__(self, path: Path, message: str, mend: str) -> None:
+    def __init__(self, path: Path, message: str, hint: str) -> None:
         super().__init__(message)
-        self.path, self.message, self.mend = path, message, mend
+        self.path, self.message, self.hint = path, message, hint
 
 
 def gathered(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, Any]]:
@@ -102,8 +102,8 @@ def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable
     known = {**dict.fromkeys(hints), **dict.fromkeys(sorted(fields))}
     wrong = next((key for key in loose if _named(key, known) is None), next(iter(loose)))
     ports = f"its ports are {listing(hints)}" if hints else "it has no input ports"
-    mend = suggestion(wrong, (word for word in known if word != wrong), ports)
-    raise PortValueError((wrong,), f"there is no input port '{wrong}'", mend)
+    hint = suggestion(wrong, (word for word in known if word != wrong), ports)
+    raise PortValueError((wrong,), f"there is no input port '{wrong}'", hint)
 
 
 def _is_record(hint: Any) -> bool:
@@ -184,8 +184,8 @@ def _plain(value: Any, hint: Any, path: Path) -> Any:
         raise _refusal(value, "nothing (null)", path)
     kinds = _PLAIN.get(hint)
     if kinds is None:
-        mend = f"let an earlier step give it, and write {{{FROM_KEY}: NAME}}"
-        raise PortValueError(path, f"a {describe_type(hint)} cannot be written in a file", mend)
+        hint = f"let an earlier step give it, and write {{{FROM_KEY}: NAME}}"
+        raise PortValueError(path, f"a {describe_type(hint)} cannot be written in a file", hint)
     fits = isinstance(value, kinds[0]) and (hint is bool or not isinstance(value, bool))
     if not fits or (isinstance(value, float) and not math.isfinite(value)):
         raise _refusal(value, kinds[1], path)
@@ -244,8 +244,8 @@ def _refusal(value: Any, wanted: str, path: Path) -> PortValueError:
 
 
 def _unknown(kind: str, name: str, known: tuple[str, ...], knowledge: Knowledge, path: Path) -> PortValueError:
-    mend = suggestion(name, knowledge.spellings(known), f"known are {listing(known)}")
-    return PortValueError(path, f"unknown {kind} '{name}'", mend)
+    hint = suggestion(name, knowledge.spellings(known), f"known are {listing(known)}")
+    return PortValueError(path, f"unknown {kind} '{name}'", hint)
 
 
 _PLAIN: Final[Mapping[Any, tuple[tuple[type, ...], str]]] = {

@@ -32,8 +32,8 @@ def installed_skills() -> dict[str, SkillClass]:
     """
     found = tuple(entry_points(group=GROUP))
     if not any(_distribution(entry) == DISTRIBUTION for entry in found):
-        mend = "install the project that these sources belong to: pip install --editable ."
-        raise InputError(f"no skill of {DISTRIBUTION} is registered under '{GROUP}'", mend=mend)
+        hint = "install the project that these sources belong to: pip install --editable ."
+        raise InputError(f"no skill of {DISTRIBUTION} is registered under '{GROUP}'", hint=hint)
     return skills_of(found)
 
 
@@ -49,7 +49,7 @@ def skills_of(entries: Iterable[EntryPoint]) -> dict[str, SkillClass]:
     for entry in sorted(entries, key=lambda entry: (entry.name, _distribution(entry))):
         if entry.name in owners and owners[entry.name].value != entry.value:
             both = f"{_distribution(owners[entry.name])} and {_distribution(entry)}"
-            raise InputError(f"{both} both register a skill '{entry.name}'", mend="uninstall one, or rename its skill")
+            raise InputError(f"{both} both register a skill '{entry.name}'", hint="uninstall one, or rename its skill")
         owners[entry.name] = entry
         found[entry.name] = _checked(entry)
     return found
@@ -57,8 +57,8 @@ def skills_of(entries: Iterable[EntryPoint]) -> dict[str, SkillClass]:
 
 def _checked(entry: EntryPoint) -> SkillClass:
     skill = _loaded(entry)
-    for message, mend in faults_of(skill, registered_as=entry.name):
-        raise _error(entry, message, mend)
+    for message, hint in faults_of(skill, registered_as=entry.name):
+        raise _error(entry, message, hint)
     return skill  # type: ignore[no-any-return]
 
 
@@ -71,7 +71,7 @@ def _loaded(entry: EntryPoint) -> Any:
 
 
 def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
-    """What a class lacks to be a skill, each with the mend."""
+    """What a class lacks to be a skill, each with the hint."""
     if not (inspect.isclass(skill) and issubclass(skill, Skill)):
         yield "it is no subclass of skills.api.Skill", "register the skill's class"
         return
@@ -128,5 +128,5 @@ def _distribution(entry: EntryPoint) -> str:
     return "an unknown distribution" if entry.dist is None else entry.dist.name
 
 
-def _error(entry: EntryPoint, message: str, mend: str) -> InputError:
-    return InputError(f"skill '{entry.name}' of distribution {_distribution(entry)}: {message}", mend=mend)
+def _error(entry: EntryPoint, message: str, hint: str) -> InputError:
+    return InputError(f"skill '{entry.name}' of distribution {_distribution(entry)}: {message}", hint=hint)

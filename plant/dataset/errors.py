@@ -4,8 +4,8 @@ from __future__ import annotations
 
 
 class DatasetError(Exception):
-    """The folder or the wishes cannot be used; the message says why, `mend` what to do."""
+    """The folder or the wishes cannot be used; the message says why, `hint` what to do."""
 
-    def __init__(self, message: str, mend: str) -> None:
-        self.message, self.mend = message, mend
-        super().__init__(f"{message}; {mend}")
+    def __init__(self, message: str, hint: str) -> None:
+        self.message, self.hint = message, hint
+        super().__init__(f"{message}; {hint}")

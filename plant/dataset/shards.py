@@ -215,8 +215,8 @@ def _shots(out: Path, images: int) -> Iterator[Mapping[str, Any]]:
         try:
             entries = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, json.JSONDecodeError) as error:
-            mend = f"remove {path.parent}; the same command makes it anew"
-            raise DatasetError(f"{path}: is damaged or missing", mend) from error
+            hint = f"remove {path.parent}; the same command makes it anew"
+            raise DatasetError(f"{path}: is damaged or missing", hint) from error
         yield from entries[:count]
 
 

@@ -23,7 +23,7 @@ _SLOTS: Final = (".a", ".b")
 
 
 class SnapshotError(ValueError):
-    """A snapshot cannot be used; the message names the file, what is wrong and the mend."""
+    """A snapshot cannot be used; the message names the file, what is wrong and the hint."""
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,8 @@ def read_snapshot(path: Path) -> Snapshot:
     whole = [each for each in found if isinstance(each, Snapshot)]
     if whole:
         return max(whole, key=lambda snapshot: snapshot.number)
-    mend = "without it the simulated world is gone; run the mission again"
-    raise SnapshotError(f"{path}: the plant's state cannot be used: {found[0]}; {mend}")
+    hint = "without it the simulated world is gone; run the mission again"
+    raise SnapshotError(f"{path}: the plant's state cannot be used: {found[0]}; {hint}")
 
 
 def _slot(path: Path, slot: str) -> Path:

@@ -201,7 +201,7 @@ def _read(path: Path, schema: type[ModelT]) -> ModelT:
 
 
 def _complaint(root: yaml.Node | None, error: ValidationError) -> str:
-    """Line, key and mend of the first fault; unknown keys first, since they often explain a missing one."""
+    """Line, key and hint of the first fault; unknown keys first, since they often explain a missing one."""
     faults = sorted(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     where, message = faults[0]["loc"], faults[0]["msg"]
     if faults[0]["type"] == "extra_forbidden":

@@ -22,7 +22,7 @@ KNOWN_KEYS = (*REQUIRED_KEYS, "negate", "mode", "height_band_m")
 
 
 class MapError(ValueError):
-    """A map that cannot be used; the text begins with file:line and ends with the mend."""
+    """A map that cannot be used; the text begins with file:line and ends with the hint."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def signed_distance(occupied: BoolGrid, resolution_m: float) -> NDArray[np.float
 
 
 def load_grid_map(path: Path) -> GridMap:
-    """Read a map_server YAML file and the picture that it names. Raises MapError with file:line and the mend."""
+    """Read a map_server YAML file and the picture that it names. Raises MapError with file:line and the hint."""
     lines = _key_lines(path)
     values = _Values(path, yaml.safe_load(path.read_text()), lines)
     values.refuse_unknown()

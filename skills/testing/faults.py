@@ -40,7 +40,7 @@ class Fault:
 def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> Fault:
     """The fault of these words.
 
-    Raises ValueError: no kind has such words, or they name something that the robot does not have; with the mend.
+    Raises ValueError: no kind has such words, or they name something that the robot does not have; with the hint.
     """
     when = _WHEN.fullmatch(" ".join(words.split()))
     what = words if when is None else when["what"]
@@ -54,8 +54,8 @@ def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> Fau
         return Fault(words, kind.effect(match), from_s, to_s, int(when["calls"] or 0))
     examples = [kind.example for kind in kinds]
     near = difflib.get_close_matches(words, examples, n=1, cutoff=0.5)
-    mend = f"did you mean '{near[0]}'?" if near else f"known are, for instance: {'; '.join(examples)}"
-    raise ValueError(f"there is no fault '{words}'; {mend}")
+    hint = f"did you mean '{near[0]}'?" if near else f"known are, for instance: {'; '.join(examples)}"
+    raise ValueError(f"there is no fault '{words}'; {hint}")
 
 
 @dataclass

@@ -23,12 +23,12 @@ def render_skill(name: str, folder: Path, *, taken: frozenset[str] = frozenset()
     """
     if not _NAME.fullmatch(name) or keyword.iskeyword(name):
         raise InputError(
-            f"'{name}' cannot be the name of a skill", mend="use lower-case words joined by _, as in wave_arm"
+            f"'{name}' cannot be the name of a skill", hint="use lower-case words joined by _, as in wave_arm"
         )
     if name in taken:
-        raise InputError(f"there is a skill '{name}' already", mend="choose another name")
+        raise InputError(f"there is a skill '{name}' already", hint="choose another name")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder} exists and is not empty", mend="name a new folder")
+        raise InputError(f"{folder} exists and is not empty", hint="name a new folder")
     package = f"errand_skill_{name}"
     words = {
         "name": name,
@@ -45,7 +45,7 @@ def render_skill(name: str, folder: Path, *, taken: frozenset[str] = frozenset()
             target.write_text(Template(template.read_text(encoding="utf-8")).substitute(words), encoding="utf-8")
             written.append(target)
     except OSError as error:
-        raise InputError(f"cannot write into {folder} ({error.strerror})", mend="name another folder") from error
+        raise InputError(f"cannot write into {folder} ({error.strerror})", hint="name another folder") from error
     return tuple(written)
 
 

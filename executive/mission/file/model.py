@@ -96,10 +96,10 @@ class SkillCall:
     file: Path | None = None
     places: Mapping[KeyPath, int] = field(default_factory=dict)
 
-    def error(self, path: KeyPath, message: str, mend: str) -> InputError:
+    def error(self, path: KeyPath, message: str, hint: str) -> InputError:
         """An error in what stands at `path` below the step."""
         known = (self.places[path[:n]] for n in range(len(path), -1, -1) if path[:n] in self.places)
-        return InputError(message, mend=mend, file=self.file, line=next(known, None))
+        return InputError(message, hint=hint, file=self.file, line=next(known, None))
 
 
 @dataclass(frozen=True)

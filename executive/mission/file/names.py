@@ -50,8 +50,8 @@ def _unknown_names(file: MissionFile, path: KeyPath, command: Command, knowledge
 def _unknown(
     file: MissionFile, path: KeyPath, kind: str, name: str, known: Sequence[str], knowledge: Knowledge
 ) -> InputError:
-    mend = suggestion(name, knowledge.spellings(known), f"known are {listing(known)}")
-    return file.error(path, f"unknown {kind} {name!r}", mend)
+    hint = suggestion(name, knowledge.spellings(known), f"known are {listing(known)}")
+    return file.error(path, f"unknown {kind} {name!r}", hint)
 
 
 def _known(command: Command, knowledge: Knowledge) -> Command:

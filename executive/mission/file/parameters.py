@@ -37,13 +37,13 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
     unknown = [name for name in given if name not in declared]
     if unknown:
         known = f"it has {listing(declared)}" if declared else "it declares none"
-        mend = suggestion(unknown[0], declared, known)
-        raise InputError(f"{source.path.name} has no parameter '{unknown[0]}'", mend=mend)
+        hint = suggestion(unknown[0], declared, known)
+        raise InputError(f"{source.path.name} has no parameter '{unknown[0]}'", hint=hint)
     values = {**declared, **given}
     for name, value in values.items():
         if value is None:
-            mend = f"give it a default, or 'with: {{{name}: ...}}' where the file is used"
-            raise source.error((DECLARED, name), f"parameter '{name}' has no value", mend)
+            hint = f"give it a default, or 'with: {{{name}: ...}}' where the file is used"
+            raise source.error((DECLARED, name), f"parameter '{name}' has no value", hint)
     data = {
         key: part if key == DECLARED else _put_in(part, values, source, (key,)) for key, part in source.data.items()
     }
@@ -57,11 +57,11 @@ def _declared(source: YamlSource) -> dict[str, Any]:
         return {}
     for name, default in declared.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            mend = "use letters, digits and underscores, a letter first"
-            raise source.error((DECLARED, str(name)), f"{name!r} cannot be a parameter's name", mend)
+            hint = "use letters, digits and underscores, a letter first"
+            raise source.error((DECLARED, str(name)), f"{name!r} cannot be a parameter's name", hint)
         if default is not None and not isinstance(default, _SCALARS):
-            mend = "give it a text, a number, true or false"
-            raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {type(default).__name__}", mend)
+            hint = "give it a text, a number, true or false"
+            raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {type(default).__name__}", hint)
     return dict(declared)
 
 
@@ -92,8 +92,8 @@ def _value(name: str, values: Mapping[str, Any], source: YamlSource, path: KeyPa
     if name not in values:
         near = did_you_mean(name, values)
         known = f"declared are {listing(values)}" if values else _how_to_declare(source)
-        mend = f"did you mean '${{{near}}}'?" if near else known
-        raise source.error(path, f"unknown parameter '{name}'", mend)
+        hint = f"did you mean '${{{near}}}'?" if near else known
+        raise source.error(path, f"unknown parameter '{name}'", hint)
     return values[name]
 
 

@@ -35,7 +35,7 @@ def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN) -> MissionFi
     """Read a mission file and put its parameters in.
 
     Raises:
-        InputError: with file, line and mend, for broken YAML, unknown keys, wrong values and unknown parameters.
+        InputError: with file, line and hint, for broken YAML, unknown keys, wrong values and unknown parameters.
     """
     source = with_parameters(read_yaml(path), parameters)
     return with_source(validate(MissionFile, source), source)
@@ -53,7 +53,7 @@ def mission_from_file(
     `answer` is asked where a sentence could mean several things; unless given, the file's own policy decides.
 
     Raises:
-        InputError: with file, line and mend, also for a sentence that is not understood, for unknown names, and for
+        InputError: with file, line and hint, also for a sentence that is not understood, for unknown names, and for
             used files that are wrong or use each other in a circle; all that was found stands in `others`.
     """
     loaded = file if isinstance(file, MissionFile) else load_mission(file)
@@ -100,8 +100,8 @@ class _Resolver:
             return MissionStep(commands, source, policy, elsewhere=step.elsewhere is not False)
         answer = self._understand(step.say)
         if answer.status is not Status.OK:
-            mend = "say it in other words, or write take, to, do and object"
-            raise file.error((*path, "say"), (answer.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], mend)
+            hint = "say it in other words, or write take, to, do and object"
+            raise file.error((*path, "say"), (answer.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], hint)
         return MissionStep(answer.commands, source, policy, elsewhere=step.elsewhere is not False)
 
     def _understand(self, sentence: str) -> Understanding:
@@ -114,7 +114,7 @@ class _Resolver:
                 knowledge=self.knowledge,
                 require_wake=False,
                 robot_name=self.robot_name,
-                mend=False,
+                correct=False,
             )
         return self.understood[sentence]
 
@@ -148,8 +148,8 @@ def _found(file: MissionFile, index: int) -> Path:
         return path
     beside = sorted(one.name for one in folder.glob("*.yaml"))
     near = difflib.get_close_matches(step.use, beside, n=1)
-    mend = f"did you mean '{near[0]}'?" if near else "give its path from this file's folder"
-    raise file.error(("steps", index, "use"), f"there is no mission file '{step.use}'", mend)
+    hint = f"did you mean '{near[0]}'?" if near else "give its path from this file's folder"
+    raise file.error(("steps", index, "use"), f"there is no mission file '{step.use}'", hint)
 
 
 def _is_file(path: Path) -> bool:
@@ -165,8 +165,8 @@ def _refuse_top_keys(used: MissionFile, user: MissionFile) -> None:
     for key in _ONLY_AT_THE_TOP:
         said = getattr(used, key)
         if key in used.model_fields_set and said is not None and said != getattr(user, key):
-            mend = "remove it there, or say the same in both"
-            raise used.error((key,), f"'{key}' of a file that is used cannot differ from that of its user", mend)
+            hint = "remove it there, or say the same in both"
+            raise used.error((key,), f"'{key}' of a file that is used cannot differ from that of its user", hint)
 
 
 def _skill_call(file: MissionFile, index: int) -> SkillCall:

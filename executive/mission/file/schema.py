@@ -188,9 +188,9 @@ class MissionFile(PolicyFile):
         """The file's data and lines; None when it was not read from a file."""
         return self._source
 
-    def error(self, path: KeyPath, message: str, mend: str) -> InputError:
+    def error(self, path: KeyPath, message: str, hint: str) -> InputError:
         """An error in what stands at `path`, for instance ("world",)."""
-        return InputError(message, mend=mend) if self._source is None else self._source.error(path, message, mend)
+        return InputError(message, hint=hint) if self._source is None else self._source.error(path, message, hint)
 
     def source_line(self, path: KeyPath) -> SourceLine | None:
         """Where `path` stands in the file."""

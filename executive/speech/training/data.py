@@ -99,4 +99,4 @@ def _kept(file: Path) -> list[SpokenSentence]:
             for (text, prompt, speaker, _), part in zip(told, sounds, strict=True)
         ]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"it is damaged ({error})", mend="delete it, and train again", file=file) from error
+        raise InputError(f"it is damaged ({error})", hint="delete it, and train again", file=file) from error

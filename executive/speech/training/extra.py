@@ -16,4 +16,4 @@ def needs_torch() -> None:
         InputError: the extra `train` is not installed.
     """
     if find_spec("torch") is None:
-        raise InputError("training needs torch, which is not installed", mend="pip install 'spot-errand[speech,train]'")
+        raise InputError("training needs torch, which is not installed", hint="pip install 'spot-errand[speech,train]'")

@@ -45,8 +45,8 @@ def speakers(left_out: tuple[str, ...] = ()) -> tuple[Speaker, ...]:
     """
     found = tuple(one for one in _SPEAKERS if shutil.which(one.program) and one.name not in left_out)
     if not found:
-        mend = "install them: apt-get install flite festival espeak-ng"
-        raise InputError("no synthetic voice to train with is installed", mend=mend)
+        hint = "install them: apt-get install flite festival espeak-ng"
+        raise InputError("no synthetic voice to train with is installed", hint=hint)
     return found
 
 

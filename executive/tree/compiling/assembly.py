@@ -183,7 +183,7 @@ class _Assembler:
     def _command_builder(self, item: _Item, base: str) -> PlanBuilder:
         command = item.command
         if command is None:
-            raise InputError("a step has no commands", mend="give it 'say', a command, a skill or a file to use")
+            raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
         builder = self.builder(f"{base}/{item.number}-{step_name(command)}", item.step.source)
         return replace(builder, command=command, anywhere=item.step.elsewhere)
 

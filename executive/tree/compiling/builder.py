@@ -139,9 +139,9 @@ class PlanBuilder:
             raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
         return classes
 
-    def error(self, message: str, mend: str) -> InputError:
+    def error(self, message: str, hint: str) -> InputError:
         """An error at the step's line."""
-        return InputError.at(self.source, f"{message} (in '{self.command}')", mend=mend)
+        return InputError.at(self.source, f"{message} (in '{self.command}')", hint=hint)
 
 
 def skill_spec(

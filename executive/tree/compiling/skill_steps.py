@@ -40,8 +40,8 @@ def skill_plan(
 
 def _registered(call: SkillCall, registry: Registry) -> type[Skill[Any]]:
     if call.skill not in registry:
-        mend = suggestion(call.skill, registry, f"registered are {listing(sorted(registry))}")
-        raise call.error(("skill",), f"there is no skill '{call.skill}'", mend)
+        hint = suggestion(call.skill, registry, f"registered are {listing(sorted(registry))}")
+        raise call.error(("skill",), f"there is no skill '{call.skill}'", hint)
     return registry[call.skill]
 
 
@@ -61,14 +61,14 @@ def _inputs(
     except PortValueError as error:
         where = ".".join(map(str, error.path))
         message = f"{call.skill}: {where + ': ' if where and where not in error.message else ''}{error.message}"
-        raise call.error(("with", *error.path), message, error.mend) from error
+        raise call.error(("with", *error.path), message, error.hint) from error
 
 
 def _named_output(call: SkillCall, path: tuple[str | int, ...], name: Any, names: Mapping[str, str]) -> FromBoard:
     if not isinstance(name, str) or name not in names:
         none = None if names else "name one with 'gives: {PORT: NAME}' in an earlier step"
-        mend = suggestion(str(name), names, none)
-        raise call.error(("with", *path), f"no earlier step gives '{name}'", mend)
+        hint = suggestion(str(name), names, none)
+        raise call.error(("with", *path), f"no earlier step gives '{name}'", hint)
     return FromBoard(names[name])
 
 
@@ -76,6 +76,6 @@ def _given_ports(call: SkillCall, skill: type[Skill[Any]]) -> tuple[str, ...]:
     for port in call.gives:
         if port not in skill.outputs:
             known = f"its outputs are {listing(skill.outputs)}" if skill.outputs else "it has none"
-            mend = suggestion(port, skill.outputs, known)
-            raise call.error(("gives", port), f"{call.skill} has no output port '{port}'", mend)
+            hint = suggestion(port, skill.outputs, known)
+            raise call.error(("gives", port), f"{call.skill} has no output port '{port}'", hint)
     return tuple(call.gives)

@@ -36,15 +36,15 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     if count > MAX_TRIPS:
         raise builder.error(f"{several} are too many trips", f"ask for {MAX_TRIPS} at most")
     if goal == START or (goal is not None and builder.knowledge.person(goal) is not None):
-        mend = "name a place with a surface to put them on"
-        raise builder.error(f"{several} cannot be handed over: the first stays in the gripper until it is taken", mend)
+        hint = "name a place with a surface to put them on"
+        raise builder.error(f"{several} cannot be handed over: the first stays in the gripper until it is taken", hint)
     if get.goal is None:
         raise builder.error(f"it is not said where to take {several} from", "name the place")
     brought = set(builder.knowledge.surfaces_in(builder.place(goal))) if goal is not None else set()
     if thing is not None and brought & set(surfaces_to_search(builder.knowledge, thing.name, builder.place(get.goal))):
-        mend = "name the surface that they are to be taken from"
+        hint = "name the surface that they are to be taken from"
         raise builder.error(
-            f"{several} that lie in the {get.goal} already cannot be told from those brought there", mend
+            f"{several} that lie in the {get.goal} already cannot be told from those brought there", hint
         )
     trips = tuple(_trip(builder, bring, number) for number in range(1, count + 1))
     return builder.sequence(f"bring {count} {thing} to {goal}, one at a time", *trips)
@@ -60,8 +60,8 @@ def refuse_several(builder: PlanBuilder) -> None:
     for thing, count in ((command.item, command.item_count), (command.object, asked)):
         if count != 1:
             said = f"{count} of '{thing}'" if count else f"an open number of '{thing}'"
-            mend = "say from where to where, and how many, or ask for one at a time"
-            raise builder.error(f"{said} cannot be carried in one go", mend)
+            hint = "say from where to where, and how many, or ask for one at a time"
+            raise builder.error(f"{said} cannot be carried in one go", hint)
 
 
 def _trip(builder: PlanBuilder, bring: Command, number: int) -> NodeSpec:

@@ -25,13 +25,13 @@ def check_wiring(root: NodeSpec) -> None:
             raise _error(node, "two nodes have this path id", "give the steps different names")
         seen.add(node.path_id)
         if node.kind == "skill":
-            for message, mend in _faults(node, written):
-                raise _error(node, message, mend)
+            for message, hint in _faults(node, written):
+                raise _error(node, message, hint)
         written.update(writes(node))
 
 
 def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """What is wrong with one skill's ports, and the mend."""
+    """What is wrong with one skill's ports, and the hint."""
     skill, inputs, outputs = (node.options[key] for key in ("skill", "inputs", "outputs"))
     types = field_types(skill.Inputs)
     for name in required(skill.Inputs):
@@ -64,5 +64,5 @@ def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) 
         yield f"input port '{port}' reads '{binding.key}', a {describe_type(given)}", wanted
 
 
-def _error(node: NodeSpec, message: str, mend: str) -> InputError:
-    return InputError.at(node.source, f"{node.path_id}: {message}", mend=mend)
+def _error(node: NodeSpec, message: str, hint: str) -> InputError:
+    return InputError.at(node.source, f"{node.path_id}: {message}", hint=hint)

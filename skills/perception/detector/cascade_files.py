@@ -122,4 +122,4 @@ def load_model(file: Path = MODEL_FILE, *, networks: int = 3) -> DetectorModel:
 def _check_belongs(found: Network, file: Path, key: str, before: Network, source: Path, kind: NetworkKind) -> None:
     """Raises ModelFileError unless the metadata of a network hold the digest of the one `before` it."""
     if found.metadata.get(key) != before.digest or found.class_names != before.class_names:
-        raise ModelFileError(file, f"it belongs to another network than {source.name}", mend=kind.mend)
+        raise ModelFileError(file, f"it belongs to another network than {source.name}", hint=kind.hint)

@@ -33,23 +33,23 @@ Outputs = Mapping[str, tuple[str, int]]
 
 
 class ModelFileError(ValueError):
-    """The file of a network cannot be used; `message` says why, `mend` what to do."""
+    """The file of a network cannot be used; `message` says why, `hint` what to do."""
 
-    def __init__(self, file: Path, message: str, *, mend: str) -> None:
-        self.file, self.message, self.mend = file, message, mend
-        super().__init__(f"{file}: {message}; {mend}")
+    def __init__(self, file: Path, message: str, *, hint: str) -> None:
+        self.file, self.message, self.hint = file, message, hint
+        super().__init__(f"{file}: {message}; {hint}")
 
 
 @dataclass(frozen=True)
 class NetworkKind:
-    """What is expected of a file of some `format`; `mend` says how to make a new one.
+    """What is expected of a file of some `format`; `hint` says how to make a new one.
 
     For a number of classes, `inputs` are ("uint8" or "float", shape of a row) by name, and `outputs` ("float", length
     of the last axis).
     """
 
     format: str
-    mend: str
+    hint: str
     inputs: Callable[[int], Inputs]
     outputs: Callable[[int], Outputs]
 
@@ -100,7 +100,7 @@ class _Reader:
 
     def error(self, message: str) -> ModelFileError:
         """What is to be raised."""
-        return ModelFileError(self.file, message, mend=self.kind.mend)
+        return ModelFileError(self.file, message, hint=self.kind.hint)
 
     def content(self) -> bytes:
         """The file's bytes, whose seal fits."""

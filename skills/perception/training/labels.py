@@ -25,9 +25,9 @@ _MOST_CORNERS: Final = 24
 class TrainingDataError(ValueError):
     """The folder of a data set cannot be trained on; the text says where and why, `mend` what to do."""
 
-    def __init__(self, message: str, *, mend: str) -> None:
-        self.message, self.mend = message, mend
-        super().__init__(f"{message}; {mend}")
+    def __init__(self, message: str, *, hint: str) -> None:
+        self.message, self.hint = message, hint
+        super().__init__(f"{message}; {hint}")
 
 
 @dataclass(frozen=True)
@@ -84,15 +84,15 @@ def _entries(folder: Path, split: str) -> Iterable[tuple[Mapping[str, Any], Sequ
 
 
 def _document(path: Path) -> Mapping[str, Any]:
-    mend = "make one: errand dataset render --out DIR --images 8000"
+    hint = "make one: errand dataset render --out DIR --images 8000"
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise TrainingDataError(f"{path}: there is no such data set ({error.strerror})", mend=mend) from error
+        raise TrainingDataError(f"{path}: there is no such data set ({error.strerror})", hint=hint) from error
     except ValueError as error:
-        raise TrainingDataError(f"{path}: is damaged ({error})", mend=mend) from error
+        raise TrainingDataError(f"{path}: is damaged ({error})", hint=hint) from error
     if not isinstance(found, dict) or not {"images", "annotations", "categories"} <= found.keys():
-        raise TrainingDataError(f"{path}: is no COCO file", mend=mend)
+        raise TrainingDataError(f"{path}: is no COCO file", hint=hint)
     return found
 
 
@@ -102,7 +102,7 @@ def _read(folder: Path, image: Mapping[str, Any], labels: Sequence[Mapping[str, 
         return TrainingPicture(folder / str(image["file_name"]), _labels(labels, scale))
     except (KeyError, TypeError, ValueError) as error:
         place = f"{folder}: picture {image.get('file_name')}"
-        raise TrainingDataError(f"{place}: its labels are damaged ({error!r})", mend="render it anew") from error
+        raise TrainingDataError(f"{place}: its labels are damaged ({error!r})", hint="render it anew") from error
 
 
 def _labels(labels: Sequence[Mapping[str, Any]], scale: Floats) -> Labels:

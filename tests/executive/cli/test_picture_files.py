@@ -24,7 +24,7 @@ def refused(file):
     with pytest.raises(InputError) as error:
         read_picture(file)
     assert error.value.file == file
-    assert error.value.mend
+    assert error.value.hint
     return error.value.message
 
 

@@ -7,7 +7,7 @@ from executive.language.phrases import noun_phrases
 from executive.language.reading import split_items
 
 
-def mend(parser, text):
+def hint(parser, text):
     tokens = parser.parse(text)
     return spoken_words(mended(split_items(tokens, noun_phrases(tokens), lexicon())))
 
@@ -29,9 +29,9 @@ def mend(parser, text):
     ],
 )
 def test_what_is_taken_back_is_gone(parser, text, meant):
-    assert mend(parser, text) == meant
+    assert hint(parser, text) == meant
 
 
 @pytest.mark.parametrize("text", ["bring the cup not", "bring the cup , no", "is the cup not here"])
 def test_what_takes_back_nothing_is_an_unknown_word(parser, text):
-    assert {"not", "no"} & set(mend(parser, text).split())
+    assert {"not", "no"} & set(hint(parser, text).split())

@@ -103,13 +103,13 @@ def test_a_sentence_may_begin_with_the_missions_own_robot(load):
         ("- {to: lounge}", "- lounge", 7, "steps.1"),
     ],
 )
-def test_a_wrong_file_is_refused_with_its_line_and_the_mend(load, old, new, line, says):
+def test_a_wrong_file_is_refused_with_its_line_and_the_hint(load, old, new, line, says):
     assert old in MISSION
     with pytest.raises(InputError) as error:
         load(MISSION.replace(old, new, 1))
     assert (error.value.line, says in str(error.value)) == (line, True), str(error.value)
     assert f"mission.yaml:{line}: " in str(error.value)
-    assert error.value.mend
+    assert error.value.hint
     assert "\n" not in str(error.value)
 
 

@@ -59,7 +59,7 @@ def test_it_is_the_same_when_it_is_read_again(tmp_path):
 def test_one_that_does_not_fit_is_refused_and_changes_nothing(weights, name, low_rank):
     with pytest.raises(InputError, match=name) as refused:
         Adapter({"c/weight": _low_rank(5, 6), name: low_rank}).add_to(weights)
-    assert "python -m executive.speech.training" in refused.value.mend
+    assert "python -m executive.speech.training" in refused.value.hint
     np.testing.assert_array_equal(weights["c/weight"], CONVOLUTION)
 
 
@@ -68,11 +68,11 @@ def _damaged(content):
 
 
 @pytest.mark.parametrize("how", ["cut off", "empty", "another kind"])
-def test_a_damaged_file_is_told_with_the_mend(tmp_path, how):
+def test_a_damaged_file_is_told_with_the_hint(tmp_path, how):
     Adapter({"a/weight": _low_rank(6, 4)}).save(tmp_path / "a.npz", base=BASE)
     with pytest.raises(InputError, match="damaged") as refused:
         read_adapter(_damaged((tmp_path / "a.npz").read_bytes())[how], base=BASE)
-    assert "python -m executive.speech.training" in refused.value.mend
+    assert "python -m executive.speech.training" in refused.value.hint
 
 
 def test_one_of_other_weights_is_refused(tmp_path):
@@ -88,8 +88,8 @@ def test_the_packaged_one_belongs_to_the_published_weights():
     assert all(np.isfinite(low_rank.change()).all() for low_rank in packaged.changes.values())
 
 
-def test_a_missing_one_is_told_with_the_mend(monkeypatch):
+def test_a_missing_one_is_told_with_the_hint(monkeypatch):
     monkeypatch.setattr(adapter, "_FILE", "nowhere.npz")
     with pytest.raises(InputError, match="missing") as refused:
         packaged_adapter(base=BASE_SHA256)
-    assert "python -m executive.speech.training" in refused.value.mend
+    assert "python -m executive.speech.training" in refused.value.hint

@@ -60,10 +60,10 @@ def test_a_sentence_under_way_is_finished_when_the_sound_ends(hearings):
     assert heard[-1].finished is not None
 
 
-def test_without_a_recorder_the_mend_is_told():
+def test_without_a_recorder_the_hint_is_told():
     with pytest.raises(InputError, match="arecord") as refused:
         next(microphone_blocks(which=lambda name: None))
-    assert "alsa-utils" in refused.value.mend
+    assert "alsa-utils" in refused.value.hint
 
 
 def _recorder(tmp_path, script):

@@ -52,4 +52,4 @@ def test_another_file_is_refused(model_bin, what, told):
     }[what]
     with pytest.raises(InputError, match=told) as refused:
         read_model_file(content)
-    assert "spot-errand[speech]" in refused.value.mend
+    assert "spot-errand[speech]" in refused.value.hint

@@ -67,7 +67,7 @@ def test_samples_beyond_full_scale_are_cut(tmp_path):
 def _refusal(file):
     with pytest.raises(InputError) as refused:
         list(read_wav(file))
-    assert refused.value.file == file and refused.value.mend
+    assert refused.value.file == file and refused.value.hint
     return refused.value.message
 
 

@@ -79,7 +79,7 @@ def test_silence_holds_no_words_worth_a_command(whisper, flat):
     assert not any("kitchen" in reading.text for reading in readings)
 
 
-def test_without_the_extra_the_mend_is_told(monkeypatch):
+def test_without_the_extra_the_hint_is_told(monkeypatch):
     def missing(name):
         raise ImportError(name)
 
@@ -87,7 +87,7 @@ def test_without_the_extra_the_mend_is_told(monkeypatch):
     for load in (load_whisper, load_detector):
         with pytest.raises(InputError, match="not installed") as refused:
             load()
-        assert "spot-errand[speech]" in refused.value.mend
+        assert "spot-errand[speech]" in refused.value.hint
     assert import_module("faster_whisper")
 
 

@@ -1,4 +1,4 @@
-"""Files of skill tests: what is refused, with line and mend, and how a trial is judged."""
+"""Files of skill tests: what is refused, with line and hint, and how a trial is judged."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

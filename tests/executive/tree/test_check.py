@@ -95,7 +95,7 @@ def test_a_place_out_of_reach_is_refused_at_its_line(check):
     checked = check(GO.format("bedroom"), GO.format("kitchen"), ways=StraightRoutes(far_m=1.0))
     ((line, message),) = told(checked)
     assert (line, "no way to" in message) == (2, True)
-    assert checked.errors[0].mend
+    assert checked.errors[0].hint
 
 
 def test_a_search_goes_on_when_one_surface_is_out_of_reach(check):

@@ -112,11 +112,11 @@ def test_a_record_of_records(knowledge):
         (None, int, (), "a whole number"),
     ],
 )
-def test_a_wrong_value_is_refused_with_its_place_and_the_mend(knowledge, value, hint, path, says):
+def test_a_wrong_value_is_refused_with_its_place_and_the_hint(knowledge, value, hint, path, says):
     with pytest.raises(PortValueError) as error:
         port_value(value, hint, knowledge)
     assert error.value.path == path
-    assert says in error.value.mend
+    assert says in error.value.hint
 
 
 def test_fields_of_the_one_port_that_has_them_go_there():
@@ -136,4 +136,4 @@ def test_fields_of_the_one_port_that_has_them_go_there():
 def test_what_belongs_to_no_port_is_refused(values, inputs, says):
     with pytest.raises(PortValueError) as error:
         gathered(values, inputs)
-    assert says in error.value.mend
+    assert says in error.value.hint

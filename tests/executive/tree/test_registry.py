@@ -108,14 +108,14 @@ def test_a_skill_of_another_distribution_is_found_beside_ours(others):
         ("import Cause, Skill", "import Cause, Skull", "cannot load wavers_skill:Wave (ImportError"),
     ],
 )
-def test_a_skill_that_breaks_a_rule_is_refused_with_its_distribution_and_the_mend(others, old, new, message):
+def test_a_skill_that_breaks_a_rule_is_refused_with_its_distribution_and_the_hint(others, old, new, message):
     assert old in GOOD
     entries = others(GOOD.replace(old, new))
     with pytest.raises(InputError) as refused:
         skills_of(entries)
     assert refused.value.message.startswith("skill 'wave' of distribution wavers: ")
     assert message in refused.value.message
-    assert refused.value.mend
+    assert refused.value.hint
 
 
 def test_two_distributions_with_one_name_are_refused_naming_both(others):

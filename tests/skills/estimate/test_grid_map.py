@@ -74,7 +74,7 @@ def test_unknown_ground_is_blocked_for_planning(tmp_path):
         ("negate: 0", "negate: [0", 5, "mend the YAML"),
     ],
 )
-def test_errors_name_file_line_and_mend(tmp_path, old, new, line, words):
+def test_errors_name_file_line_and_hint(tmp_path, old, new, line, words):
     path = write_map(tmp_path, YAML.replace(old, new))
     with pytest.raises(MapError) as error:
         load_grid_map(path)

@@ -26,7 +26,7 @@ def test_the_good_ones_are_good(checker, missions):
     assert not any(faults.values()), faults
 
 
-def test_every_broken_file_is_refused_with_a_place_and_a_mend(checker, mission_folder, missions):
+def test_every_broken_file_is_refused_with_a_place_and_a_hint(checker, mission_folder, missions):
     wrong = []
     for name, raw in mutations.broken_files(missions, COUNT, SEED):
         path = mission_folder / "mission.yaml"
@@ -35,7 +35,7 @@ def test_every_broken_file_is_refused_with_a_place_and_a_mend(checker, mission_f
         if not errors:
             wrong.append((name, "accepted"))
         for error in errors:
-            if error.file is None or error.line is None or not error.message or not error.mend:
+            if error.file is None or error.line is None or not error.message or not error.hint:
                 wrong.append((name, str(error)))
             if "\n" in str(error) or "Traceback" in str(error) or len(str(error)) > 2000:
                 wrong.append((name, str(error)[:300]))

@@ -188,4 +188,4 @@ def test_ports_that_are_wired_wrongly_are_refused_at_their_line(compile_text, ol
     assert old in DETECT
     error = refused(compile_text, DETECT.replace(old, new, 1))
     assert (error.line, says in str(error)) == (line, True), str(error)
-    assert error.mend
+    assert error.hint

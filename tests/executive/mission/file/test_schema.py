@@ -1,4 +1,4 @@
-"""The schema of mission files: what is refused, with which line and mend; and the JSON Schema for editors."""
+"""The schema of mission files: what is refused, with which line and hint; and the JSON Schema for editors."""
 
 import json
 from pathlib import Path
@@ -81,13 +81,13 @@ def test_on_failure_retry_is_one_retry_unless_said(load):
         ("say: go to the hall", "say: go to the hall\n    gives: {a: b}", 8, "'gives' goes with 'skill'"),
     ],
 )
-def test_what_does_not_fit_is_refused_with_its_line_and_the_mend(load, old, new, line, says):
+def test_what_does_not_fit_is_refused_with_its_line_and_the_hint(load, old, new, line, says):
     good = GOOD.replace("What now?", '"What now?"')
     assert old in good
     with pytest.raises(InputError) as error:
         load(good.replace(old, new, 1))
     assert (error.value.line, says in str(error.value)) == (line, True), str(error.value)
-    assert error.value.mend
+    assert error.value.hint
 
 
 def test_all_errors_are_told_at_once(load):

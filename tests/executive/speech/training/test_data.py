@@ -46,4 +46,4 @@ def test_a_damaged_file_is_told(spoken, tmp_path):
     file.write_bytes(file.read_bytes()[:50])
     with pytest.raises(InputError, match="damaged") as refused:
         spoken_sentences(tmp_path, 2, 1)
-    assert refused.value.file == file and "delete" in refused.value.mend
+    assert refused.value.file == file and "delete" in refused.value.hint

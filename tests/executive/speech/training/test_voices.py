@@ -12,11 +12,11 @@ from executive.speech.training.voices import drawn_speaker, speakers, speech
 HELD_OUT = ("scotland", "rp", "+f3", "awb", "slt", "ked")
 
 
-def test_without_any_the_mend_is_told(monkeypatch):
+def test_without_any_the_hint_is_told(monkeypatch):
     monkeypatch.setattr(voices.shutil, "which", lambda name: None)
     with pytest.raises(InputError, match="no synthetic voice") as refused:
         speakers()
-    assert "apt-get install" in refused.value.mend
+    assert "apt-get install" in refused.value.hint
 
 
 def test_voices_that_figures_are_taken_with_are_not_among_them():

@@ -66,4 +66,4 @@ def test_the_condition_is_one_of_two_things(compiled, run_tree, knowledge, scrip
 def test_what_no_trips_can_be_made_of_is_refused(compiled, get, bring, says):
     with pytest.raises(InputError, match=says) as error:
         compiled(get, f"{bring} and do [Nothing] to [Nothing]")
-    assert error.value.mend
+    assert error.value.hint

@@ -221,9 +221,10 @@ def _type(hint: Any) -> str:
 def stack_page() -> str:
     """The page on stack files: every slot with its components, every skill that has options."""
     words = (
-        "What a robot uses, and with which options: `errand run --stack FILE`. A slot, a skill or an option that the "
-        "file leaves out is as in the default; `errand stack show` prints all. Unknown keys are refused with file and "
-        "line. `skills/stack.schema.json` is the schema for editors. Each component is a frozen dataclass that an "
+        "What a robot uses, and with which options: `errand run --stack FILE`, also `check`, `evaluate` and "
+        "`queue add`. A slot, a skill or an option that the file leaves out is as in the default; `errand stack show` "
+        "prints all. Unknown keys are refused with file and line. "
+        "`skills/stack.schema.json` is the schema for editors. Each component is a frozen dataclass that an "
         "installed distribution registers in the slot's entry-point group."
     )
     slots = "".join(_slot(slot, group) for slot, group in SLOTS.items())

@@ -14,6 +14,7 @@ from rich.markup import escape
 from executive.cli.feasibility import abilities_of, route_planner_of
 from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.cli.requests import prepare
+from executive.cli.stack_command import STACK
 from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.tree.check import check_tree
@@ -44,13 +45,13 @@ class CheckedFile:
 
 
 class Checker:
-    """Checks files; the ways planned in each world are shared among them.
+    """Checks files; the routes planned in each world are shared among them.
 
-    `world` stands in for the files' own.
+    `world` stands in for the files' own, and `stack` is the file that says what the robot uses.
     """
 
-    def __init__(self, world: str | None = None) -> None:
-        self._world = world
+    def __init__(self, world: str | None = None, stack: Path | None = None) -> None:
+        self._world, self._stack = world, stack
         self._routes: dict[Path, RoutePlanner] = {}
 
     def check(self, file: Path) -> CheckedFile:
@@ -60,7 +61,7 @@ class Checker:
             prepared = prepare(Request(file=file, world=self._world), ask=None)
             tree, world = prepared.tree, prepared.world
             if world.folder not in self._routes:
-                self._routes[world.folder] = route_planner_of(world)
+                self._routes[world.folder] = route_planner_of(world, self._stack)
             checked = check_tree(
                 tree,
                 knowledge=prepared.knowledge,
@@ -77,11 +78,12 @@ class Checker:
 def check(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Mission files.", show_default=False)],
     world: Annotated[str | None, typer.Option(help="World by name or folder, in place of the files' own.")] = None,
+    stack: STACK = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No commands and no trees.")] = False,
 ) -> None:
-    """Check mission files without running them: commands, tree, ways on the map, time and battery."""
-    checker = Checker(world)
+    """Check mission files without running them: commands, tree, paths on the map, time and battery."""
+    checker = Checker(world, stack)
     checked = [checker.check(file) for file in files]
     if as_json:
         print_json(to_json(checked))
@@ -137,6 +139,6 @@ def _show(one: CheckedFile, console: Console, *, quiet: bool) -> None:
 def _in_words(tree: CompiledTree, estimate: Estimate) -> str:
     minutes, seconds = divmod(round(estimate.duration_s), 60)
     return (
-        f"{len(tree.path_ids)} nodes; about {minutes} min {seconds:02d} s, {estimate.distance_m:.0f} m of way and "
+        f"{len(tree.path_ids)} nodes; about {minutes} min {seconds:02d} s, {estimate.distance_m:.0f} m of driving and "
         f"{estimate.charge:.1%} of the battery when all goes well"
     )

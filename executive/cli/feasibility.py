@@ -1,4 +1,4 @@
-"""What is known beforehand of whether a mission can be done: the ways in its world, and what the robot is able to."""
+"""What is known beforehand of whether a mission can be done: the routes in its world, and what the robot is able to."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from functools import cache, cached_property
 from pathlib import Path
 from xml.etree import ElementTree
 
-from executive.cli.kept_ways import KeptRoutes, kept_routes_of
+from executive.cli.route_cache import RouteCache, route_cache_of
 from executive.mission.errors import InputError
+from executive.mission.stack_file import load_stack
 from executive.tree.check import Abilities, PlannedRoutes
 from executive.tree.estimate import Route, RoutePlanner
 from plant.models.catalogue import load_catalogue
@@ -17,14 +18,17 @@ from plant.worlds.world import World
 from skills.perception.attributes import known_attributes
 from skills.perception.class_forms import class_forms
 from skills.robot import Pose2D
-from skills.stack import default_component
+from skills.stack import RobotStack, default_component
 
 
 class _RoutesOnMap(RoutePlanner):
-    """Ways on a world's surveyed map for the robot's footprint; the map is read when the first is asked for."""
+    """Routes on a world's surveyed map for the robot's footprint; the map is read when the first is asked for.
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    A stack plans them with its costmap and planner; None stands for the default one, of which only these are loaded.
+    """
+
+    def __init__(self, world: World, stack: RobotStack | None) -> None:
+        self._world, self._stack = world, stack
 
     @cached_property
     def _routes(self) -> PlannedRoutes:
@@ -35,16 +39,28 @@ class _RoutesOnMap(RoutePlanner):
             keepout_map = load_grid_map(self._world.keepout_map_path)
         except (MapError, OSError) as error:
             raise InputError(str(error)) from error
-        return PlannedRoutes(default_component("costmap").build(keepout_map), Footprint.of(spot_capabilities()))
+        costmap, planner = (
+            default_component(slot) if self._stack is None else getattr(self._stack, slot)
+            for slot in ("costmap", "planner")
+        )
+        return PlannedRoutes(costmap.build(keepout_map), Footprint.of(spot_capabilities()), planner)
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
         """The route from start to goal. Raises ValueError with one sentence when there is none, InputError."""
         return self._routes.route(start, goal)
 
 
-def route_planner_of(world: World) -> KeptRoutes:
-    """Ways on a world's surveyed map. When there is no such map, the first way raises InputError."""
-    return kept_routes_of(world, _RoutesOnMap(world), FACTS)
+def route_planner_of(world: World, stack_file: Path | None = None) -> RouteCache:
+    """Routes on a world's surveyed map, as a stack file has them planned (None: the default stack).
+
+    When there is no such map, the first route raises InputError.
+
+    Raises:
+        InputError: with file and line where the stack file cannot be used.
+    """
+    stack = None if stack_file is None else load_stack(stack_file)
+    files = (FACTS,) if stack_file is None else (FACTS, stack_file)
+    return route_cache_of(world, _RoutesOnMap(world, stack), *files)
 
 
 @cache

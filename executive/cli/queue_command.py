@@ -12,7 +12,9 @@ from rich.table import Table
 from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
 from executive.cli.requests import prepare
+from executive.cli.stack_command import STACK
 from executive.mission.request import Request
+from executive.mission.stack_file import load_stack
 from executive.store.missions import MissionState, MissionStore, StoredMission
 
 __all__ = ["queue"]
@@ -32,6 +34,7 @@ def add(
     world: Annotated[str | None, typer.Option(help="World by name or folder.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
     no_wake: Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")] = False,
+    stack: STACK = None,
     out: Out = Path("out"),
     store: Store = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
@@ -39,7 +42,10 @@ def add(
 ) -> None:
     """Queue a sentence or a mission file, checked."""
     with refusals():
-        asked = Request(say, file, world, require_wake=not no_wake, seed=seed, out=out, record=not no_record)
+        load_stack(stack)
+        asked = Request(
+            say, file, world, require_wake=not no_wake, seed=seed, out=out, record=not no_record, stack=stack
+        )
         request = prepare(asked).request.from_anywhere()
         with MissionStore(store or out / STORE) as missions:
             mission = missions.add(request, queued=True)

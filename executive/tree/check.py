@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -13,8 +14,8 @@ from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, es
 from skills.api import Costmap, PlanningError
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import path_length
-from skills.navigate.planner import plan_path
 from skills.robot import Pose2D
+from skills.stack import GlobalPlanner
 
 __all__ = ["Abilities", "Checked", "PlannedRoutes", "check_tree"]
 
@@ -42,10 +43,10 @@ class Checked:
 
 
 class PlannedRoutes(RoutePlanner):
-    """Routes by the planner of `navigate` on the surveyed map; each is planned once."""
+    """Routes by a global planner on the surveyed map, as `navigate` plans them; each is planned once."""
 
-    def __init__(self, costmap: Costmap, footprint: Footprint) -> None:
-        self._costmap, self._footprint = costmap, footprint
+    def __init__(self, costmap: Costmap, footprint: Footprint, planner: GlobalPlanner) -> None:
+        self._costmap, self._footprint, self._planner = costmap, footprint, planner
         self._routes: dict[tuple[Pose2D, Pose2D], Route | PlanningError] = {}
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
@@ -59,7 +60,7 @@ class PlannedRoutes(RoutePlanner):
 
     def _planned(self, start: Pose2D, goal: Pose2D) -> Route | PlanningError:
         try:
-            path = plan_path(self._costmap, self._footprint, start, goal)
+            path = self._planner.problem(self._costmap, self._footprint, start, goal, max_speed_m_s=math.inf)()
         except PlanningError as error:
             return error
         return Route(path_length(path), float(path.progress_m()[-1]))

@@ -88,3 +88,17 @@ def test_people_read_the_errors_on_standard_error(write):
 def test_a_world_that_is_not_there_is_no_traceback():
     result = invoke(GOOD, "--world", "fla")
     assert (result.exit_code, "did you mean 'flat'?" in result.stderr) == (2, True)
+
+
+def test_paths_are_planned_with_the_planner_of_a_stack_file(write):
+    mission = write("name: x\nsteps:\n  - {to: kitchen}\n")
+    wide = write("planner: {use: lattice, margin_m: 3.0}\n", "wide.yaml")
+    assert json.loads(invoke(mission, "--json").stdout)["ok"] is True
+    (error,) = json.loads(invoke(mission, "--json", "--stack", wide).stdout)["errors"]
+    assert (error["file"], error["line"]) == (str(mission), 3)
+
+
+def test_a_stack_file_that_cannot_be_used_is_refused_with_its_line(write):
+    bad = write("planner: {use: lattice}\nlocaliser: {use: none_such}\n", "stack.yaml")
+    (error,) = json.loads(invoke(GOOD, "--json", "--stack", bad).stdout)["errors"]
+    assert (error["file"], error["line"]) == (str(bad), 2)

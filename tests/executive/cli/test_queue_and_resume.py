@@ -31,6 +31,7 @@ class Plant:
 
     def __init__(self):
         self.runs = []
+        self.stacks = []
         self.outcomes = []
 
     def __call__(self, prepared, *, durable, **_):
@@ -38,6 +39,7 @@ class Plant:
         out.mkdir(parents=True, exist_ok=True)
         durable.plant.with_name(f"{durable.plant.name}.a").touch()
         self.runs.append((prepared.mission.name, prepared.request.seed, out.name, durable))
+        self.stacks.append(prepared.request.stack)
         leaf = next(node.path_id for node in tree.root.walk() if node.kind == "skill" and "/watch/" not in node.path_id)
         done = Change(leaf, NodeState(), NodeState(Status.SUCCESS, None, "done"))
         durable.journal.note(TickNote(1.0, (done,), {}, None, {}))
@@ -104,6 +106,22 @@ def test_a_mission_with_another_seed_begins_in_a_fresh_world(errand, mission, pl
     errand("queue", "add", mission("second"), "--seed", "5")
     errand("queue", "run", "--quiet")
     assert [run[3].take_up for run in plant.runs] == [False, False]
+
+
+def test_a_queued_mission_keeps_its_stack_file(errand, mission, plant, tmp_path):
+    stack = tmp_path / "stack.yaml"
+    stack.write_text("planner: {use: lattice, soft_m: 0.5}\n")
+    assert errand("queue", "add", mission("first"), "--stack", str(stack)).exit_code == 0
+    errand("queue", "run", "--quiet")
+    assert plant.stacks == [stack.resolve()]
+
+
+def test_a_mission_with_a_broken_stack_file_is_not_queued(errand, mission, tmp_path):
+    stack = tmp_path / "stack.yaml"
+    stack.write_text("planer: {}\n")
+    result = errand("queue", "add", mission("first"), "--stack", str(stack))
+    assert (result.exit_code, f"{stack}:1" in "".join(result.output.split())) == (2, True)
+    assert not (tmp_path / "out" / "missions.sqlite").exists()
 
 
 def test_one_that_fails_does_not_keep_the_next_from_being_run(errand, mission, plant, states):
@@ -211,7 +229,7 @@ def test_another_run_gives_up_what_was_broken_off(errand, mission, plant, states
     assert states() == ["cancelled", "success"]
 
 
-def test_nothing_to_resume_is_refused_with_the_mend(errand, mission, plant):
+def test_nothing_to_resume_is_refused_with_a_hint(errand, mission, plant):
     result = errand("resume")
     assert (result.exit_code, "there is no store; run or queue a mission first" in result.output) == (2, True)
     errand("queue", "add", mission("first"))

@@ -14,6 +14,7 @@ from executive.tree.estimate import Route, load_estimates
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
 from skills.navigate.footprint import Footprint
+from skills.navigate.planner import LatticePlanner
 from skills.robot import Pose2D
 
 START = Pose2D(0.0, 0.0, 0.0)
@@ -163,7 +164,9 @@ def walled():
 
 
 def test_ways_are_planned_on_the_map_for_the_whole_body(walled):
-    ways = PlannedRoutes(walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]))
+    ways = PlannedRoutes(
+        walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]), LatticePlanner()
+    )
     here = Pose2D(-1.0, -1.0, 0.0)
     assert ways.route(here, Pose2D(-1.0, 1.0, 0.0)).length_m == pytest.approx(2.0, abs=0.3)
     for _ in range(2):

@@ -1,10 +1,10 @@
-"""Ways kept between processes."""
+"""Routes kept between processes."""
 
 import os
 
 import pytest
 
-from executive.cli.kept_ways import KeptRoutes, kept_routes_of
+from executive.cli.route_cache import RouteCache, route_cache_of
 from executive.cli.worlds import open_world
 from executive.tree.estimate import Route
 from skills.robot import Pose2D
@@ -26,24 +26,24 @@ class Planner:
 
 
 @pytest.mark.parametrize("broken", ["", "[", '{"a": 1'])
-def test_each_way_is_planned_once_in_all_processes(tmp_path, broken):
-    file, planner = tmp_path / "ways" / "a.json", Planner()
+def test_each_route_is_planned_once_in_all_processes(tmp_path, broken):
+    file, planner = tmp_path / "routes" / "a.json", Planner()
     file.parent.mkdir()
     file.write_text(broken)
     for process in range(2):
-        ways = KeptRoutes(file, planner)
-        assert ways.route(HERE, THERE) == Route(5.0, 5.25)
+        routes = RouteCache(file, planner)
+        assert routes.route(HERE, THERE) == Route(5.0, 5.25)
         with pytest.raises(ValueError, match=r"There is no way\."):
-            ways.route(HERE, NOWHERE)
+            routes.route(HERE, NOWHERE)
         assert planner.asked == 2, process
-    KeptRoutes(file, planner).route(THERE, HERE)
+    RouteCache(file, planner).route(THERE, HERE)
     assert planner.asked == 3
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_where_nothing_can_be_kept_ways_are_planned_all_the_same(tmp_path):
     tmp_path.chmod(0o500)
-    assert KeptRoutes(tmp_path / "ways" / "a.json", Planner()).route(HERE, THERE) == Route(5.0, 5.25)
+    assert RouteCache(tmp_path / "routes" / "a.json", Planner()).route(HERE, THERE) == Route(5.0, 5.25)
 
 
 def test_ways_are_planned_anew_when_a_file_that_they_depend_on_has_changed(tmp_path, monkeypatch):
@@ -51,5 +51,5 @@ def test_ways_are_planned_anew_when_a_file_that_they_depend_on_has_changed(tmp_p
     robot, planner = tmp_path / "robot.yaml", Planner()
     for text, asked in (("a", 1), ("a", 1), ("b", 2)):
         robot.write_text(text)
-        kept_routes_of(open_world("flat"), planner, robot).route(HERE, THERE)
+        route_cache_of(open_world("flat"), planner, robot).route(HERE, THERE)
         assert planner.asked == asked

@@ -1,4 +1,4 @@
-"""Ways that were planned before, kept in the user's cache: the planner takes a second to be loaded."""
+"""Routes that were planned before, kept in the user's cache: loading the planner takes a second."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from plant.worlds.world import World
 from skills.robot import Pose2D
 from skills.stack import DEFAULT_FILE
 
-__all__ = ["KeptRoutes", "kept_routes_of"]
+__all__ = ["RouteCache", "route_cache_of"]
 
 _SKILLS: Final = DEFAULT_FILE.parent
 
 
-class KeptRoutes(RoutePlanner):
-    """Ways kept in a file; those that it does not have are planned, and kept there for later processes."""
+class RouteCache(RoutePlanner):
+    """Routes kept in a file. It plans those that the file does not have, and adds them for later processes."""
 
     def __init__(self, file: Path, planned: RoutePlanner) -> None:
         self._file, self._planned = file, planned
 
     @cached_property
     def _routes(self) -> dict[str, list[float] | str]:
-        """By start and goal: length and progress of a way, or why there is none."""
+        """By start and goal: length and progress of a route, or why there is none."""
         with suppress(OSError, ValueError):
-            ways: dict[str, list[float] | str] = json.loads(self._file.read_text(encoding="utf-8"))
-            return ways
+            routes: dict[str, list[float] | str] = json.loads(self._file.read_text(encoding="utf-8"))
+            return routes
         return {}
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
@@ -49,10 +49,10 @@ class KeptRoutes(RoutePlanner):
 
     def _new(self, start: Pose2D, goal: Pose2D) -> list[float] | str:
         try:
-            way = self._planned.route(start, goal)
+            route = self._planned.route(start, goal)
         except ValueError as error:
             return str(error)
-        return [way.length_m, way.progress_m]
+        return [route.length_m, route.progress_m]
 
     def _write(self) -> None:
         """Write the file; another process sees the old one or the new one."""
@@ -62,12 +62,12 @@ class KeptRoutes(RoutePlanner):
         draft.replace(self._file)
 
 
-def kept_routes_of(world: World, planned: RoutePlanner, *robot_files: Path) -> KeptRoutes:
-    """The ways kept for a world. They are planned anew once its maps, the planner or the robot's files change."""
+def route_cache_of(world: World, planned: RoutePlanner, *robot_files: Path) -> RouteCache:
+    """The routes kept for a world. They are planned again once its maps, the planner or the robot's files change."""
     planner = (DEFAULT_FILE, *_SKILLS.glob("navigate/*.py"), *_SKILLS.glob("estimate/*.py"), *_SKILLS.glob("*.py"))
     digest = _digest((*world.keepout_map_path.parent.iterdir(), *planner, *robot_files))
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return KeptRoutes(home / "errand" / "ways" / f"{digest}.json", planned)
+    return RouteCache(home / "errand" / "routes" / f"{digest}.json", planned)
 
 
 def _digest(files: Iterable[Path]) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from executive.language.actions import Action
 from executive.language.clauses import Clause
-from executive.language.drafts import spoken_command
+from executive.language.command_frames import spoken_command
 from executive.language.items import spoken_words
 from executive.language.parser import Token
 from executive.language.roles import Location
@@ -56,7 +56,7 @@ class ActionRow:
 class Explanation:
     """All steps of one sentence in order; those behind a refusal are empty.
 
-    `parts` are the clauses as they were read, `stands_for` the pronouns with what each stood for, `drafts` the commands
+    `parts` are the clauses as they were read, `stands_for` the pronouns with what each stood for, `frames` the commands
     with names as they were spoken, and `refused_at` names the step that refused.
     """
 
@@ -67,7 +67,7 @@ class Explanation:
     parts: tuple[str, ...]
     actions: tuple[ActionRow, ...]
     stands_for: tuple[tuple[str, str], ...]
-    drafts: tuple[str, ...]
+    frames: tuple[str, ...]
     commands: tuple[str, ...]
     notes: tuple[str, ...]
     refused_at: str | None
@@ -88,7 +88,7 @@ def explain(trace: Trace) -> Explanation:
         parts=tuple(map(_part, trace.clauses)),
         actions=tuple(map(_action_row, trace.actions)),
         stands_for=trace.meanings,
-        drafts=tuple(str(spoken_command(draft)) for draft in trace.drafts),
+        frames=tuple(str(spoken_command(frame)) for frame in trace.frames),
         commands=tuple(map(str, trace.commands)),
         notes=trace.notes,
         refused_at=trace.refused_at,

@@ -19,7 +19,7 @@ def explanation_lines(explained: Explanation) -> Iterator[str]:
     yield from _section("parts", explained.parts)
     yield from _section("actions", [line for action in explained.actions for line in _action_lines(action)])
     yield from _section("stands for", [f"{word} = {meant}" for word, meant in explained.stands_for])
-    yield from _section("drafts", explained.drafts)
+    yield from _section("command frames", explained.frames)
     yield from _section("notes", explained.notes)
     yield from _section("commands", explained.commands)
     if explained.refused_at is not None:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from executive.language.drafts import Draft
+from executive.language.command_frames import CommandFrame
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.questions import ClarifyingQuestion, Slot, perhaps, which
@@ -40,13 +40,13 @@ def known_line(knowledge: Knowledge | None) -> str:
     return f"{able}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
 
 
-def ground(drafts: Sequence[Draft], knowledge: Knowledge) -> tuple[Command, ...]:
+def ground(frames: Sequence[CommandFrame], knowledge: Knowledge) -> tuple[Command, ...]:
     """The commands of `ground_noted`. Raises as that does."""
-    return ground_noted(drafts, knowledge).commands
+    return ground_noted(frames, knowledge).commands
 
 
-def ground_noted(drafts: Sequence[Draft], knowledge: Knowledge, facts: WordFacts | None = None) -> Grounded:
-    """The drafts as commands in the world's own names, with default places where none was said.
+def ground_noted(frames: Sequence[CommandFrame], knowledge: Knowledge, facts: WordFacts | None = None) -> Grounded:
+    """The frames as commands in the world's own names, with default places where none was said.
 
     `facts` on English words widen what an unknown name may stand for.
 
@@ -54,7 +54,7 @@ def ground_noted(drafts: Sequence[Draft], knowledge: Knowledge, facts: WordFacts
         RefusalError: a thing, place or person is unknown, or could be several; with a question where that helps.
     """
     grounder = _Grounder(knowledge, facts)
-    commands = tuple(grounder.command(draft) for draft in drafts)
+    commands = tuple(grounder.command(frame) for frame in frames)
     return Grounded(commands, tuple(dict.fromkeys(grounder.notes)))
 
 
@@ -66,21 +66,21 @@ class _Grounder:
     facts: WordFacts | None
     notes: list[str] = field(default_factory=list)
 
-    def command(self, draft: Draft) -> Command:
-        """One draft as a command."""
-        item, target = (None if phrase is None else self.thing(phrase) for phrase in (draft.item, draft.object))
-        goal, goal_at = (None, None) if draft.goal is None else self.goal(draft.goal)
-        if goal is None and target is not None and draft.task in (Task.GRASP, Task.FIND):
-            goal = self.knowledge.default_place(draft.task, target.name)
+    def command(self, frame: CommandFrame) -> Command:
+        """One frame as a command."""
+        item, target = (None if phrase is None else self.thing(phrase) for phrase in (frame.item, frame.object))
+        goal, goal_at = (None, None) if frame.goal is None else self.goal(frame.goal)
+        if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
+            goal = self.knowledge.default_place(frame.task, target.name)
         return Command(
             item=item,
             goal=goal,
             goal_at=goal_at,
-            task=draft.task,
+            task=frame.task,
             object=target,
-            item_count=1 if draft.item is None else draft.item.count,
-            object_count=1 if draft.object is None else draft.object.count,
-            verb=draft.verb,
+            item_count=1 if frame.item is None else frame.item.count,
+            object_count=1 if frame.object is None else frame.object.count,
+            verb=frame.verb,
         )
 
     def thing(self, phrase: Phrase) -> Thing:

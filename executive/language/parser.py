@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from executive.language.nouns import FloatArray, NounKind, NounKinds, noun_examples
-from executive.language.repairs import repaired
+from executive.language.parse_correction import corrected_parse
 from executive.language.tokens import Token
 from executive.mission.errors import InputError
 
@@ -66,7 +66,7 @@ class SpacyParser:
 
     def parse(self, text: str) -> tuple[Token, ...]:
         """The words of `text`, in order."""
-        return repaired(_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
+        return corrected_parse(_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)
 
     def _kind(self, token: SpacyToken) -> NounKind | None:
         """The kind of a word as a noun, with what stands before it; each is judged once."""

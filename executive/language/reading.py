@@ -24,9 +24,9 @@ from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
 from executive.language.nouns import NounKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
+from executive.language.question_parsing import how_many, where_is
 from executive.language.row import LONGEST, Row, command_position
 from executive.language.statements import belongs, goes_on, narrated, needed, told
-from executive.language.wondering import how_many, where_is
 
 __all__ = ["split_items"]
 

@@ -13,14 +13,14 @@ from executive.language.phrases import Phrase
 from executive.language.refusal import RefusalError
 from executive.language.roles import THERE, Location
 
-__all__ = ["Deed", "Memory", "Resolved", "resolve"]
+__all__ = ["Memory", "Resolved", "ResolvedAction", "resolve"]
 
 
 _SEVERAL: Final = frozenset({"them", "they", "these", "those"})
 
 
 @dataclass(frozen=True)
-class Deed:
+class ResolvedAction:
     """An action on one thing at most, without pronouns; `again` says that the thing was spoken of before."""
 
     kind: VerbKind
@@ -53,15 +53,15 @@ class Memory:
 
 @dataclass(frozen=True)
 class Resolved:
-    """The deeds of a sentence, what was spoken of last, and each pronoun with what it stood for."""
+    """The resolved actions of a sentence, what was spoken of last, and each pronoun with what it stood for."""
 
-    deeds: tuple[Deed, ...] = ()
+    actions: tuple[ResolvedAction, ...] = ()
     memory: Memory = field(default_factory=Memory)
     meanings: tuple[tuple[str, str], ...] = ()
 
 
 def resolve(actions: Sequence[Action], memory: Memory) -> Resolved:
-    """The actions as deeds, each on one thing; `memory` is what was spoken of before.
+    """The actions, each on one thing and without pronouns; `memory` is what was spoken of before.
 
     Raises:
         RefusalError: a pronoun stands for nothing that was said.
@@ -77,7 +77,7 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
     memory = before.memory
     again = any(phrase.pronoun for phrase in action.objects)
     meant = _all_meant(action.objects, memory)
-    things = tuple(_named_before(thing, action, kind, before.deeds) or thing for thing in meant)
+    things = tuple(_named_before(thing, action, kind, before.actions) or thing for thing in meant)
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
     _check_back(action, goal, before)
     told = again or any(phrase.stands_for_one for phrase in action.objects)
@@ -92,28 +92,30 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
         told=memory.told,
     )
     looks = kind is not VerbKind.GO
-    deeds = (
-        Deed(kind, action.verb, thing, source or (memory.where_is(thing) if thing and looks else None), goal, same)
+    actions = (
+        ResolvedAction(
+            kind, action.verb, thing, source or (memory.where_is(thing) if thing and looks else None), goal, same
+        )
         for thing in things or (None,)
         for same in [again or (thing is not None and thing not in meant)]
     )
-    return Resolved((*before.deeds, *deeds), after, (*before.meanings, *_meanings(action, memory)))
+    return Resolved((*before.actions, *actions), after, (*before.meanings, *_meanings(action, memory)))
 
 
 def _check_back(action: Action, goal: Location | None, before: Resolved) -> None:
     """Ask what "it" means in "put it next to it" when that would be where the thing was taken from."""
     phrase = None if action.goal is None else action.goal.phrase
-    taken = before.deeds[-1].source if before.deeds else None
+    taken = before.actions[-1].source if before.actions else None
     again = any(thing.pronoun for thing in action.objects)
     if again and phrase is not None and phrase.pronoun and goal is not None and goal == taken:
         raise RefusalError(f"which place is {phrase.text!r}?", [phrase.text], question=True)
 
 
-def _named_before(thing: Phrase, action: Action, kind: VerbKind, deeds: Sequence[Deed]) -> Phrase | None:
+def _named_before(thing: Phrase, action: Action, kind: VerbKind, actions: Sequence[ResolvedAction]) -> Phrase | None:
     """The thing that was taken before under the same name: "get the bread, go to the hall and put the bread there"."""
     if thing.indefinite or action.source is not None or kind not in (VerbKind.PLACE, VerbKind.SINGLE_TRIP):
         return None
-    taken = (deed.target for deed in reversed(deeds) if deed.target is not None and deed.kind is not VerbKind.PLACE)
+    taken = (one.target for one in reversed(actions) if one.target is not None and one.kind is not VerbKind.PLACE)
     return next((target for target in taken if target.text.lower() == thing.text.lower()), None)
 
 
@@ -130,7 +132,7 @@ def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
 
 
 def _stated(action: Action, before: Resolved) -> Resolved:
-    """Remember a statement; "it is in the drawer" tells where the thing of an earlier deed is."""
+    """Remember a statement; "it is in the drawer" tells where the thing of an earlier action is."""
     where = _place(action.source, before.memory)
     at = where if not action.objects else None
     person = before.memory.person if action.teller is None else Location(action.teller, within=at)
@@ -142,17 +144,17 @@ def _stated(action: Action, before: Resolved) -> Resolved:
     if not animal and not any(phrase.pronoun for phrase in action.objects):
         return replace(before, memory=_told(action, where, memory))
     told = tuple(
-        replace(deed, source=where) if deed.target in memory.things and deed.source is None else deed
-        for deed in before.deeds
+        replace(one, source=where) if one.target in memory.things and one.source is None else one
+        for one in before.actions
     )
-    return replace(before, deeds=told, memory=memory)
+    return replace(before, actions=told, memory=memory)
 
 
 def _met(person: Location, before: Resolved) -> Resolved:
     """Remember where somebody who was spoken of is to be met: "bring it to Robin, he is in the hall"."""
     old = before.memory.person
-    deeds = tuple(replace(deed, goal=person) if deed.goal == old else deed for deed in before.deeds)
-    return replace(before, deeds=deeds, memory=replace(before.memory, person=person, place=person.within))
+    actions = tuple(replace(one, goal=person) if one.goal == old else one for one in before.actions)
+    return replace(before, actions=actions, memory=replace(before.memory, person=person, place=person.within))
 
 
 def _told(action: Action, where: Location | None, memory: Memory) -> Memory:

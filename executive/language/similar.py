@@ -19,7 +19,7 @@ from rapidfuzz.distance import OSA
 from executive.language.sounds import sound_distance
 from executive.mission.knowledge import Knowledge
 
-__all__ = ["Mended", "WordFacts", "look_alikes", "mend_spelling", "synonyms_of", "words_for"]
+__all__ = ["Corrected", "WordFacts", "correct_spelling", "look_alikes", "synonyms_of", "words_for"]
 
 ALIKE_SOUND: Final = 0.16
 ALIKE_MEANING: Final = 0.65
@@ -43,7 +43,7 @@ class WordFacts(Protocol):
 
 
 @dataclass(frozen=True)
-class Mended:
+class Corrected:
     """A sentence with known names in place of misspelled ones, and a word on each ("I take ...")."""
 
     text: str
@@ -81,7 +81,7 @@ def look_alikes(word: str, known: Mapping[str, str], facts: WordFacts | None) ->
     return tuple(dict.fromkeys(near))[:_MOST_CANDIDATES]
 
 
-def mend_spelling(text: str, knowledge: Knowledge, facts: WordFacts) -> Mended:
+def correct_spelling(text: str, knowledge: Knowledge, facts: WordFacts) -> Corrected:
     """Write known names in place of what is misspelled so that only one of them can be meant.
 
     A word is misspelled when it is no English word; the name must be within one slip, or two for long names. Names
@@ -91,14 +91,14 @@ def mend_spelling(text: str, knowledge: Knowledge, facts: WordFacts) -> Mended:
     words = list(_WORD.finditer(text))[:_MOST_WORDS]
     pieces, notes, end, at = [], [], 0, 0
     while at < len(words):
-        count, name = _mended_at(words, at, known, facts)
+        count, name = _corrected_at(words, at, known, facts)
         if name is not None:
             spoken = text[words[at].start() : words[at + count - 1].end()]
             pieces += [text[end : words[at].start()], name]
             notes += [] if _despaced(spoken) in (_despaced(name), _despaced(f"{name}s")) else [_note(spoken, name)]
             end = words[at + count - 1].end()
         at += count
-    return Mended("".join([*pieces, text[end:]]), tuple(notes))
+    return Corrected("".join([*pieces, text[end:]]), tuple(notes))
 
 
 def _note(spoken: str, name: str) -> str:
@@ -117,7 +117,7 @@ class _Known:
     spelled: Mapping[str, str]
 
 
-def _mended_at(words: Sequence[re.Match[str]], at: int, known: _Known, facts: WordFacts) -> tuple[int, str | None]:
+def _corrected_at(words: Sequence[re.Match[str]], at: int, known: _Known, facts: WordFacts) -> tuple[int, str | None]:
     """How many words from here on are one name, and that name where it must be written anew."""
     rows = [[word.group().lower() for word in words[at : at + count]] for count in range(_LONGEST_NAME, 0, -1)]
     fitting = [row for row in rows if at + len(row) <= len(words)]

@@ -8,20 +8,20 @@ from typing import Final
 
 from executive.language.actions import Action, read_actions
 from executive.language.clauses import Clause, split_clauses, without_name
-from executive.language.drafts import Draft, draft_commands, spoken_command
+from executive.language.command_frames import CommandFrame, command_frames, spoken_command
+from executive.language.disfluency import repair_disfluencies
+from executive.language.feasibility import check_feasible, not_understood
 from executive.language.grounding import ground_noted, known_line
 from executive.language.items import Item
 from executive.language.lexicon import lexicon
-from executive.language.mending import mended
 from executive.language.names import name_table, parse_with_names
 from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS, open_commands
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser, Token
 from executive.language.phrases import Phrase, noun_phrases
 from executive.language.questions import Slot, which
-from executive.language.reach import check_reach, not_understood
 from executive.language.reading import split_items
-from executive.language.reference import Deed, Memory, resolve
+from executive.language.reference import Memory, ResolvedAction, resolve
 from executive.language.refusal import RefusalError
 from executive.language.similar import WordFacts
 from executive.mission.command import Command, is_attribute
@@ -45,8 +45,8 @@ class Trace:
     items: tuple[Item, ...] = ()
     clauses: tuple[Clause, ...] = ()
     actions: tuple[Action, ...] = ()
-    deeds: tuple[Deed, ...] = ()
-    drafts: tuple[Draft, ...] = ()
+    resolved: tuple[ResolvedAction, ...] = ()
+    frames: tuple[CommandFrame, ...] = ()
     meanings: tuple[tuple[str, str], ...] = ()
     commands: tuple[Command, ...] = ()
     notes: tuple[str, ...] = ()
@@ -92,7 +92,7 @@ def _parse(trace: Trace, context: _Context) -> Trace:
 
 
 def _read(trace: Trace, _: _Context) -> Trace:
-    return replace(trace, items=mended(split_items(trace.tokens, noun_phrases(trace.tokens), lexicon())))
+    return replace(trace, items=repair_disfluencies(split_items(trace.tokens, noun_phrases(trace.tokens), lexicon())))
 
 
 def _split(trace: Trace, context: _Context) -> Trace:
@@ -142,23 +142,23 @@ def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError
 
 def _refer(trace: Trace, context: _Context) -> Trace:
     found = resolve(trace.actions, trace.memory)
-    return replace(trace, deeds=found.deeds, memory=found.memory, meanings=found.meanings)
+    return replace(trace, resolved=found.actions, memory=found.memory, meanings=found.meanings)
 
 
-def _reach(trace: Trace, context: _Context) -> Trace:
-    check_reach(trace.deeds, context.knowledge)
+def _check_feasible(trace: Trace, context: _Context) -> Trace:
+    check_feasible(trace.resolved, context.knowledge)
     return trace
 
 
-def _draft(trace: Trace, _: _Context) -> Trace:
-    return replace(trace, drafts=draft_commands(trace.deeds))
+def _frame(trace: Trace, _: _Context) -> Trace:
+    return replace(trace, frames=command_frames(trace.resolved))
 
 
 def _command(trace: Trace, context: _Context) -> Trace:
     if context.knowledge is None:
-        return replace(trace, commands=tuple(map(spoken_command, trace.drafts)))
+        return replace(trace, commands=tuple(map(spoken_command, trace.frames)))
     facts = context.parser if isinstance(context.parser, WordFacts) else None
-    grounded = ground_noted(trace.drafts, context.knowledge, facts)
+    grounded = ground_noted(trace.frames, context.knowledge, facts)
     return replace(trace, commands=grounded.commands, notes=(*trace.notes, *grounded.notes))
 
 
@@ -170,7 +170,7 @@ _STEPS: Final[dict[str, Callable[[Trace, _Context], Trace]]] = {
     "actions": _act,
     "understanding": _check,
     "reference": _refer,
-    "reach": _reach,
-    "drafts": _draft,
+    "feasibility": _check_feasible,
+    "command frames": _frame,
     "grounding": _command,
 }

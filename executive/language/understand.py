@@ -12,7 +12,7 @@ from executive.language.normalise import clean
 from executive.language.parser import DependencyParser
 from executive.language.questions import ClarifyingQuestion
 from executive.language.reference import Memory
-from executive.language.similar import Mended, WordFacts, mend_spelling
+from executive.language.similar import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
 from executive.language.wake import strip_wake
 from executive.mission.command import Command
@@ -91,11 +91,11 @@ def understand(
         reason = f'the robot\'s name was not said; begin with "Hey {name}"'
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
     facts = parser if isinstance(parser, WordFacts) else None
-    mended = Mended(wake.text)
+    corrected = Corrected(wake.text)
     if correct and knowledge is not None and facts is not None:
-        mended = mend_spelling(wake.text, knowledge, facts)
-    trace = trace_sentence(mended.text, parser=parser, knowledge=knowledge, memory=memory)
-    refusal, notes = trace.refusal, (*mended.notes, *trace.notes)
+        corrected = correct_spelling(wake.text, knowledge, facts)
+    trace = trace_sentence(corrected.text, parser=parser, knowledge=knowledge, memory=memory)
+    refusal, notes = trace.refusal, (*corrected.notes, *trace.notes)
     if refusal is None:
         return Understanding(sentence, Status.OK, trace.commands, notes=notes, memory=trace.memory, trace=trace)
     status = Status.QUESTION if refusal.question else Status.REFUSED

@@ -57,8 +57,8 @@ def heard_wake(transcript: str, name: str, *, others: Collection[str] = ()) -> A
     exact = addressed_to(transcript, (name, *others))
     if exact.name is not None:
         return exact if exact.name == name else Address(None, transcript)
-    for mended in _mended(transcript, name, others):
-        address = addressed_to(mended, (name, *others))
+    for corrected in _corrected(transcript, name, others):
+        address = addressed_to(corrected, (name, *others))
         if address.name == name:
             return address
     return Address(None, transcript)
@@ -148,7 +148,7 @@ def _matches(pattern: str, text: str, flags: int = re.IGNORECASE) -> bool:
     return re.fullmatch(pattern, text, flags | re.DOTALL) is not None
 
 
-def _mended(transcript: str, name: str, others: Collection[str]) -> Iterator[str]:
+def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[str]:
     """The transcript with what sounds like the wake phrase, or the name, at its beginning written as that."""
     words = list(re.finditer(r"[^\W\d_][\w'’-]*", transcript))[:_HEARD_WORDS]
     for at, word in enumerate(words[:_LATEST_GREETING]):

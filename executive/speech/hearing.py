@@ -14,7 +14,7 @@ from executive.language.wake import Address, heard_wake
 from executive.mission.command import Command, is_attribute
 from executive.mission.knowledge import Knowledge
 from executive.speech.alikes import SoundAlikes
-from executive.speech.repair import Reading
+from executive.speech.sound_correction import Reading
 from executive.speech.vocabulary import Vocabulary
 
 __all__ = ["Meant", "SpeechReader", "spoken_phrases"]
@@ -65,7 +65,7 @@ class SpeechReader:
         typed = f"Hey {self.robot_name}, {address.text}" if addressed else text
         meant = Meant(replace(understood, text=typed), addressed)
         if understood.status is Status.NOT_ADDRESSED:
-            return Reading(meant, fits=False, mendable=False)
+            return Reading(meant, fits=False, correctable=False)
         if understood.status is not Status.OK:
             return Reading(meant, fits=False, suspects=understood.unknown_words)
         strange = () if self.knowledge else tuple(self._strange(understood.commands))

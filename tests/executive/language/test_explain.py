@@ -40,8 +40,8 @@ def test_each_action_has_its_roles(explained):
     assert bring.recipient == "start"
 
 
-def test_drafts_keep_the_spoken_names_and_commands_the_worlds(explained):
-    assert "Take [Nothing] to [Nothing] and do [grasp] to [2 cokes]" in explained.drafts
+def test_command_frames_keep_the_spoken_names_and_commands_the_worlds(explained):
+    assert "Take [Nothing] to [Nothing] and do [grasp] to [2 cokes]" in explained.frames
     assert "Take [Nothing] to [kitchen] and do [grasp] to [2 coke]" in explained.commands
 
 
@@ -59,8 +59,8 @@ def test_pronouns_are_told(parser):
         ("...", "clauses"),
         ("bring me a cup and sing", "understanding"),
         ("bring it", "reference"),
-        ("bring me the news", "reach"),
-        ("put the cup", "drafts"),
+        ("bring me the news", "feasibility"),
+        ("put the cup", "command frames"),
     ],
 )
 def test_the_step_that_refused_is_named(parser, sentence, step):
@@ -78,7 +78,7 @@ def test_a_name_that_the_world_lacks_is_refused_at_grounding(parser, knowledge):
 def test_the_text_has_all_steps_and_the_tree(explained):
     lines = list(explanation_lines(explained))
     headings = [line for line in lines if not line.startswith(" ")]
-    wanted = ["heard", "in plain words", "words", "dependencies", "subject", "parts", "actions", "drafts", "commands"]
+    wanted = "heard, in plain words, words, dependencies, subject, parts, actions, command frames, commands".split(", ")
     assert headings == [f"{name}:" for name in wanted]
     assert "  ├─ obj: hammer (NOUN)" in lines
 

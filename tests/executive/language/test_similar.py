@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.language.similar import look_alikes, mend_spelling, synonyms_of, words_for
+from executive.language.similar import correct_spelling, look_alikes, synonyms_of, words_for
 
 KNOWN = {"wrench": "wrench", "coke": "coke", "lemonade": "lemonade", "living room": "living room", "hammer": "hammer"}
 
@@ -29,7 +29,7 @@ def test_a_name_has_its_synonyms_and_the_words_for_its_kind():
 
 
 @pytest.mark.parametrize(
-    ("text", "mended"),
+    ("text", "corrected"),
     [
         ("bring me the wrnch", "bring me the wrench"),
         ("fetch a screwdrver from the worshop", "fetch a screwdriver from the workshop"),
@@ -41,24 +41,24 @@ def test_a_name_has_its_synonyms_and_the_words_for_its_kind():
         ("fetch me a spaner", "fetch me a spanner"),
     ],
 )
-def test_a_misspelled_name_is_mended_and_told(parser, knowledge, text, mended):
-    answer = mend_spelling(text, knowledge, parser)
-    assert answer.text == mended
+def test_a_misspelled_name_is_corrected_and_told(parser, knowledge, text, corrected):
+    answer = correct_spelling(text, knowledge, parser)
+    assert answer.text == corrected
     assert answer.notes
     assert all(note.startswith("I take '") for note in answer.notes)
 
 
 @pytest.mark.parametrize(
-    ("text", "mended"),
+    ("text", "corrected"),
     [
         ("put it on the night-stand", "put it on the night stand"),
         ("go to the livingroom", "go to the living room"),
         ("fetch the screw driver", "fetch the screw driver"),
     ],
 )
-def test_names_written_together_or_apart_are_the_same_and_not_told(parser, knowledge, text, mended):
-    answer = mend_spelling(text, knowledge, parser)
-    assert (answer.text, answer.notes) == (mended, ())
+def test_names_written_together_or_apart_are_the_same_and_not_told(parser, knowledge, text, corrected):
+    answer = correct_spelling(text, knowledge, parser)
+    assert (answer.text, answer.notes) == (corrected, ())
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_names_written_together_or_apart_are_the_same_and_not_told(parser, knowl
     ],
 )
 def test_what_may_be_right_is_left_alone(parser, knowledge, text):
-    assert mend_spelling(text, knowledge, parser).text == text
+    assert correct_spelling(text, knowledge, parser).text == text
 
 
 @pytest.mark.parametrize(("word", "names"), [("cake", ("coke",)), ("ranch", ("wrench",)), ("unicorn", ())])
@@ -84,5 +84,5 @@ def test_what_looks_or_sounds_alike_may_be_meant(parser, word, names):
 
 
 @given(st.text(max_size=30))
-def test_any_text_is_mended_without_an_error(parser, knowledge, text):
-    mend_spelling(text, knowledge, parser)
+def test_any_text_is_corrected_without_an_error(parser, knowledge, text):
+    correct_spelling(text, knowledge, parser)

@@ -25,9 +25,9 @@ def test_a_call_may_be_misheard(reader, call):
     assert reading.meaning.understanding.text == "Hey Alice, go to the kitchen"
 
 
-def test_what_is_said_to_others_does_not_fit_and_is_not_mended(reader):
+def test_what_is_said_to_others_does_not_fit_and_is_not_corrected(reader):
     reading = reader.read("Robin, go to the kitchen")
-    assert not reading.fits and not reading.mendable and not reading.meaning.addressed
+    assert not reading.fits and not reading.correctable and not reading.meaning.addressed
     assert reading.meaning.understanding.status is Status.NOT_ADDRESSED
 
 
@@ -43,7 +43,7 @@ def test_other_robots_are_told_from_this_one(flat, parser):
 
 def test_an_unknown_name_is_to_blame(reader):
     reading = reader.read("Hey Alice, walk to the maze")
-    assert not reading.fits and reading.mendable
+    assert not reading.fits and reading.correctable
     assert "maze" in " ".join(reading.suspects)
 
 

@@ -6,14 +6,14 @@ from made_speech import ScriptedRecognition
 from executive.speech.alikes import SoundAlikes
 from executive.speech.interpret import interpret, smoothed
 from executive.speech.recogniser import Transcript
-from executive.speech.repair import Reading
+from executive.speech.sound_correction import Reading
 
 ALIKES = SoundAlikes(["wrench", "bench", "coke"])
 
 
 def read(text):
     last = text.split()[-1].strip(".?")
-    return Reading(text, last in ("wrench", "bench", "coke"), (last,), mendable=not text.startswith("Robin"))
+    return Reading(text, last in ("wrench", "bench", "coke"), (last,), correctable=not text.startswith("Robin"))
 
 
 def heard(*texts, wider=(), likely=None, step=1.0, otherwise=0.0):
@@ -41,16 +41,16 @@ def test_a_wider_search_is_made_when_no_reading_fits():
     assert meant("get the ranch", wider=["get the crunch", "get the coke"]) == "get the coke"
 
 
-def test_words_are_mended_by_sound_when_no_reading_fits():
+def test_words_are_corrected_by_sound_when_no_reading_fits():
     result = interpret(heard("get the ranch"), read, ALIKES)
     assert (result.text, result.meaning, result.first_text) == ("get the wrench", "get the wrench", "get the ranch")
 
 
-def test_the_sound_decides_between_two_mended_sentences():
+def test_the_sound_decides_between_two_corrected_sentences():
     assert meant("get the ranch", likely={"get the bench": -1.0}, otherwise=-8.0) == "get the bench"
 
 
-def test_a_mended_sentence_that_the_sound_denies_is_not_meant():
+def test_a_corrected_sentence_that_the_sound_denies_is_not_meant():
     assert meant("get the ranch", otherwise=-30.0) == "get the ranch"
 
 

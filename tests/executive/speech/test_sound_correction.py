@@ -3,7 +3,7 @@
 import pytest
 
 from executive.speech.alikes import SoundAlikes
-from executive.speech.repair import Reading, Repair, repairs
+from executive.speech.sound_correction import Candidate, Reading, corrections
 
 NAMES = ("wrench", "bench", "desk", "kitchen", "beer", "coke")
 WORDS = ("could you", "would you", "drive to", "bring", "from", "take")
@@ -16,8 +16,8 @@ def read(text):
     return Reading(text, not unknown, unknown)
 
 
-def mended(text, most=3):
-    return [repair.text for repair in repairs([Repair(text, 0.0, read(text))], read, ALIKES, most=most)]
+def corrected(text, most=3):
+    return [candidate.text for candidate in corrections([Candidate(text, 0.0, read(text))], read, ALIKES, most=most)]
 
 
 @pytest.mark.parametrize(
@@ -31,28 +31,28 @@ def mended(text, most=3):
     ],
 )
 def test_misheard_words_become_known_ones(heard, meant):
-    assert meant in mended(heard)
+    assert meant in corrected(heard)
 
 
 def test_a_sentence_that_fits_stays_as_it_is():
-    assert mended("bring me the coke", most=1) == ["bring me the coke"]
+    assert corrected("bring me the coke", most=1) == ["bring me the coke"]
 
 
 def test_right_words_are_left_alone():
-    assert mended("take the beer from the nest")[0].startswith("take the beer from the")
+    assert corrected("take the beer from the nest")[0].startswith("take the beer from the")
 
 
-def test_what_sounds_like_nothing_known_is_not_mended():
-    assert mended("bring me the newspaper subscription") == []
+def test_what_sounds_like_nothing_known_is_not_corrected():
+    assert corrected("bring me the newspaper subscription") == []
 
 
 def test_behind_an_article_stands_a_name():
-    assert not any("the could" in text or "the from" in text for text in mended("bring me the food", most=9))
+    assert not any("the could" in text or "the from" in text for text in corrected("bring me the food", most=9))
 
 
 def test_the_likest_sentence_comes_first():
-    found = repairs([Repair("bring me the ranch", 0.0, read("bring me the ranch"))], read, ALIKES)
-    assert [repair.cost for repair in found] == sorted(repair.cost for repair in found)
+    found = corrections([Candidate("bring me the ranch", 0.0, read("bring me the ranch"))], read, ALIKES)
+    assert [candidate.cost for candidate in found] == sorted(candidate.cost for candidate in found)
 
 
 def test_the_search_ends_however_long_the_sentence():
@@ -62,6 +62,6 @@ def test_the_search_ends_however_long_the_sentence():
         reads.append(text)
         return Reading(text, fits=False)
 
-    heard = Repair("could you bring me the ranch from the nest " * 6, 0.0, Reading("", fits=False))
-    assert repairs([heard], never, ALIKES) == []
+    heard = Candidate("could you bring me the ranch from the nest " * 6, 0.0, Reading("", fits=False))
+    assert corrections([heard], never, ALIKES) == []
     assert len(reads) < 50

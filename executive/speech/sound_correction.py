@@ -1,4 +1,4 @@
-"""Mends what was heard by sound: words that fit nowhere become known words that sound alike ("ranch" -> wrench).
+"""Corrects what was heard by sound: words that fit nowhere become known words that sound alike ("ranch" -> wrench).
 
 The search goes from the transcripts outwards, the change that is least to the ear first, and only changes words that
 the reader of the sentence found fault with, or their neighbours. Which of the sentences that then make sense was
@@ -17,7 +17,7 @@ from typing import Final, Generic, TypeVar
 from executive.mission.command import is_attribute
 from executive.speech.alikes import Alike, SoundAlikes
 
-__all__ = ["Reading", "Repair", "repairs"]
+__all__ = ["Candidate", "Reading", "corrections"]
 
 Meaning = TypeVar("Meaning")
 
@@ -26,17 +26,17 @@ Meaning = TypeVar("Meaning")
 class Reading(Generic[Meaning]):
     """What a sentence means, whether that fits, and else the words that are to blame (none: any may be).
 
-    One that is not `mendable` is better left as it was heard.
+    One that is not `correctable` is better left as it was heard.
     """
 
     meaning: Meaning
     fits: bool
     suspects: tuple[str, ...] = ()
-    mendable: bool = True
+    correctable: bool = True
 
 
 @dataclass(frozen=True)
-class Repair(Generic[Meaning]):
+class Candidate(Generic[Meaning]):
     """A sentence, what it means, and how far it sounds from what was heard (0 the same, about 1 a changed sound).
 
     `changes` counts the groups of words that were changed.
@@ -48,15 +48,15 @@ class Repair(Generic[Meaning]):
     changes: int = 0
 
 
-def repairs(
-    heard: Sequence[Repair[Meaning]], read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes, *, most: int = 3
-) -> list[Repair[Meaning]]:
+def corrections(
+    heard: Sequence[Candidate[Meaning]], read: Callable[[str], Reading[Meaning]], alikes: SoundAlikes, *, most: int = 3
+) -> list[Candidate[Meaning]]:
     """At most so many sentences that fit and sound like one of those that were heard, the likest first."""
     order = count()
-    known = {repair.text: repair.reading for repair in heard}
-    queue = [(repair.cost, next(order), 0, tuple(repair.text.split())) for repair in heard]
+    known = {candidate.text: candidate.reading for candidate in heard}
+    queue = [(candidate.cost, next(order), 0, tuple(candidate.text.split())) for candidate in heard]
     heapq.heapify(queue)
-    seen, found = {words for *_, words in queue}, list[Repair[Meaning]]()
+    seen, found = {words for *_, words in queue}, list[Candidate[Meaning]]()
     for _ in range(_MOST_READINGS):
         if not queue or len(found) == most:
             break
@@ -64,7 +64,7 @@ def repairs(
         sentence = " ".join(words)
         reading = known.get(sentence) or read(sentence)
         if reading.fits:
-            found.append(Repair(sentence, cost, reading, changes))
+            found.append(Candidate(sentence, cost, reading, changes))
         elif changes < _MOST_CHANGES:
             for more, changed in _changed(words, reading.suspects, alikes):
                 if changed not in seen and cost + more <= _MOST_COST:

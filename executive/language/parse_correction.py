@@ -16,7 +16,7 @@ from executive.language.nouns import NounKind
 from executive.language.tokens import Token
 from executive.mission.command import is_attribute
 
-__all__ = ["repaired"]
+__all__ = ["corrected_parse"]
 
 _AFTER_NOUN: Final = frozenset({"", "ADP", "PUNCT", "CCONJ", "INTJ"})
 _BEGINS_OBJECT: Final = frozenset({"DT", "PRP", "PRP$", "CD"})
@@ -25,7 +25,7 @@ _BEFORE_INFINITIVE: Final = frozenset({"want", "need", "like", "love", "have", "
 _BEFORE_NOUN: Final = frozenset({"det", "amod", "compound", "nmod", "nummod", "poss"})
 
 
-def repaired(tokens: Iterable[Token]) -> tuple[Token, ...]:
+def corrected_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
     """The words with their repairs, from left to right."""
     found = list(tokens)
     for at in range(1, len(found)):

@@ -9,30 +9,30 @@ from executive.language.grounding import known_line
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
-from executive.language.reference import Deed
+from executive.language.reference import ResolvedAction
 from executive.language.refusal import RefusalError
 from executive.language.roles import HERE, Location
 from executive.mission.knowledge import Knowledge
 
-__all__ = ["check_reach", "not_understood"]
+__all__ = ["check_feasible", "not_understood"]
 
 
-def check_reach(deeds: Sequence[Deed], knowledge: Knowledge | None) -> None:
+def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | None) -> None:
     """Refuse to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
 
     Raises:
-        RefusalError: any deed is out of reach; it names all that is.
+        RefusalError: any action is out of reach; it names all that is.
     """
     shared = [
-        d.goal.phrase.spoken for d in deeds if d.goal is not None and d.goal.phrase is not None and _serves_all(d)
+        d.goal.phrase.spoken for d in actions if d.goal is not None and d.goal.phrase is not None and _serves_all(d)
     ]
     if shared:
         raise RefusalError(f"I bring things to one person at a time, not to {', '.join(shared)}; name one", shared)
-    people = [f"{d.verb} {d.target.text}" for d in deeds if _carries(d) and d.target is not None and d.target.person]
+    people = [f"{d.verb} {d.target.text}" for d in actions if _carries(d) and d.target is not None and d.target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
-    moved = [deed.target for deed in deeds if _moved(deed)]
-    outside = [(part, part) for deed in deeds for part in _outside(deed, deed.target in moved)]
+    moved = [action.target for action in actions if _moved(action)]
+    outside = [(part, part) for action in actions for part in _outside(action, action.target in moved)]
     if outside:
         raise not_understood(outside, knowledge)
 
@@ -50,69 +50,69 @@ def _named(words: Sequence[str], clause: str) -> str:
     return quoted if not clause or clause in words else f"{quoted} in {clause!r}"
 
 
-def _serves_all(deed: Deed) -> bool:
+def _serves_all(action: ResolvedAction) -> bool:
     """Whether a thing is brought to all of some people."""
-    goal = None if deed.goal is None else deed.goal.phrase
-    return _carries(deed) and goal is not None and goal.universal and deed.target is not None
+    goal = None if action.goal is None else action.goal.phrase
+    return _carries(action) and goal is not None and goal.universal and action.target is not None
 
 
-def _carries(deed: Deed) -> bool:
-    return deed.kind not in (VerbKind.GO, VerbKind.FIND)
+def _carries(action: ResolvedAction) -> bool:
+    return action.kind not in (VerbKind.GO, VerbKind.FIND)
 
 
 _BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "bring over", "carry over", "hand"})
 _INTO: Final = frozenset({"into", "onto"})
 
 
-def _moved(deed: Deed) -> bool:
+def _moved(action: ResolvedAction) -> bool:
     """Whether a definite thing is taken from or put into a place in the house, so that it is no idea.
 
     So is "the mail from the desk", and what is written ("take the report to the boss").
     """
-    if deed.target is None or deed.target.indefinite or not _carries(deed):
+    if action.target is None or action.target.indefinite or not _carries(action):
         return False
-    goal = deed.goal
+    goal = action.goal
     if (
         goal is not None
         and goal.preposition in _INTO
         and goal.phrase is not None
         and goal.phrase.kind is NounKind.PLACE
     ):
-        return deed.target.kind is not NounKind.ELSEWHERE
-    laid = deed.kind is VerbKind.PLACE and goal is not None and goal.phrase is not None
+        return action.target.kind is not NounKind.ELSEWHERE
+    laid = action.kind is VerbKind.PLACE and goal is not None and goal.phrase is not None
     laid = laid and goal is not None and goal.phrase is not None and goal.phrase.kind is NounKind.PLACE
-    if goal not in (None, HERE) and (deed.verb in _BY_HAND or laid) and deed.target.head.lemma in lexicon().written:
+    if goal not in (None, HERE) and (action.verb in _BY_HAND or laid) and action.target.head.lemma in lexicon().written:
         return True
-    role = lexicon().prepositions.get(tuple(deed.source.preposition.split())) if deed.source is not None else None
-    place = None if deed.source is None else deed.source.phrase
-    if place is None or role is not PrepositionRole.SOURCE or deed.target.kind is NounKind.ELSEWHERE:
+    role = lexicon().prepositions.get(tuple(action.source.preposition.split())) if action.source is not None else None
+    place = None if action.source is None else action.source.phrase
+    if place is None or role is not PrepositionRole.SOURCE or action.target.kind is NounKind.ELSEWHERE:
         return False
-    return place.kind is NounKind.PLACE or (place.kind is NounKind.THING and _fixture(deed.target))
+    return place.kind is NounKind.PLACE or (place.kind is NounKind.THING and _fixture(action.target))
 
 
-def _outside(deed: Deed, moved: bool) -> Iterator[str]:
-    """The parts of a deed that are out of reach; `moved` says that its thing lies in a place of the house."""
-    if deed.target is not None and (
-        deed.target.universal
-        or deed.target.addressed
-        or deed.target.counts
-        or not (moved or _holdable(deed.target, deed))
+def _outside(action: ResolvedAction, moved: bool) -> Iterator[str]:
+    """The parts of an action that are out of reach; `moved` says that its thing lies in a place of the house."""
+    if action.target is not None and (
+        action.target.universal
+        or action.target.addressed
+        or action.target.counts
+        or not (moved or _holdable(action.target, action))
     ):
-        yield f"{deed.verb} {deed.target.spoken}"
-    for place in (deed.source, deed.goal):
-        yield from _outside_place(place, deed)
+        yield f"{action.verb} {action.target.spoken}"
+    for place in (action.source, action.goal):
+        yield from _outside_place(place, action)
 
 
-def _holdable(phrase: Phrase, deed: Deed) -> bool:
-    """Whether it is something to be found, and taken where the deed takes it."""
+def _holdable(phrase: Phrase, action: ResolvedAction) -> bool:
+    """Whether it is something to be found, and taken where the action takes it."""
     if phrase.known:
         return True
-    if deed.kind is VerbKind.FIND and deed.source is None and (_anybody(phrase) or _cuisine(phrase)):
+    if action.kind is VerbKind.FIND and action.source is None and (_anybody(phrase) or _cuisine(phrase)):
         return False
-    called = phrase.kind is NounKind.VEHICLE and (phrase.indefinite or deed.kind is not VerbKind.FIND)
-    if called or (deed.kind is not VerbKind.FIND and _fixture(phrase)):
+    called = phrase.kind is NounKind.VEHICLE and (phrase.indefinite or action.kind is not VerbKind.FIND)
+    if called or (action.kind is not VerbKind.FIND and _fixture(phrase)):
         return False
-    return not _light(phrase, deed) and (phrase.kind is None or phrase.kind.within_reach)
+    return not _light(phrase, action) and (phrase.kind is None or phrase.kind.within_reach)
 
 
 def _anybody(phrase: Phrase) -> bool:
@@ -130,20 +130,20 @@ def _fixture(phrase: Phrase) -> bool:
     return phrase.head.lemma in lexicon().fixtures
 
 
-def _light(phrase: Phrase, deed: Deed) -> bool:
+def _light(phrase: Phrase, action: ResolvedAction) -> bool:
     """Whether verb and noun are one act, as in "take a picture": the noun is no thing then."""
-    acts = lexicon().light_nouns.get(deed.verb.split()[0], frozenset())
-    elsewhere = deed.goal is not None and deed.goal.phrase is not None and deed.goal.phrase.kind is NounKind.PLACE
-    loose = phrase.indefinite or deed.verb in lexicon().light_whole
-    return phrase.head.lemma in acts and loose and deed.source is None and not elsewhere
+    acts = lexicon().light_nouns.get(action.verb.split()[0], frozenset())
+    elsewhere = action.goal is not None and action.goal.phrase is not None and action.goal.phrase.kind is NounKind.PLACE
+    loose = phrase.indefinite or action.verb in lexicon().light_whole
+    return phrase.head.lemma in acts and loose and action.source is None and not elsewhere
 
 
-def _outside_place(place: Location | None, deed: Deed) -> Iterator[str]:
+def _outside_place(place: Location | None, action: ResolvedAction) -> Iterator[str]:
     while place is not None:
         phrase = place.phrase
-        idle = phrase is not None and deed.kind is VerbKind.GO and _idle(phrase, place, deed.verb)
+        idle = phrase is not None and action.kind is VerbKind.GO and _idle(phrase, place, action.verb)
         if phrase is not None and (idle or phrase.universal or not _reachable(phrase, place)):
-            yield f"{deed.verb} {place.preposition} {phrase.spoken}".replace("  ", " ")
+            yield f"{action.verb} {place.preposition} {phrase.spoken}".replace("  ", " ")
         place = place.within
 
 

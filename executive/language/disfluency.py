@@ -11,7 +11,7 @@ from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 
-__all__ = ["mended"]
+__all__ = ["repair_disfluencies"]
 
 _IT: Final = frozenset({"it", "them"})
 _CONTRAST: Final = "but"
@@ -19,7 +19,7 @@ _WHERE_FROM: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.AT, Prep
 _WHERE_TO: Final = frozenset({PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE, PrepositionRole.FOR})
 
 
-def mended(items: Iterable[Item]) -> tuple[Item, ...]:
+def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
     """The items as if the speaker had said at once what they mean.
 
     A correction or negation that fits nothing becomes an unknown word.

@@ -1,59 +1,23 @@
-"""What a conversation is made of: the hands on the run, how sentences become missions, and replies."""
+"""What a conversation is made of: how sentences become missions, and replies."""
 
 from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 from executive.language.questions import ClarifyingQuestion
 from executive.language.reference import Memory
 from executive.language.understand import Understanding
 from executive.mission.command import Command
 from executive.mission.knowledge import Knowledge
-from executive.run.control import ControlState
 from executive.tree.compiler import CompiledTree
 
-__all__ = ["NEVER_MIND", "OVER", "Hands", "Reply", "ReplyKind", "Speech", "Waiting", "answer", "done", "refused"]
+__all__ = ["NEVER_MIND", "OVER", "Reply", "ReplyKind", "Speech", "Waiting", "answer", "done", "refused"]
 
 OVER: Final = "the run is over; begin another with 'errand run'"
 NEVER_MIND: Final = "all right, never mind"
-
-
-class Hands(Protocol):
-    """What a conversation does to a run; `executive.run.control.Control` is one."""
-
-    @property
-    def state(self) -> ControlState:
-        """What can be seen of the run."""
-
-    def pause(self, reason: str = ...) -> None:
-        """Hold the robot still."""
-
-    def resume(self) -> None:
-        """Go on after a pause."""
-
-    def cancel(self, reason: str = ...) -> None:
-        """End the run."""
-
-    def stop_button(self, reason: str = ...) -> None:
-        """Stop at once."""
-
-    def release_stop_button(self) -> None:
-        """Let go of the stop button."""
-
-    def preempt(self, tree: CompiledTree) -> None:
-        """Do a mission first. Raises ValueError."""
-
-    def then(self, tree: CompiledTree) -> None:
-        """Do a mission afterwards. Raises ValueError."""
-
-    def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
-        """Do a mission instead of the one of that name. Raises ValueError."""
-
-    def answer(self, question_id: str, text: str) -> None:
-        """Answer the mission's own question. Raises ValueError."""
 
 
 @dataclass(frozen=True)

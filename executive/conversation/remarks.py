@@ -1,4 +1,4 @@
-"""What remarks about the run do: they act at once, through the hands on it."""
+"""What remarks about the run do: they act at once, through its control."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from executive.conversation.parts import OVER, Hands, Reply, Speech, answer, done, refused
+from executive.conversation.parts import OVER, Reply, Speech, answer, done, refused
 from executive.conversation.status_words import doing_in_words, place_in_words
 from executive.language.grounding import known_line
 from executive.language.remarks import Remark
-from executive.run.control import Mode
+from executive.run.control import Control, Mode
 from executive.run.runner import Progress
 
 __all__ = ["RemarkAnswers"]
@@ -21,8 +21,8 @@ _TOLD_TO_STOP: Final = "told to stop"
 class RemarkAnswers:
     """Stops, holds, goes on, cancels, and tells where the robot is and what it does. `progress` is the latest."""
 
-    def __init__(self, speech: Speech, hands: Hands) -> None:
-        self._speech, self._hands = speech, hands
+    def __init__(self, speech: Speech, control: Control) -> None:
+        self._speech, self._control = speech, control
         self.progress: Progress | None = None
         self._answers: Mapping[Remark, Callable[[], Reply]] = MappingProxyType(
             {
@@ -31,7 +31,7 @@ class RemarkAnswers:
                 Remark.GO_ON: self._go_on,
                 Remark.CANCEL: self._cancel,
                 Remark.WHERE: self._where,
-                Remark.DOING: lambda: answer(doing_in_words(self.progress, hands.state, speech.robot_name)),
+                Remark.DOING: lambda: answer(doing_in_words(self.progress, control.state, speech.robot_name)),
                 Remark.ABLE: lambda: answer(known_line(speech.knowledge)),
                 Remark.THANKS: lambda: answer("you are welcome"),
             }
@@ -40,29 +40,29 @@ class RemarkAnswers:
     def to(self, remark: Remark) -> Reply:
         """Do what a remark asks for."""
         acts = remark in (Remark.STOP, Remark.WAIT, Remark.GO_ON, Remark.CANCEL)
-        if acts and self._hands.state.mode is Mode.ENDED:
+        if acts and self._control.state.mode is Mode.ENDED:
             return refused(OVER)
         return self._answers[remark]()
 
     def _stop(self) -> Reply:
-        self._hands.stop_button(_TOLD_TO_STOP)
+        self._control.stop_button(_TOLD_TO_STOP)
         return done("I stand still; say 'go on' when I may move again")
 
     def _wait(self) -> Reply:
-        self._hands.pause("told to wait")
+        self._control.pause("told to wait")
         return done("I wait; say 'go on' when I may go on")
 
     def _go_on(self) -> Reply:
-        state = self._hands.state
+        state = self._control.state
         if state.mode is Mode.STOPPED and state.reason != _TOLD_TO_STOP:
             return refused(f"{state.reason}; release it where it was pressed")
         held = state.mode in (Mode.STOPPED, Mode.PAUSED)
-        self._hands.release_stop_button()
-        self._hands.resume()
+        self._control.release_stop_button()
+        self._control.resume()
         return done("I go on" if held else "I am under way")
 
     def _cancel(self) -> Reply:
-        self._hands.cancel("told to cancel")
+        self._control.cancel("told to cancel")
         return done("I give it up and stop")
 
     def _where(self) -> Reply:

@@ -14,7 +14,6 @@ from typing import Final
 from executive.conversation.parts import (
     NEVER_MIND,
     OVER,
-    Hands,
     Reply,
     ReplyKind,
     Speech,
@@ -32,7 +31,7 @@ from executive.language.understand import Status, Understanding
 from executive.language.wake import heard_wake, strip_wake
 from executive.mission.command import Command, Task, Thing
 from executive.mission.errors import InputError
-from executive.run.control import Mode
+from executive.run.control import Control, Mode
 from executive.run.runner import Progress
 from executive.tree.compiler import CompiledTree
 
@@ -75,8 +74,10 @@ class Conversation:
     With `require_wake` only what is said to the robot by its name counts, and answers to its questions.
     """
 
-    def __init__(self, speech: Speech, hands: Hands, *, require_wake: bool = False, others: Sequence[str] = ()) -> None:
-        self._speech, self._hands = speech, hands
+    def __init__(
+        self, speech: Speech, control: Control, *, require_wake: bool = False, others: Sequence[str] = ()
+    ) -> None:
+        self._speech, self._control = speech, control
         self._require_wake, self._others = require_wake, tuple(others)
         self._lock = threading.Lock()
         self._progress: Progress | None = None
@@ -84,7 +85,7 @@ class Conversation:
         self._open: _Open | None = None
         self._names: frozenset[str] = frozenset()
         self._seen: frozenset[str] = frozenset()  # missions that have begun
-        self._remarks = RemarkAnswers(speech, hands)
+        self._remarks = RemarkAnswers(speech, control)
         self._listeners: tuple[Callable[[Waiting | None], None], ...] = ()
 
     def listen(self, listener: Callable[[Waiting | None], None]) -> None:
@@ -156,11 +157,11 @@ class Conversation:
     def _answer_mission(self, text: str, now_s: float) -> Reply | None:
         """An answer to a question that the mission asks."""
         said = text.strip(" .,!?").lower()
-        for each in self._hands.state.questions:
+        for each in self._control.state.questions:
             option = next((o for n, o in enumerate(each.options, 1) if said in (o.lower(), str(n))), None)
             chosen = option or (text if not each.options else None)
             if chosen is not None:
-                return self._tried(partial(self._hands.answer, each.id, chosen), f"{chosen}, then")
+                return self._tried(partial(self._control.answer, each.id, chosen), f"{chosen}, then")
         return None
 
     def _answer_own(self, text: str, now_s: float) -> Reply | None:
@@ -287,7 +288,7 @@ class Conversation:
         memory: Memory | None = None,
     ) -> Reply:
         """Have commands done, and remember them."""
-        state = self._hands.state
+        state = self._control.state
         if state.mode is Mode.ENDED:
             return refused(OVER)
         todo = tuple(commands)
@@ -297,7 +298,7 @@ class Conversation:
             tree = self._speech.compile(todo, self._names)
         except InputError as error:
             return refused(str(error))
-        give = {_When.FIRST: self._hands.preempt, _When.AFTERWARDS: self._hands.then}.get(when, self._replace)
+        give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, self._replace)
         still = "; I stand still until you say 'go on'" if state.mode in (Mode.PAUSED, Mode.STOPPED) else ""
         text = "; ".join((*notes, f"{when.value}: {'; '.join(map(str, todo))}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
@@ -307,7 +308,7 @@ class Conversation:
         return reply
 
     def _replace(self, tree: CompiledTree) -> None:
-        self._hands.replace(tree, None if self._last is None else self._last.mission)
+        self._control.replace(tree, None if self._last is None else self._last.mission)
 
     def _tried(self, act: Callable[[], None], text: str, commands: tuple[Command, ...] = ()) -> Reply:
         try:
@@ -318,7 +319,7 @@ class Conversation:
 
     def _can_be_changed(self, now_s: float) -> bool:
         """Whether the last request is not done yet: it is under way, waits, or is about to begin."""
-        last, missions = self._remembered(now_s), self._hands.state.missions.get(self._speech.robot_name, ())
+        last, missions = self._remembered(now_s), self._control.state.missions.get(self._speech.robot_name, ())
         return last is not None and (last.mission in missions or last.mission not in self._seen)
 
     def _same_thing(self, commands: Sequence[Command]) -> bool:
@@ -328,7 +329,7 @@ class Conversation:
     def _held(self) -> Thing | None:
         """The thing in the gripper, as far as the last request tells."""
         status = None if self._progress is None else self._progress.robots.get(self._speech.robot_name)
-        missions = self._hands.state.missions.get(self._speech.robot_name, ())
+        missions = self._control.state.missions.get(self._speech.robot_name, ())
         if status is None or not status.holding or self._last is None or self._last.mission not in missions[-1:]:
             return None
         return next((command.object for command in self._last.commands if command.task is Task.GRASP), None)

@@ -9,8 +9,8 @@ from typing import Final
 
 from executive.language.lexicon import VerbKind, lexicon
 from executive.language.phrases import Phrase
+from executive.language.questions import RefusalError
 from executive.language.reference import ResolvedAction
-from executive.language.refusal import RefusalError
 from executive.language.roles import HERE, Location
 from executive.mission.command import Command, Task, Thing
 

@@ -9,8 +9,8 @@ from executive.language.grounding import known_line
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
+from executive.language.questions import RefusalError
 from executive.language.reference import ResolvedAction
-from executive.language.refusal import RefusalError
 from executive.language.roles import HERE, Location
 from executive.mission.knowledge import Knowledge
 

@@ -6,10 +6,9 @@ import re
 import unicodedata
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
 from typing import Final
 
-import yaml
+from executive.language.lexicon import read_table
 
 __all__ = ["foreign_reason"]
 
@@ -33,6 +32,4 @@ def foreign_reason(text: str) -> str | None:
 
 @cache
 def _small_words() -> Mapping[str, frozenset[str]]:
-    text = resources.files(__package__).joinpath("foreign.yaml").read_text(encoding="utf-8")
-    data: dict[str, list[str]] = yaml.load(text, Loader=yaml.BaseLoader)
-    return {language: frozenset(words) for language, words in data.items()}
+    return {language: frozenset(words) for language, words in read_table("foreign.yaml").items()}

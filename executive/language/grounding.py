@@ -13,8 +13,7 @@ from typing import Final
 from executive.language.command_frames import CommandFrame
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
-from executive.language.questions import ClarifyingQuestion, Slot, perhaps, which
-from executive.language.refusal import RefusalError
+from executive.language.questions import ClarifyingQuestion, RefusalError, Slot, perhaps, which
 from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.mission.command import Command, Task, Thing

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import yaml
 
-__all__ = ["Lexicon", "PrepositionRole", "VerbKind", "lexicon"]
+__all__ = ["Lexicon", "PrepositionRole", "VerbKind", "lexicon", "read_table"]
 
 Phrase = tuple[str, ...]
 
@@ -95,7 +95,7 @@ class Lexicon:
 @cache
 def lexicon() -> Lexicon:
     """The dictionaries that come with the package."""
-    verbs, words = _read("verbs.yaml"), _read("words.yaml")
+    verbs, words = read_table("verbs.yaml"), read_table("words.yaml")
     read = {**verbs, **words}
     plain: dict[str, Any] = {
         each.name: _KINDS[each.type](read[each.name]) for each in fields(Lexicon) if each.type in _KINDS
@@ -114,8 +114,6 @@ def lexicon() -> Lexicon:
     )
 
 
-# Plain words: "on" is no truth value.
-_Loader: Final = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _SOFTNESS: Final = {False: "certain", True: "soft"}
 
 
@@ -123,9 +121,11 @@ def _phrases(texts: Iterable[str]) -> frozenset[Phrase]:
     return frozenset(tuple(text.split()) for text in texts)
 
 
-def _read(name: str) -> dict[str, Any]:
+@cache
+def read_table(name: str) -> dict[str, Any]:
+    """A table of this package: all that is no list or mapping is text, "on" and "no" among it."""
     text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-    data: dict[str, Any] = yaml.load(text, Loader=_Loader)
+    data: dict[str, Any] = yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
     return data
 
 

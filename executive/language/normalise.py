@@ -6,9 +6,7 @@ import re
 import unicodedata
 from typing import Final
 
-from executive.language.rephrasing import rephrased
-
-__all__ = ["MAX_CHARACTERS", "MAX_WORDS", "clean", "open_commands"]
+__all__ = ["MAX_CHARACTERS", "MAX_WORDS", "clean"]
 
 MAX_WORDS: Final = 60
 MAX_CHARACTERS: Final = 800
@@ -25,12 +23,3 @@ def clean(text: str) -> str:
     printable = "".join(" " if unicodedata.category(c).startswith(("C", "S", "Z")) else c for c in plain)
     spaced = " ".join(_ALLOWED.sub(" ", printable).split())
     return _APART.sub(r"\1", spaced)
-
-
-def open_commands(text: str) -> str:
-    """Turn polite forms into plain commands: "could you please get it" becomes "get it".
-
-    Hesitations and words said twice are left out. Where a polite form stands inside the sentence, a comma takes its
-    place. "I would like something to drink" becomes "bring me a drink".
-    """
-    return rephrased(text)

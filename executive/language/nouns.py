@@ -12,20 +12,18 @@ import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-import yaml
+
+from executive.language.lexicon import read_table
 
 __all__ = ["FloatArray", "NounKind", "NounKinds", "noun_examples"]
 
 FloatArray = npt.NDArray[np.float64]
 VectorOf = Callable[[str], FloatArray | None]
 
-# Plain words, "on" and "no" among them; much faster where yaml comes with its library in C.
-_Loader: Final = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _SHRINKAGE: Final = 0.2
 _MODIFIER_WEIGHT: Final = 0.3
 _MARGIN: Final = 2.0
@@ -50,9 +48,8 @@ class NounKind(enum.Enum):
 @cache
 def noun_examples() -> Mapping[str, NounKind]:
     """The examples that come with the package: each noun, or pair of nouns, and its kind."""
-    text = resources.files(__package__).joinpath("nouns.yaml").read_text(encoding="utf-8")
-    data: dict[str, dict[str, list[Any]]] = yaml.load(text, Loader=_Loader)
-    kinds = [(NounKind(kind), noun) for kind, fields in data.items() for nouns in fields.values() for noun in nouns]
+    table = read_table("nouns.yaml").items()
+    kinds = [(NounKind(kind), noun) for kind, fields in table for nouns in fields.values() for noun in nouns]
     return {noun: kind for kind, noun in reversed(kinds)}
 
 

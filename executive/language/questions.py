@@ -1,4 +1,4 @@
-"""One question back to the speaker, and what a sentence becomes by the answer.
+"""One question back to the speaker, what a sentence becomes by the answer, and refusals.
 
 The answer is put into the sentence, which is then understood anew: so it goes through the same steps as all else.
 """
@@ -6,7 +6,7 @@ The answer is put into the sentence, which is then understood anew: so it goes t
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final
@@ -16,9 +16,19 @@ from rapidfuzz.distance import OSA
 from executive.language.sounds import nearest_by_sound
 from executive.mission.errors import listing
 
-__all__ = ["Answerer", "ClarifyingQuestion", "QuestionPolicy", "Slot", "answer_by", "chosen", "with_answer"]
+__all__ = [
+    "Answerer",
+    "ClarifyingQuestion",
+    "QuestionPolicy",
+    "RefusalError",
+    "Slot",
+    "answer_by",
+    "chosen",
+    "with_answer",
+]
 
 ALIKE_SOUND: Final = 0.2
+_LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")
 
 
 class Slot(Enum):
@@ -174,3 +184,18 @@ _PRONOUNS: Final = frozenset("it them they one ones that this those these some h
 _PLACE_WORDS: Final = frozenset({"there"})
 _YES: Final = frozenset({"yes", "yeah", "yep", "sure", "ok", "okay", "right", "correct", "exactly", "y"})
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")
+
+
+class RefusalError(Exception):
+    """The sentence cannot become commands: the reason in one line, and the words that were not understood.
+
+    `question` says that an answer from the speaker would help, or is the question itself.
+    """
+
+    def __init__(
+        self, reason: str, unknown: Iterable[str] = (), *, question: bool | ClarifyingQuestion = False
+    ) -> None:
+        self.reason = _LONG_WORD.sub(r"\1…", reason)
+        super().__init__(self.reason)
+        self.unknown = tuple(dict.fromkeys(_LONG_WORD.sub(r"\1…", word) for word in unknown))
+        self.question = left_open(self.reason, next(iter(self.unknown), None)) if question is True else question or None

@@ -10,7 +10,7 @@ from executive.language.actions import Action
 from executive.language.lexicon import VerbKind
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
-from executive.language.refusal import RefusalError
+from executive.language.questions import RefusalError
 from executive.language.roles import THERE, Location
 
 __all__ = ["Memory", "Resolved", "ResolvedAction", "resolve"]

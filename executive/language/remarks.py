@@ -6,10 +6,9 @@ import enum
 import re
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
 from typing import Final
 
-import yaml
+from executive.language.lexicon import read_table
 
 __all__ = ["Remark", "remark_of"]
 
@@ -40,9 +39,8 @@ def _plain(text: str) -> str:
 
 @cache
 def _remarks() -> Mapping[str, Remark]:
-    text = resources.files(__package__).joinpath("remarks.yaml").read_text(encoding="utf-8")
-    data: dict[str, list[str]] = yaml.load(text, Loader=yaml.BaseLoader)
-    return {" ".join(phrase.split()): Remark(name) for name, phrases in data.items() for phrase in phrases}
+    remarks = read_table("remarks.yaml").items()
+    return {" ".join(phrase.split()): Remark(name) for name, phrases in remarks for phrase in phrases}
 
 
 _MOST_LETTERS: Final = 200

@@ -19,7 +19,11 @@ _AT: Final = r"(?=in|on|at|under|next|by|near)"
 
 
 def rephrased(text: str) -> str:
-    """The sentence as a plain command, in single blanks, without what only goes around it."""
+    """The sentence as a plain command, in single blanks: "could you please get it" becomes "get it".
+
+    Hesitations and words said twice are left out. Where a polite form stands inside the sentence, a comma takes its
+    place. "I would like something to drink" becomes "bring me a drink".
+    """
     for pattern, instead in _rules():
         text = pattern.sub(instead, text)
     return " ".join(text.split()).strip(" ,;:-.")

@@ -10,12 +10,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from importlib import resources
 from typing import Final, Protocol, runtime_checkable
 
-import yaml
 from rapidfuzz.distance import OSA
 
+from executive.language.lexicon import read_table
 from executive.language.sounds import sound_distance
 from executive.mission.knowledge import Knowledge
 
@@ -199,9 +198,7 @@ def _with_ring(word: str) -> Iterator[str]:
 
 @cache
 def _synonyms() -> tuple[tuple[tuple[str, ...], ...], Mapping[str, tuple[str, ...]]]:
-    data = yaml.load(
-        resources.files(__package__).joinpath("synonyms.yaml").read_text(encoding="utf-8"), Loader=yaml.BaseLoader
-    )
+    data = read_table("synonyms.yaml")
     return tuple(map(tuple, data["same"])), {kind: tuple(members) for kind, members in data["kinds"].items()}
 
 

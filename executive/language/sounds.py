@@ -16,11 +16,10 @@ import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-import yaml
+from executive.language.lexicon import read_table
 
 __all__ = ["SoundMatch", "change_cost", "drop_cost", "nearest_by_sound", "sound_distance", "sounds_of"]
 
@@ -83,8 +82,7 @@ class _Rule:
 @cache
 def _rules() -> Mapping[str, Sequence[_Rule]]:
     """The rules by their first letter."""
-    table = yaml.safe_load(Path(__file__).with_name("letter_sounds.yaml").read_text(encoding="utf-8"))
-    return {letter: tuple(_rule(*row) for row in rows) for letter, rows in table.items()}
+    return {letter: tuple(_rule(*row) for row in rows) for letter, rows in read_table("letter_sounds.yaml").items()}
 
 
 def _rule(left: str, letters: str, right: str, sounds: str) -> _Rule:

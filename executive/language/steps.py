@@ -15,14 +15,14 @@ from executive.language.grounding import ground_noted, known_line
 from executive.language.items import Item
 from executive.language.lexicon import lexicon
 from executive.language.names import name_table, parse_with_names
-from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS, open_commands
+from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser, Token
 from executive.language.phrases import Phrase, noun_phrases
-from executive.language.questions import Slot, which
+from executive.language.questions import RefusalError, Slot, which
 from executive.language.reading import split_items
 from executive.language.reference import Memory, ResolvedAction, resolve
-from executive.language.refusal import RefusalError
+from executive.language.rephrasing import rephrased
 from executive.language.similar import WordFacts
 from executive.mission.command import Command, is_attribute
 from executive.mission.errors import listing
@@ -83,7 +83,7 @@ def _open(trace: Trace, _: _Context) -> Trace:
         raise RefusalError(f"{len(words)} words are too many for one sentence; say it in {MAX_WORDS} at most")
     if len(trace.text) > MAX_CHARACTERS:
         raise RefusalError(f"{len(trace.text)} characters are too many for one sentence; {MAX_CHARACTERS} at most")
-    return replace(trace, opened=open_commands(trace.text))
+    return replace(trace, opened=rephrased(trace.text))
 
 
 def _parse(trace: Trace, context: _Context) -> Trace:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 from executive.language.foreign import foreign_reason
 from executive.language.normalise import clean
 from executive.language.parser import DependencyParser
-from executive.language.questions import ClarifyingQuestion
+from executive.language.questions import Answerer, ClarifyingQuestion, with_answer
 from executive.language.reference import Memory
 from executive.language.similar import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
@@ -18,7 +18,7 @@ from executive.language.wake import strip_wake
 from executive.mission.command import Command
 from executive.mission.knowledge import Knowledge
 
-__all__ = ["Status", "Understanding", "parse_lines", "understand"]
+__all__ = ["Status", "Understanding", "parse_lines", "understand", "understand_asking"]
 
 
 class Status(enum.Enum):
@@ -109,3 +109,37 @@ def parse_lines(
     """Understand each line for itself, in order; an empty line is refused, not skipped."""
     for line in lines:
         yield understand(line.rstrip("\r\n"), parser=parser, knowledge=knowledge, require_wake=require_wake)
+
+
+def understand_asking(
+    sentence: str,
+    *,
+    answer: Answerer,
+    parser: DependencyParser,
+    knowledge: Knowledge,
+    require_wake: bool,
+    robot_name: str | None = None,
+    correct: bool = True,
+) -> Understanding:
+    """What a sentence means once its questions are answered; `text` is the sentence with the answers in their places.
+
+    The arguments are those of `understand`. A question that is left open, or whose answer is not understood, is what
+    comes back.
+    """
+
+    def meaning(text: str) -> Understanding:
+        return understand(
+            text, parser=parser, knowledge=knowledge, require_wake=require_wake, robot_name=robot_name, correct=correct
+        )
+
+    meant = meaning(sentence)
+    for _ in range(_MOST_QUESTIONS):
+        said = None if meant.question is None else answer(meant.question)
+        if meant.question is None or said is None:
+            break
+        sentence = with_answer(sentence, meant.question, said)
+        meant = meaning(sentence)
+    return meant
+
+
+_MOST_QUESTIONS: Final = 3

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from executive.language import DependencyParser, Status, Understanding
-from executive.language.asking import understand_asking
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
+from executive.language.understand import understand_asking
 from executive.mission.command import Command
 from executive.mission.errors import InputError
 from executive.mission.file.model import Mission, MissionStep

@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import Final
 
 from executive.language import DependencyParser, Status, Understanding
-from executive.language.asking import understand_asking
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
+from executive.language.understand import understand_asking
 from executive.mission.command import Command
 from executive.mission.errors import InputError, Problems
 from executive.mission.file.model import Mission, MissionStep, SkillCall

@@ -4,8 +4,7 @@ import pytest
 
 from executive.language import explain, understand
 from executive.language.explain import tree_lines
-from executive.language.explain_svg import arcs_svg
-from executive.language.explain_text import explanation_lines
+from executive.language.explain_views import arcs_svg, explanation_lines
 
 SVG = "{http://www.w3.org/2000/svg}"
 SENTENCE = "could you give Robin the hammer from the workshop, and bring two cokes here"
@@ -78,7 +77,17 @@ def test_a_name_that_the_world_lacks_is_refused_at_grounding(parser, knowledge):
 def test_the_text_has_all_steps_and_the_tree(explained):
     lines = list(explanation_lines(explained))
     headings = [line for line in lines if not line.startswith(" ")]
-    wanted = "heard, in plain words, words, dependencies, subject, parts, actions, command frames, commands".split(", ")
+    wanted = [
+        "heard",
+        "in plain words",
+        "words",
+        "dependencies",
+        "subject",
+        "parts",
+        "actions",
+        "command frames",
+        "commands",
+    ]
     assert headings == [f"{name}:" for name in wanted]
     assert "  ├─ obj: hammer (NOUN)" in lines
 

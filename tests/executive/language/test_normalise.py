@@ -1,6 +1,7 @@
 import pytest
 
-from executive.language.normalise import clean, open_commands
+from executive.language.normalise import clean
+from executive.language.rephrasing import rephrased
 
 
 @pytest.mark.parametrize(
@@ -33,4 +34,4 @@ def test_text_becomes_plain(text, cleaned):
     ],
 )
 def test_polite_forms_become_plain_commands(text, command):
-    assert " ".join(open_commands(text).split()) == command
+    assert rephrased(text) == command

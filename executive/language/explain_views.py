@@ -1,4 +1,4 @@
-"""The steps of a sentence as text."""
+"""The steps of a sentence as text, and its dependency arcs as a drawing."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from executive.language.explain import ActionRow, Explanation, TokenRow, tree_lines
 
-__all__ = ["explanation_lines"]
+__all__ = ["arcs_svg", "explanation_lines"]
 
 
 def explanation_lines(explained: Explanation) -> Iterator[str]:
@@ -56,3 +56,18 @@ def _action_lines(action: ActionRow) -> Iterator[str]:
         "not understood": ", ".join(action.not_understood),
     }
     yield from (f"  {name}: {value}" for name, value in found.items() if value)
+
+
+def arcs_svg(tokens: Sequence[TokenRow]) -> str:
+    """An SVG document with the words, their parts of speech, and the arcs, as displaCy of spaCy draws them."""
+    from spacy.displacy.render import DependencyRenderer
+
+    places = {token.index: place for place, token in enumerate(tokens)}
+    arcs = []
+    for token in tokens:
+        if token.head in places:
+            start, end = sorted((places[token.index], places[token.head]))
+            side = "left" if places[token.index] == start else "right"
+            arcs.append({"start": start, "end": end, "label": token.relation, "dir": side})
+    words = [{"text": token.text, "tag": token.pos, "lemma": None} for token in tokens]
+    return DependencyRenderer({"distance": 110}).render_svg("arcs", words, arcs).strip() + "\n"

@@ -90,6 +90,11 @@ class Lexicon:
     gives: frozenset[str]
     hands: frozenset[str]
     calls: frozenset[str]
+    titles: frozenset[str]
+    units: frozenset[str]
+    vague_numbers: frozenset[str]
+    definite: frozenset[str]
+    numbers: Mapping[str, int]
 
 
 @cache
@@ -109,6 +114,7 @@ def lexicon() -> Lexicon:
             for phrase in phrases
         },
         short_forms=words["short_forms"],
+        numbers={word: int(number) for word, number in words["numbers"].items()},
         corrections={tuple(p.split()): soft for soft in (False, True) for p in words["corrections"][_SOFTNESS[soft]]},
         light_nouns={verb: frozenset(nouns) for verb, nouns in words["light_nouns"].items()},
     )

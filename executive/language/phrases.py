@@ -17,10 +17,6 @@ _LEFT: Final = frozenset(
     {"det", "amod", "compound", "nummod", "poss", "nmod", "predet", "quantmod", "advmod", "case", "npadvmod", "punct"}
 )
 _NOMINAL: Final = frozenset({"NOUN", "PROPN", "PRON", "NUM", "X"})
-_NUMBERS: Final[Mapping[str, int]] = {
-    word: number
-    for number, word in enumerate("zero one two three four five six seven eight nine ten eleven twelve".split())  # noqa: SIM905
-} | {"couple": 2, "dozen": 12}
 _DEEPEST: Final = 6
 # They stand before a noun, too, but say nothing of it.
 _LOOSE: Final = frozenset({"then", "now", "just", "also", "please", "maybe", "again", "not", "n't", "instead"})
@@ -128,7 +124,7 @@ class Phrase:
             return self.head.entity == "PERSON"
         proper = all(t.pos == "PROPN" for t in self.tokens)
         somebody = proper or self.head.kind is NounKind.PERSON
-        titled = somebody and len(self.tokens) > 1 and self.tokens[0].word.rstrip(".") in _TITLES
+        titled = somebody and len(self.tokens) > 1 and self.tokens[0].word.rstrip(".") in lexicon().titles
         return titled or (self.head.kind is NounKind.PERSON and (proper or len(self.tokens) == 1))
 
     @property
@@ -163,7 +159,7 @@ class Phrase:
     @property
     def indefinite(self) -> bool:
         """Whether it means any one of its kind: no article but "a", no possessive."""
-        return not any(t.word in _DEFINITE or t.tag in ("PRP$", "POS") for t in self.tokens)
+        return not any(t.word in lexicon().definite or t.tag in ("PRP$", "POS") for t in self.tokens)
 
     @property
     def nominal(self) -> bool:
@@ -236,39 +232,17 @@ class Phrase:
 
     def _measures(self, at: int) -> bool:
         """Whether the number there belongs to a unit of measure."""
-        return at + 2 < len(self.tokens) and _number(self.tokens[at]) is not None and self.tokens[at + 1].word in _UNITS
+        return (
+            at + 2 < len(self.tokens)
+            and _number(self.tokens[at]) is not None
+            and self.tokens[at + 1].word in lexicon().units
+        )
 
 
 _ENDS: Final = frozenset({"end", "start", "beginning", "middle"})
 _POINTING: Final = frozenset({"that", "this", "these", "those"})
 _ALL: Final = "all"
-_UNITS: Final = frozenset(
-    """millimetre millimeter centimetre centimeter metre meter inch foot mm cm litre liter ounce pound gram kilo
-    kilogram volt watt amp gallon pint""".split()  # noqa: SIM905
-)
-_VAGUE_NUMBERS: Final = frozenset({"few", "several", "many", "some", "any", "more", "enough", "another"})
-_TITLES: Final = frozenset(
-    {
-        "mr",
-        "mrs",
-        "ms",
-        "miss",
-        "dr",
-        "doctor",
-        "professor",
-        "nurse",
-        "sister",
-        "officer",
-        "sir",
-        "madam",
-        "uncle",
-        "aunt",
-    }
-)
 _ONE: Final = frozenset({"one", "ones"})
-_DEFINITE: Final = frozenset(
-    {"the", "this", "that", "these", "those", "my", "your", "his", "her", "its", "our", "their"}
-)
 
 
 def _joined_text(words: Sequence[Token | str]) -> str:
@@ -281,7 +255,7 @@ def _joined_text(words: Sequence[Token | str]) -> str:
 
 
 def _is_determiner(token: Token) -> bool:
-    said_number = _number(token) is not None or token.word in _VAGUE_NUMBERS
+    said_number = _number(token) is not None or token.word in lexicon().vague_numbers
     said_number = said_number or token.word in _POINTING
     return said_number or token.pos == "DET" or token.tag in ("PRP$", "DT", "PDT", "POS", "WP$") or token.text == "-"
 
@@ -289,7 +263,7 @@ def _is_determiner(token: Token) -> bool:
 def _number(token: Token) -> int | None:
     if token.word.isdecimal() and len(token.word) < 4:
         return int(token.word)
-    return _NUMBERS.get(token.word)
+    return lexicon().numbers.get(token.word)
 
 
 def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:

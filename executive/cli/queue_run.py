@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from rich.console import Console
 
-from executive.cli.durable import as_it_was, kept, new_run, next_run, plant_file, same_world
-from executive.cli.requests import prepare
+from executive.cli.durable import Durable, as_it_was, kept, new_run, next_run, plant_file, same_world
+from executive.cli.requests import Prepared, prepare
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.simulated import run_simulated
 from executive.mission.errors import InputError
@@ -50,11 +50,25 @@ def start_of(missions: MissionStore, mission: StoredMission, console: Console, *
     before = _before(missions, mission) if mission.queued else None
     durable = new_run(missions, mission) if before is None else next_run(missions, mission, before)
     console.print(f"Mission {mission.id}: {asked.name}", markup=False, style="bold")
+    result = run_kept(missions, mission, prepared, durable, console, quiet=quiet)
+    show_files(out, console)
+    return result
+
+
+def run_kept(
+    missions: MissionStore,
+    mission: StoredMission,
+    prepared: Prepared,
+    durable: Durable,
+    console: Console,
+    *,
+    quiet: bool,
+) -> dict[str, Any]:
+    """Run a mission of the store, shown on the console, and note there how it ended; its report."""
     with kept(missions, mission) as ended:
         start = partial(run_simulated, prepared, durable=durable)
         finished = show_run(start, prepared, console, control=control_for(console, quiet=quiet), quiet=quiet)
         ended(finished.report)
-    show_files(out, console)
     return {**finished.report.to_json(), "mission": mission.id, "achieved": finished.report.achieved}
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
 from rich.console import Console
 
-from executive.cli.durable import STORE, kept, take_up
+from executive.cli.durable import STORE, take_up
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
-from executive.cli.queue_run import run_queue, start_of
-from executive.cli.shown import control_for, show_files, show_past, show_run
-from executive.cli.simulated import run_simulated
+from executive.cli.queue_run import run_kept, run_queue, start_of
+from executive.cli.shown import show_files
 from executive.mission.errors import InputError, listing
 from executive.store.missions import MissionState, MissionStore, StoredMission
 
@@ -67,13 +65,8 @@ def _go_on(missions: MissionStore, mission: StoredMission, console: Console, *, 
         return start_of(missions, mission, console, quiet=quiet)
     taken = take_up(missions, mission)
     console.print(f"Mission {mission.id} ({name}) goes on.", markup=False)
-    with kept(missions, mission) as ended:
-        start = partial(run_simulated, taken.prepared, durable=taken.durable)
-        finished = show_run(start, taken.prepared, console, control=control_for(console, quiet=quiet), quiet=quiet)
-        ended(finished.report)
-    console.print("What became of its past:")
-    show_past(taken.recollection.told, console)
-    show_files(mission.request.out, console)
-    report = finished.report
+    result = run_kept(missions, mission, taken.prepared, taken.durable, console, quiet=quiet)
     told = list(taken.recollection.told)
-    return {**report.to_json(), "mission": mission.id, "achieved": report.achieved, "resumed": told}
+    console.print("\n  ".join(["What became of its past:", *told]), markup=False)
+    show_files(mission.request.out, console)
+    return {**result, "resumed": told}

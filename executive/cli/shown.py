@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -64,9 +63,3 @@ def show_run(
 def show_files(out: Path, console: Console) -> None:
     """Name what was left in a folder."""
     console.print(f"Written to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}", markup=False)
-
-
-def show_past(told: Sequence[str], console: Console) -> None:
-    """Say what a resumed mission did with its past."""
-    for sentence in told:
-        console.print(f"  {sentence}", markup=False)

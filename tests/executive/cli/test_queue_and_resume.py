@@ -8,7 +8,7 @@ import pytest
 from py_trees.common import Status
 from typer.testing import CliRunner
 
-from executive.cli import entry, main, queue_run, requests, resume_command
+from executive.cli import entry, main, queue_run, requests
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
 from executive.mission.command import Command
@@ -57,7 +57,7 @@ def report(outcome):
 @pytest.fixture
 def plant(monkeypatch):
     stand_in = Plant()
-    for module in (main, queue_run, resume_command):
+    for module in (main, queue_run):
         monkeypatch.setattr(module, "run_simulated", stand_in)
     monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
     return stand_in

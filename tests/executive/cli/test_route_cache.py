@@ -41,7 +41,7 @@ def test_each_route_is_planned_once_in_all_processes(tmp_path, broken):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_where_nothing_can_be_kept_ways_are_planned_all_the_same(tmp_path):
+def test_where_nothing_can_be_kept_routes_are_planned_all_the_same(tmp_path):
     tmp_path.chmod(0o500)
     assert RouteCache(tmp_path / "routes" / "a.json", Planner()).route(HERE, THERE) == Route(5.0, 5.25)
 

@@ -152,7 +152,7 @@ def _read(work: _Work, k: int) -> Picture:
     size = picture.shape[1], picture.shape[0]
     if expected is not None and expected != size:
         what = f"it has {size[0]} x {size[1]} pixels, and its labels are for {expected[0]} x {expected[1]}"
-        raise InputError(what, mend="label it as it is, or put back the picture that was labelled", file=work.files[k])
+        raise InputError(what, hint="label it as it is, or put back the picture that was labelled", file=work.files[k])
     return picture
 
 

@@ -23,7 +23,7 @@ _MOST_CORNERS: Final = 24
 
 
 class TrainingDataError(ValueError):
-    """The folder of a data set cannot be trained on; the text says where and why, `mend` what to do."""
+    """The folder of a data set cannot be trained on; the text says where and why, `hint` what to do."""
 
     def __init__(self, message: str, *, hint: str) -> None:
         self.message, self.hint = message, hint

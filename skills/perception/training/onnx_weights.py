@@ -36,7 +36,7 @@ def take_over(network: DetectorNetwork, file: Path) -> None:
     try:
         source = load_model(file, networks=1).proposal
     except ModelFileError as error:
-        raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
+        raise TrainingDataError(f"{file}: {error.message}", hint=_HINT) from error
     _take(network, file, source, [head.scores.bias for head in network.heads])
     _take_shares(network.backbone)
 
@@ -57,7 +57,7 @@ def _take_crop_network(network: CropNetwork, file: Path, load: Callable[[Path], 
     try:
         source = load(file)
     except ModelFileError as error:
-        raise TrainingDataError(f"{file}: {error.message}", mend=_MEND) from error
+        raise TrainingDataError(f"{file}: {error.message}", hint=_HINT) from error
     _take(network, file, source, [network.scores.bias])
 
 

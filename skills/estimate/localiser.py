@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
@@ -74,6 +75,7 @@ class ScanMatchingLocaliser:
         self._stamp_s = -math.inf
         self._poor_scans = 0
         self._localised = False
+        self._transformed: tuple[Pose2D, RigidTransform] | None = None
 
     @property
     def grid(self) -> GridMap:
@@ -82,7 +84,9 @@ class ScanMatchingLocaliser:
 
     def estimate(self) -> LocalisationEstimate:
         """The latest estimate; its stamp is that of the scan that it rests on (minus infinity before the first)."""
-        return LocalisationEstimate(self._stamp_s, self._X_WO.transform(), self._covariance.copy(), self._localised)
+        if self._transformed is None or self._transformed[0] is not self._X_WO:
+            self._transformed = self._X_WO, self._X_WO.transform()
+        return LocalisationEstimate(self._stamp_s, self._transformed[1], self._covariance.copy(), self._localised)
 
     def update(self, robot: Robot) -> None:
         """Take in the newest scan, if it is new."""

@@ -32,8 +32,8 @@ _SAME_YAW_RAD: Final = 0.05
 class PeopleOptions:
     """How often the watch looks (s), how late the answer comes (s), and what counts as a person.
 
-    A camera looks every `period_s` while it may show somebody: somebody is known, or the costmap has something within
-    `near_m` that the map does not explain, no farther than `view_rad` off its axis. All look every `idle_s` otherwise.
+    A camera looks every `period_s` while it may show somebody: a known person, or something in the costmap that the map
+    does not explain, within `near_m` and no farther than `view_rad` off its axis. All look every `idle_s` anyway.
     A person counts once seen twice within `same_m`, at least `least_score` sure; a second look follows the first after
     `again_s`. Who should be in a picture and is not for `misses` times has gone. Who is out of all pictures is
     remembered for `memory_s`, and for `beside_s` as long as the costmap knows something within `beside_m` of the place.
@@ -115,20 +115,21 @@ class PeopleWatch:
     def _due(self, cameras: Sequence[CameraCapabilities], now_s: float) -> tuple[Sequence[CameraCapabilities], bool]:
         """The cameras whose next picture is due, and whether depth is wanted with it."""
         options, since_s = self._options, now_s - self._looked_s
-        if self._soon or self._seen:
-            period_s = (0.0 if self._suspected else options.again_s) if self._soon else options.period_s
-            return (cameras if since_s >= period_s else ()), True
+        if self._suspected:
+            return cameras, True
         if now_s >= self._all_looked_s + options.idle_s:
             self._all_looked_s = now_s
             return cameras, bool(self._showing_something(cameras))
-        return (self._showing_something(cameras) if since_s >= options.period_s else ()), True
+        period_s = options.again_s if self._soon else options.period_s
+        return (self._showing_something(cameras) if since_s >= period_s else ()), True
 
     def _showing_something(self, cameras: Sequence[CameraCapabilities]) -> Sequence[CameraCapabilities]:
-        """Those that have something in view that the map does not explain; all where the costmap cannot tell."""
+        """Those with a known person or something unexplained in view; all where the costmap cannot tell."""
         costmap, here = self._context.costmap, self._context.pose()
         if not isinstance(costmap, LayeredView):
             return cameras
-        off_W = costmap.seen_m() - (here.x_m, here.y_m)
+        places_W = np.vstack([costmap.seen_m(), np.array([one.place_W for one in self._seen]).reshape(-1, 2)])
+        off_W = places_W - (here.x_m, here.y_m)
         near_W = off_W[np.linalg.norm(off_W, axis=1) < self._options.near_m]
         bearings_rad = np.arctan2(near_W[:, 1], near_W[:, 0]) - here.yaw_rad
         return [each for each in cameras if _shown(bearings_rad - each.heading_rad, self._options.view_rad)]

@@ -28,7 +28,7 @@ from plant.scene import Scene
 from plant.scenery import add_model, add_scenery
 from plant.spot.model import SpotModel
 
-TIME_STEP_S = 0.01
+TIME_STEP_S = 0.0125
 PACKAGE = "errand"
 FLOOR_TOP_M = 0.01
 

@@ -29,10 +29,10 @@ from plant.worlds.placement import Placement, place_objects, place_people
 from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 
-CONTROL_PERIOD_S = 0.01
+CONTROL_PERIOD_S = 0.0125
 CONTROL_PERIOD_STEPS = 2
-SLEEP_PERIOD_STEPS = 5
-REFEREE_PERIOD_STEPS = 5
+SLEEP_PERIOD_STEPS = 4
+REFEREE_PERIOD_STEPS = 4
 SETTLING_S = 1.5
 
 

@@ -13,6 +13,7 @@ from executive.cli.mission_run import Finished, both
 from executive.cli.requests import Prepared
 from executive.cli.talk import conversation_of, load_ahead
 from executive.conversation import Conversation
+from executive.language import load_parser
 from executive.run.control import Control
 from executive.run.runner import Observer
 from executive.view.text import to_rich
@@ -48,6 +49,8 @@ def show_run(
     talk = conversation or conversation_of(prepared, control)
     talk.begun(prepared.tree, memory=None if prepared.meant is None else prepared.meant.memory)
     if quiet:
+        if conversation is None:
+            load_parser().release()  # nobody speaks to the run
         finished = start(control=control, observer=None if conversation is None else talk.observe)
     else:
         with live_view(prepared.tree, console, control, say=lambda text: talk.hear(text).text) as observer:

@@ -64,6 +64,11 @@ class SpacyParser:
         frequent = islice(self._pipeline.vocab.vectors.keys(), FREQUENT_WORDS)
         return np.sort(np.fromiter(frequent, dtype=np.uint64))
 
+    def release(self) -> None:
+        """Give the model's memory back; it is loaded anew when it is next needed."""
+        for loaded in ("_pipeline", "_nouns", "_frequent"):
+            self.__dict__.pop(loaded, None)
+
     def parse(self, text: str) -> tuple[Token, ...]:
         """The words of `text`, in order."""
         return corrected_parse(_token(token, self._kind(token)) for token in self._pipeline(text) if not token.is_space)

@@ -66,7 +66,7 @@ def build_diagram(
     directives: Path | None,
     models: Sequence[LooseModel],
     robot_names: Sequence[str],
-    looks: bool = True,
+    visuals: bool = True,
     carried: bool = True,
     locomotion: FloatingBaseLimits | None = None,
     render: bool = True,
@@ -79,7 +79,7 @@ def build_diagram(
     SAP contact at `time_step_s`; sampled outputs, which would double the cost of a step, are off, so that evaluating
     contact results solves once more. Positions of the models are defaults, the robots' are set by the caller.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
-    `looks` draws Spot with meshes where they are installed; `render` makes the scene for cameras. `locomotion` limits
+    `visuals` draws Spot with meshes where they are installed; `render` makes the scene for cameras. `locomotion` limits
     what bears the robots.
     """
     rebuild = partial(
@@ -87,7 +87,7 @@ def build_diagram(
         directives=directives,
         models=models,
         robot_names=robot_names,
-        looks=looks,
+        visuals=visuals,
         carried=carried,
         locomotion=locomotion,
         render=False,
@@ -102,7 +102,8 @@ def build_diagram(
     scenery = {} if directives is None else add_scenery(plant, directives, parser_of)
     instances = {model.name: _add_model(plant, parser, model) for model in models}
     robots = {
-        name: SpotModel(plant, name, looks=looks, carried=carried, limits=locomotion) for name in sorted(robot_names)
+        name: SpotModel(plant, name, visuals=visuals, carried=carried, limits=locomotion)
+        for name in sorted(robot_names)
     }
     plant.Finalize()
     for model in models:

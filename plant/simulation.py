@@ -164,7 +164,7 @@ class Simulation:
         seed: int,
         robot_names: Sequence[str] = ("Alice",),
         record: bool = False,
-        looks: bool = True,
+        visuals: bool = True,
         charge: float = 1.0,
         locomotion: FloatingBaseLimits | None = None,
         extra_models: Sequence[LooseModel] = (),
@@ -185,7 +185,7 @@ class Simulation:
                 *extra_models,
             ],
             robot_names=robot_names,
-            looks=looks,
+            visuals=visuals,
             locomotion=locomotion,
             renderer_parameters=render_parameters(),
         )

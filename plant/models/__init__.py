@@ -1,1 +1,1 @@
-"""Models of robots and things: SDF files, their looks, and the scripts that made them."""
+"""Models of robots and objects: SDF files, their visual meshes, and the scripts that made them."""

@@ -44,7 +44,7 @@ class SpotModel:
         plant: MultibodyPlant,
         name: str,
         *,
-        looks: bool,
+        visuals: bool,
         carried: bool = True,
         limits: FloatingBaseLimits | None = None,
     ) -> None:
@@ -53,7 +53,7 @@ class SpotModel:
         self.name = name
         parser = Parser(plant)
         parser.SetAutoRenaming(True)
-        meshes = visuals_folder() if looks else None
+        meshes = visuals_folder() if visuals else None
         if meshes is not None:
             parser.package_map().Add(VISUALS_PACKAGE, meshes)
         (self.instance,) = parser.AddModelsFromString(spot_urdf(visuals=meshes is not None), "urdf")

@@ -46,7 +46,7 @@ class ArmScene:
         self.model, self._work = model, work
         builder = RobotDiagramBuilder()
         plant = builder.plant()
-        (robot,) = Parser(plant).AddModelsFromString(_without_looks(capabilities.description), "urdf")
+        (robot,) = Parser(plant).AddModelsFromString(_without_visuals(capabilities.description), "urdf")
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("body", robot))
         plant.Finalize()
         self._instance = plant.GetModelInstanceName(robot)
@@ -134,6 +134,6 @@ class ArmScene:
             self._checker.SetCollisionFilteredBetween(plant.GetBodyByName(a), plant.GetBodyByName(b), True)
 
 
-def _without_looks(description: str) -> str:
+def _without_visuals(description: str) -> str:
     """URDF text without its visual elements, whose mesh files a skill does not need."""
     return re.sub(r"<visual\b.*?</visual>", "", description, flags=re.DOTALL)

@@ -121,7 +121,7 @@ def in_flat(seed: int, number: int) -> Iterator[Asked]:
         directives=world.directives_path,
         models=loose,
         robot_names=("Alice",),
-        looks=False,
+        visuals=False,
         renderer_parameters=render_parameters(),
     )
     engine = Engine(built, {"Alice": pose}, seed=seed * 1000 + number)

@@ -122,7 +122,7 @@ def furnished(rng: np.random.Generator, world: World, free: GridMap, supply: Sup
         directives=world.directives_path,
         models=loose,
         robot_names=(),
-        looks=False,
+        visuals=False,
         renderer_parameters=render_parameters(),
     )
     assert built.scene is not None

@@ -43,7 +43,7 @@ class FlatMission:
         self.tree = compile_mission(
             Mission("m", DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
         )
-        self.simulation = Simulation(self.world, seed=seed, robot_names=("Alice",), looks=False, **plant)
+        self.simulation = Simulation(self.world, seed=seed, robot_names=("Alice",), visuals=False, **plant)
         self.entry = run_entry(self.simulation, self.world, self.tree)
         self.transitions: list[dict[str, Any]] = []
         self.seed = seed

@@ -12,7 +12,7 @@ from plant.worlds.world import load_world
 
 @pytest.fixture
 def simulation() -> Simulation:
-    return Simulation(load_world("flat"), seed=1, looks=False)
+    return Simulation(load_world("flat"), seed=1, visuals=False)
 
 
 def test_the_scene_is_served_on_this_machine(simulation):
@@ -46,7 +46,7 @@ def test_it_shows_the_plant_as_it_is(simulation):
 
 
 def test_a_run_is_the_same_with_it_and_without(simulation):
-    alone = Simulation(load_world("flat"), seed=1, looks=False)
+    alone = Simulation(load_world("flat"), seed=1, visuals=False)
     simulation.show_live()
     for each in (alone, simulation):
         each.clock.advance(0.2)

@@ -72,7 +72,7 @@ def test_a_model_with_a_part_that_moves_stays_a_model(directives):
 
 
 def test_a_bump_into_scenery_names_the_piece(directives):
-    built = build_diagram(directives=directives, models=[], robot_names=["Alice"], looks=False, render=False)
+    built = build_diagram(directives=directives, models=[], robot_names=["Alice"], visuals=False, render=False)
     engine = Engine(built, {"Alice": Pose2D(0.0, 0.0, 0.0)})
     referee = Referee(built.plant, [], robots=["Alice"], scenery=built.scenery)
     engine.observe(lambda now_s: referee.observe(engine.context, now_s), every=5)

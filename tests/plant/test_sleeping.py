@@ -42,7 +42,7 @@ def stage(tmp_path):
             directives=tmp_path / "world.dmd.yaml",
             models=models,
             robot_names=[*(robots or {})],
-            looks=False,
+            visuals=False,
             render=False,
         )
         engine = Engine(built, robots or {})

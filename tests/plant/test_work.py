@@ -5,7 +5,7 @@ from plant.worlds.world import load_world
 
 
 def counted():
-    simulation = Simulation(load_world("flat"), seed=1, looks=False)
+    simulation = Simulation(load_world("flat"), seed=1, visuals=False)
     before = simulation.work()
     simulation.clock.advance(0.5)
     robot = simulation.robots["Alice"]

@@ -15,7 +15,7 @@ WORLD = load_world("flat")
 
 
 def make(seed=3):
-    return Simulation(WORLD, seed=seed, looks=False)
+    return Simulation(WORLD, seed=seed, visuals=False)
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,8 @@ from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.sleeping import Sleepers
 from plant.snapshot.file import read_snapshot
-from plant.snapshot.keeper import SnapshotKeeper, restore
 from plant.snapshot.values import State
+from plant.snapshot.writer import SnapshotWriter, restore
 from plant.spot.model import SpotModel
 from plant.spot.robot import SpotRobot
 from plant.spot.sensing import HAND_LINK, SpotSensors
@@ -228,10 +228,10 @@ class Simulation:
 
         `label` says what it is for.
         """
-        keeper = SnapshotKeeper(path, self.engine, self.referee, {**self._facts(), "label": label}, sorted(self.robots))
-        keeper()
-        self.engine.after_advance(keeper.when_due)
-        return keeper
+        writer = SnapshotWriter(path, self.engine, self.referee, {**self._facts(), "label": label}, sorted(self.robots))
+        writer()
+        self.engine.after_advance(writer.when_due)
+        return writer
 
     def restore(self, path: Path, *, label: str | None = "") -> None:
         """Take up the state in a file, as after a power failure: nobody commands the robots, which come to a stop.

@@ -1,4 +1,4 @@
-"""What a gripper feels: jaw angle, clamp force, and whether something is between the jaws."""
+"""What a gripper feels: gripper angle, clamp force, and whether something is between its fingers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from skills.robot import Gripper
 class GripperNoise:
     """Noise of the readings, and when the robot believes that it holds something.
 
-    It does when the read force is at least `holding_force_n` with the jaw wider than `closed_rad` for
+    It does when the read force is at least `holding_force_n` with the gripper wider than `closed_rad` for
     `holding_after_s` on end; the belief ends as soon as one of both is no longer so for that time.
     """
 
@@ -37,9 +37,9 @@ class GripperModel:
         self._changing_since_s: float | None = None
 
     def update(self, stamp_s: float, opening_rad: float, force_n: float) -> Gripper:
-        """Reading at stamp_s from the true jaw angle (0 closed, positive open) and clamp force at the tip.
+        """Reading at stamp_s from the true gripper angle (0 closed, positive open) and clamp force at the tip.
 
-        `force_n` is what the jaw presses with, 0 while it moves freely.
+        `force_n` is what the gripper presses with, 0 while it moves freely.
         """
         opening = opening_rad + float(self._rng.normal(0.0, self._noise.opening_rad))
         force = max(0.0, force_n * self._force_scale + float(self._rng.normal(0.0, self._noise.force_n)))

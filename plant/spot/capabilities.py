@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from plant.models.spot.description import CAMERAS, JAW, LEGS, spot_facts, spot_urdf
+from plant.models.spot.description import CAMERAS, GRIPPER_JOINT, LEGS, spot_facts, spot_urdf
 from plant.sensors.camera_spec import load_cameras
 from skills.robot import ArmCapabilities, CameraCapabilities, Capabilities, FloatArray, GripperCapabilities
 
@@ -41,7 +41,7 @@ def spot_capabilities() -> Capabilities:
             body["max_payload"],
         ),
         gripper=GripperCapabilities(
-            joint_name=JAW,
+            joint_name=GRIPPER_JOINT,
             open_rad=gripper["open"],
             max_opening_m=gripper["max_opening"],
             max_force_n=gripper["max_force"],

@@ -30,7 +30,7 @@ class Active(Generic[PayloadT]):
     until_s: float
 
 
-class CommandBook:
+class CommandTable:
     """All commands ever given and the running one of each part."""
 
     def __init__(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from skills.robot import Lease, LeaseError
 
 
-class LeaseDesk:
+class LeaseManager:
     """Hands out one robot's lease; the lease with the highest number counts."""
 
     def __init__(self, robot_name: str) -> None:

@@ -13,7 +13,7 @@ from pydrake.systems.framework import Context
 
 from plant.locomotion.floating_base import FloatingBase, FloatingBaseLimits
 from plant.models.spot.description import (
-    JAW,
+    GRIPPER_JOINT,
     LEGS,
     VISUALS_PACKAGE,
     arm_joint_names,
@@ -32,7 +32,7 @@ _ARM_GAINS = {
     "arm_el1": (300.0, 12.0),
     "arm_wr0": (300.0, 12.0),
     "arm_wr1": (200.0, 6.0),
-    JAW: (60.0, 0.8),
+    GRIPPER_JOINT: (60.0, 0.8),
 }
 
 
@@ -114,8 +114,8 @@ class SpotModel:
 class JointIndex:
     """Index arrays of a Spot's joints: into the plant's positions and velocities, in the order of its actuators.
 
-    `arm`, `jaw` and `legs` stand for positions in the desired state of the actuators, `arm_rates` and `leg_rates` for
-    velocities there.
+    `arm`, `gripper` and `legs` stand for positions in the desired state of the actuators, `arm_rates` and `leg_rates`
+    for velocities there.
     """
 
     def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
@@ -131,10 +131,10 @@ class JointIndex:
         self._stiffness = np.array([each.p for each in gains])
         self._damping = np.array([each.d for each in gains])
         self.arm = np.array([self.names.index(name) for name in arm_joint_names()])
-        self.jaw = self.names.index(JAW)
+        self.gripper = self.names.index(GRIPPER_JOINT)
         self.legs = np.array([[self.names.index(joint) for joint in leg_joint_names(leg)] for leg in LEGS])
         self.arm_rates, self.leg_rates = len(joints) + self.arm, len(joints) + self.legs
-        self.jaw_gain = _ARM_GAINS[JAW][0]
+        self.gripper_gain = _ARM_GAINS[GRIPPER_JOINT][0]
 
     def efforts_of(
         self, desired: FloatArray, feed_forward: FloatArray, positions: FloatArray, rates: FloatArray

@@ -13,11 +13,11 @@ from plant.locomotion.trot import BodyMotion, Trot
 from plant.models.spot.description import spot_facts
 from plant.snapshot.values import State, array_of
 from plant.spot.capabilities import nominal_footholds, spot_capabilities
-from plant.spot.commands import CommandBook, Part
-from plant.spot.leases import LeaseDesk
+from plant.spot.commands import CommandTable, Part
+from plant.spot.leases import LeaseManager
 from plant.spot.model import SpotModel
 from plant.spot.sensing import SpotSensors
-from plant.spot.servos import JawGoal, LegServos, arm_set_point, jaw_set_point
+from plant.spot.servos import GripperGoal, LegServos, arm_set_point, gripper_set_point
 from skills.robot import (
     ArmTrajectory,
     Battery,
@@ -39,9 +39,9 @@ _ARM_ARRIVED_RAD = 0.03
 _ARM_STILL_RAD_S = 0.06
 _MAX_ARM_RATE_RAD_S = 4.0
 _TRAJECTORY_START_RAD = 0.25
-_JAW_ARRIVED_RAD = 0.03
-_JAW_STALL_RAD_S = 0.03
-_JAW_STALL_S = 0.25
+_GRIPPER_ARRIVED_RAD = 0.03
+_GRIPPER_STALL_RAD_S = 0.03
+_GRIPPER_STALL_S = 0.25
 
 
 class SpotRobot:
@@ -53,15 +53,17 @@ class SpotRobot:
         self._sensors = sensors
         self._context = context
         self._index = model.index()
-        self._book = CommandBook()
-        self._desk = LeaseDesk(model.name)
+        self._commands = CommandTable()
+        self._leases = LeaseManager(model.name)
         self._now_s = 0.0
         positions = self._positions()
         joints = positions[self._index.positions]
         self._arm_hold = joints[self._index.arm]
         self._arm_rate = np.zeros(len(self._arm_hold))
-        self._jaw_goal = self._jaw_goal_before = JawGoal(max(0.0, -float(joints[self._index.jaw])), 20.0)
-        self._jaw_still_s = 0.0
+        self._gripper_goal = self._gripper_goal_before = GripperGoal(
+            max(0.0, -float(joints[self._index.gripper])), 20.0
+        )
+        self._gripper_still_s = 0.0
         self._posture = (float(spot_facts()["capabilities"]["standing_height"]), 0.0)
         self._leg_servos = LegServos(self._index, joints[self._index.legs])
         self._trot = Trot(nominal_footholds())
@@ -117,9 +119,9 @@ class SpotRobot:
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Walk at a body-frame velocity until the clock reads until_s."""
         if not all(math.isfinite(value) for value in (vx, vy, wz)):
-            return self._book.refuse(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
+            return self._commands.refuse(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
         if self._posture[0] < spot_facts()["capabilities"]["height_range"][0] - 0.02:
-            return self._book.refuse("drive: the robot sits; stand up first")
+            return self._commands.refuse("drive: the robot sits; stand up first")
         return self._begin(Part.VELOCITY, Velocity(vx, vy, wz), until_s, lease)
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
@@ -127,7 +129,7 @@ class SpotRobot:
         low, high = self._capabilities.height_range_m
         least, most = self._capabilities.pitch_range_rad
         if not (low <= height_m <= high and least <= pitch_rad <= most):
-            return self._book.refuse(
+            return self._commands.refuse(
                 f"stand: height {height_m:.2f} m must lie in [{low}, {high}] "
                 f"and pitch {pitch_rad:.2f} rad in [{least}, {most}]"
             )
@@ -136,61 +138,61 @@ class SpotRobot:
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lower the body to the floor; driving stops."""
         command = self._begin(Part.POSTURE, (spot_facts()["capabilities"]["sitting_height"], 0.0), until_s, lease)
-        if self._book.status(command).state is CommandState.RUNNING:
-            self._book.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down")
+        if self._commands.status(command).state is CommandState.RUNNING:
+            self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down")
         return command
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follow a joint trajectory; done when its end is reached and the arm is still."""
         reason = self._trajectory_refusal(trajectory)
-        return self._book.refuse(reason) if reason else self._begin(Part.ARM, trajectory, until_s, lease)
+        return self._commands.refuse(reason) if reason else self._begin(Part.ARM, trajectory, until_s, lease)
 
     def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Move the jaw to an opening with at most force_n at its tip; the force stays after the command's end."""
+        """Move the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
         gripper = spot_facts()["gripper"]
         if not (0.0 <= opening_rad <= gripper["open"] and 0.0 < force_n <= gripper["max_force"]):
-            return self._book.refuse(
+            return self._commands.refuse(
                 f"set_gripper: opening {opening_rad:.2f} rad must lie in [0, {gripper['open']}] "
                 f"and force {force_n:.0f} N in (0, {gripper['max_force']}]"
             )
-        command = self._begin(Part.GRIPPER, JawGoal(opening_rad, force_n), until_s, lease)
-        if self._book.status(command).state is CommandState.RUNNING:
-            self._jaw_goal_before, self._jaw_goal = self._jaw_goal, JawGoal(opening_rad, force_n)
-            self._jaw_still_s = 0.0
+        command = self._begin(Part.GRIPPER, GripperGoal(opening_rad, force_n), until_s, lease)
+        if self._commands.status(command).state is CommandState.RUNNING:
+            self._gripper_goal_before, self._gripper_goal = self._gripper_goal, GripperGoal(opening_rad, force_n)
+            self._gripper_still_s = 0.0
         return command
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stop all motion, or only the given command if it still runs."""
-        refusal = self._desk.refusal(lease)
+        refusal = self._leases.refusal(lease)
         if refusal:
-            return self._book.refuse(f"stop: {refusal}")
-        part = self._book.part_of(only) if only is not None else None
+            return self._commands.refuse(f"stop: {refusal}")
+        part = self._commands.part_of(only) if only is not None else None
         for candidate in Part if only is None else ([part] if part else []):
             self._halt(candidate, "stopped by command")
-        return self._book.note(CommandState.DONE)
+        return self._commands.note(CommandState.DONE)
 
     def command_status(self, command: CommandId) -> CommandStatus:
         """What became of a command. Raises KeyError for an id never given."""
-        return self._book.status(command)
+        return self._commands.status(command)
 
     # -- own ------------------------------------------------------------------------------------------------------
 
     def lease_holder(self) -> Lease | None:
         """The lease that counts now; None while it is free."""
-        return self._desk.current
+        return self._leases.current
 
     def acquire_lease(self, holder: str) -> Lease:
         """Take a free lease. Raises LeaseError when another holds it."""
-        return self._desk.acquire(holder)
+        return self._leases.acquire(holder)
 
     def take_lease(self, holder: str) -> Lease:
         """Take the lease from whoever holds it; the robot stops."""
         self._halt_all("the lease was taken by " + repr(holder))
-        return self._desk.take(holder)
+        return self._leases.take(holder)
 
     def return_lease(self, lease: Lease) -> None:
         """Give the lease back; the robot stops. A lease that was taken away is ignored."""
-        if self._desk.give_back(lease):
+        if self._leases.give_back(lease):
             self._halt_all("the lease was returned")
 
     # -- called by the simulation ---------------------------------------------------------------------------------
@@ -205,7 +207,9 @@ class SpotRobot:
         self._follow_up(joints, rates, base, dt_s)
         desired = np.concatenate([joints, np.zeros(len(joints))])
         desired[index.arm], desired[index.arm_rates] = self._arm_hold, self._arm_rate
-        desired[index.jaw] = jaw_set_point(self._jaw_goal, float(joints[index.jaw]), index.jaw_gain, self._tip_radius_m)
+        desired[index.gripper] = gripper_set_point(
+            self._gripper_goal, float(joints[index.gripper]), index.gripper_gain, self._tip_radius_m
+        )
         self._drive_body(base, dt_s)
         desired[index.legs], desired[index.leg_rates] = self._legs(base, dt_s)
         gravity = plant.CalcGravityGeneralizedForces(self._context)[index.velocities]
@@ -223,8 +227,8 @@ class SpotRobot:
         """What the robot itself keeps: servos, gait, sensors. Commands and leases do not outlive its computer."""
         floating_base = self._model.floating_base
         return {
-            "arm_hold": None if self._book.running(Part.ARM) is not None else self._arm_hold.tolist(),
-            "jaw": [self._jaw_goal.opening_rad, self._jaw_goal.force_n, self._jaw_still_s],
+            "arm_hold": None if self._commands.running(Part.ARM) is not None else self._arm_hold.tolist(),
+            "gripper": [self._gripper_goal.opening_rad, self._gripper_goal.force_n, self._gripper_still_s],
             "posture": list(self._posture),
             "legs": self._leg_servos.state(),
             "trot": self._trot.state(),
@@ -233,18 +237,18 @@ class SpotRobot:
         }
 
     def restore(self, state: State, now_s: float) -> None:
-        """Power up in such a state: nobody has the lease, no command runs, the jaw keeps its clamp.
+        """Power up in such a state: nobody has the lease, no command runs, the gripper keeps its clamp.
 
         An arm that was moving holds where it is; a body that was moving slows down.
         """
         self._now_s = now_s
-        self._book, self._desk = CommandBook(), LeaseDesk(self._model.name)
+        self._commands, self._leases = CommandTable(), LeaseManager(self._model.name)
         joints = self._positions()[self._index.positions]
         hold = state["arm_hold"]
         self._arm_hold = joints[self._index.arm] if hold is None else array_of(hold)
         self._arm_rate = np.zeros(len(self._arm_hold))
-        opening_rad, force_n, self._jaw_still_s = state["jaw"]
-        self._jaw_goal = self._jaw_goal_before = JawGoal(opening_rad, force_n)
+        opening_rad, force_n, self._gripper_still_s = state["gripper"]
+        self._gripper_goal = self._gripper_goal_before = GripperGoal(opening_rad, force_n)
         self._posture = (state["posture"][0], state["posture"][1])
         self._leg_servos.restore(state["legs"])
         self._trot.restore(state["trot"])
@@ -255,12 +259,14 @@ class SpotRobot:
     # -- inside ---------------------------------------------------------------------------------------------------
 
     def _begin(self, part: Part, payload: object, until_s: float, lease: Lease) -> CommandId:
-        refusal = self._desk.refusal(lease)
+        refusal = self._leases.refusal(lease)
         if refusal:
-            return self._book.refuse(f"{part.value}: {refusal}")
+            return self._commands.refuse(f"{part.value}: {refusal}")
         if until_s <= self._now_s:
-            return self._book.refuse(f"{part.value}: expires at {until_s:.2f} s, and it is {self._now_s:.2f} s already")
-        return self._book.begin(part, payload, self._now_s, until_s)
+            return self._commands.refuse(
+                f"{part.value}: expires at {until_s:.2f} s, and it is {self._now_s:.2f} s already"
+            )
+        return self._commands.begin(part, payload, self._now_s, until_s)
 
     def _trajectory_refusal(self, trajectory: ArmTrajectory) -> str | None:
         positions = trajectory.positions_rad
@@ -281,49 +287,49 @@ class SpotRobot:
             self._halt(part, reason)
 
     def _halt(self, part: Part, reason: str) -> None:
-        if self._book.running(part) is not None:
+        if self._commands.running(part) is not None:
             self._hold_still(part)
-        self._book.finish(part, CommandState.STOPPED, reason)
+        self._commands.finish(part, CommandState.STOPPED, reason)
 
     def _hold_still(self, part: Part) -> None:
-        """Make where a part is the place where it stays; a jaw that clamps something goes on clamping."""
+        """Make where a part is the place where it stays; a gripper that clamps something goes on clamping."""
         joints = self._positions()[self._index.positions]
         if part is Part.ARM:
             self._arm_hold, self._arm_rate = joints[self._index.arm], np.zeros(len(self._index.arm))
         if part is Part.GRIPPER:
-            self._jaw_goal = self._stopped_jaw(max(0.0, -float(joints[self._index.jaw])))
+            self._gripper_goal = self._stopped_gripper(max(0.0, -float(joints[self._index.gripper])))
         if part is Part.POSTURE and self._model.floating_base is not None:
             self._posture = self._model.floating_base.posture
 
-    def _stopped_jaw(self, opening_rad: float) -> JawGoal:
-        """A moving jaw stays where it is; one that has hold of a thing keeps its force, or gets that of before."""
+    def _stopped_gripper(self, opening_rad: float) -> GripperGoal:
+        """A moving gripper stays where it is; one that holds an object keeps its force, or gets that of before."""
         rates = self._model.plant.GetVelocities(self._context)[self._index.velocities]
-        if abs(float(rates[self._index.jaw])) >= _JAW_STALL_RAD_S:
-            return JawGoal(opening_rad, self._jaw_goal.force_n)
-        return self._jaw_goal_before if self._jaw_goal.opening_rad > opening_rad else self._jaw_goal
+        if abs(float(rates[self._index.gripper])) >= _GRIPPER_STALL_RAD_S:
+            return GripperGoal(opening_rad, self._gripper_goal.force_n)
+        return self._gripper_goal_before if self._gripper_goal.opening_rad > opening_rad else self._gripper_goal
 
     def _expire(self) -> None:
         for part in Part:
-            active = self._book.running(part)
+            active = self._commands.running(part)
             if active is None or self._now_s < active.until_s - 1e-9:
                 continue
             if part is Part.VELOCITY:
-                self._book.finish(part, CommandState.DONE)
+                self._commands.finish(part, CommandState.DONE)
             else:
                 self._halt(part, "expired before it was done")
 
     def _follow_up(self, joints: FloatArray, rates: FloatArray, base: Sequence[float], dt_s: float) -> None:
         self._follow_arm(joints, rates)
-        self._follow_jaw(joints, rates, dt_s)
-        posture = self._book.running(Part.POSTURE)
+        self._follow_gripper(joints, rates, dt_s)
+        posture = self._commands.running(Part.POSTURE)
         if posture is not None and isinstance(posture.payload, tuple):
             self._posture = posture.payload
             height, pitch = base[3:]
             if abs(height - self._posture[0]) < 0.01 and abs(pitch - self._posture[1]) < 0.02:
-                self._book.finish(Part.POSTURE, CommandState.DONE)
+                self._commands.finish(Part.POSTURE, CommandState.DONE)
 
     def _follow_arm(self, joints: FloatArray, rates: FloatArray) -> None:
-        active = self._book.running(Part.ARM)
+        active = self._commands.running(Part.ARM)
         self._arm_rate = np.zeros(len(self._index.arm))
         if active is None or not isinstance(active.payload, ArmTrajectory):
             return
@@ -333,22 +339,24 @@ class SpotRobot:
             return
         off = np.abs(joints[self._index.arm] - trajectory.positions_rad[-1]).max()
         if off < _ARM_ARRIVED_RAD and np.abs(rates[self._index.arm]).max() < _ARM_STILL_RAD_S:
-            self._book.finish(Part.ARM, CommandState.DONE)
+            self._commands.finish(Part.ARM, CommandState.DONE)
 
-    def _follow_jaw(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> None:
-        opening, rate = -float(joints[self._index.jaw]), abs(float(rates[self._index.jaw]))
-        self._jaw_still_s = self._jaw_still_s + dt_s if rate < _JAW_STALL_RAD_S else 0.0
-        if self._book.running(Part.GRIPPER) is None:
+    def _follow_gripper(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> None:
+        opening, rate = -float(joints[self._index.gripper]), abs(float(rates[self._index.gripper]))
+        self._gripper_still_s = self._gripper_still_s + dt_s if rate < _GRIPPER_STALL_RAD_S else 0.0
+        if self._commands.running(Part.GRIPPER) is None:
             return
-        arrived = abs(opening - self._jaw_goal.opening_rad) < _JAW_ARRIVED_RAD
-        if arrived or self._jaw_still_s > _JAW_STALL_S:
-            self._book.finish(Part.GRIPPER, CommandState.DONE, "" if arrived else "stopped by a thing in the jaw")
+        arrived = abs(opening - self._gripper_goal.opening_rad) < _GRIPPER_ARRIVED_RAD
+        if arrived or self._gripper_still_s > _GRIPPER_STALL_S:
+            self._commands.finish(
+                Part.GRIPPER, CommandState.DONE, "" if arrived else "stopped by an object in the gripper"
+            )
 
     def _drive_body(self, base: Sequence[float], dt_s: float) -> None:
         floating_base = self._model.floating_base
         if floating_base is None:
             return
-        active = self._book.running(Part.VELOCITY)
+        active = self._commands.running(Part.VELOCITY)
         wanted = active.payload if active is not None and isinstance(active.payload, Velocity) else Velocity()
         floating_base.control(self._context, base, wanted, self._posture, dt_s, stopping=active is None)
 

@@ -30,7 +30,7 @@ from skills.robot import Battery, FloatArray, FrameTree, Gripper, Image, Imu, Jo
 HAND_LINK = "arm_wr1"
 _FRAME_OF_LINK = {"body": "body", HAND_LINK: "hand"}
 _LIDAR_PERIOD_S = 0.1
-_JAW_MOVES_RAD_S = 0.05
+_GRIPPER_MOVES_RAD_S = 0.05
 _DOCKED_WITHIN_M = 0.2
 _STILL_M_S = 0.02
 
@@ -107,7 +107,7 @@ class SpotSensors:
         efforts = self._efforts(positions, rates)
         self._joints = self._joint_model.update(now_s, positions, rates, efforts)
         self._gripper = self._gripper_model.update(
-            now_s, -float(positions[index.jaw]), self._clamp_force_n(rates, efforts)
+            now_s, -float(positions[index.gripper]), self._clamp_force_n(rates, efforts)
         )
         load = min(1.0, float(np.linalg.norm(v_WB)) + float(np.abs(rates[index.arm]).sum()) / 4.0)
         self._battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
@@ -155,10 +155,10 @@ class SpotSensors:
         }
 
     def _clamp_force_n(self, rates: FloatArray, efforts: FloatArray) -> float:
-        """Force at the jaw's tip from its motor's torque, 0 while the jaw moves."""
-        if abs(float(rates[self._index.jaw])) > _JAW_MOVES_RAD_S:
+        """Force at the gripper's tip from its motor's torque, 0 while the gripper moves."""
+        if abs(float(rates[self._index.gripper])) > _GRIPPER_MOVES_RAD_S:
             return 0.0
-        return max(0.0, float(efforts[self._index.jaw])) / float(spot_facts()["gripper"]["tip_radius"])
+        return max(0.0, float(efforts[self._index.gripper])) / float(spot_facts()["gripper"]["tip_radius"])
 
     def odometry(self) -> Odometry:
         """Latest dead reckoning."""

@@ -1,4 +1,4 @@
-"""Set points of Spot's joint servos: arm along a trajectory, jaw with limited force, legs under the body."""
+"""Set points of Spot's joint servos: arm along a trajectory, gripper with limited force, legs under the body."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _MAX_LEG_RATE_RAD_S = 20.0
 
 
 @dataclass(frozen=True)
-class JawGoal:
-    """Jaw angle to reach (0 closed, positive open) with at most `force_n` at the tip."""
+class GripperGoal:
+    """Gripper angle to reach (0 closed, positive open) with at most `force_n` at the tip."""
 
     opening_rad: float
     force_n: float
@@ -36,10 +36,10 @@ def arm_set_point(trajectory: ArmTrajectory, elapsed_s: float) -> tuple[FloatArr
     return positions[k] + rate * (elapsed_s - times[k]), rate
 
 
-def jaw_set_point(goal: JawGoal, jaw_rad: float, gain_nm_rad: float, tip_radius_m: float) -> float:
-    """Jaw joint position (rad, negative open) that makes the servo push with no more than the goal's force."""
+def gripper_set_point(goal: GripperGoal, gripper_rad: float, gain_nm_rad: float, tip_radius_m: float) -> float:
+    """Gripper joint position (rad, negative open) that makes the servo push with no more than the goal's force."""
     lead = goal.force_n * tip_radius_m / gain_nm_rad
-    return min(max(-goal.opening_rad, jaw_rad - lead), jaw_rad + lead)
+    return min(max(-goal.opening_rad, gripper_rad - lead), gripper_rad + lead)
 
 
 class LegServos:

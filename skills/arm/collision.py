@@ -59,7 +59,7 @@ class ArmScene:
         for name, start in starts.items():
             self._q[start] = joint_positions_rad.get(name, 0.0)
         self._arm = np.array([starts[name] for name in model.names])
-        self._jaw = starts[model.jaw.name]
+        self._gripper = starts[model.gripper.name]
         self._allow_stowed_contacts()
 
     def set_boxes(self, boxes: Sequence[Box]) -> None:
@@ -76,7 +76,7 @@ class ArmScene:
 
     def set_opening(self, opening_rad: float) -> None:
         """Angle of the gripper in later checks, 0 closed."""
-        self._q[self._jaw] = -opening_rad
+        self._q[self._gripper] = -opening_rad
 
     def set_padding(self, padding_m: float) -> None:
         """Distance that the robot keeps from boxes in later checks."""

@@ -1,7 +1,7 @@
 """Kinematics of an arm with shoulder yaw, two parallel pitch joints and a spherical roll-pitch-roll wrist.
 
-All poses are in the body frame B; the hand frame H is the last arm link, x along the fingers, y along the jaw's hinge.
-The chain is read from the robot's own URDF. The inverse is solved in closed form, every branch and no seeds, or by
+All poses are in the body frame B; the hand frame H is the last arm link, x along the fingers, y along the
+gripper's hinge. The chain is read from the robot's own URDF. The inverse is solved in closed form, every branch and no seeds, or by
 the solver that the robot's capabilities bring.
 """
 
@@ -37,10 +37,10 @@ class ChainJoint:
 
 @dataclass(frozen=True)
 class ArmModel:
-    """Forward and inverse kinematics of the arm, and where the jaw hinges on the hand."""
+    """Forward and inverse kinematics of the arm, and where the gripper hinges on the hand."""
 
     joints: tuple[ChainJoint, ...]
-    jaw: ChainJoint
+    gripper: ChainJoint
     stowed_rad: FloatArray
     solver: InverseKinematics | None = None
 

@@ -13,7 +13,7 @@ from skills.navigate.footprint import Footprint, disc_centres, pose_array
 from skills.perception.people import SeenPerson
 from skills.robot import FloatArray, Pose2D, Robot
 
-__all__ = ["Pace", "PaceKeeper", "SpaceOptions", "WithPeople", "outline_distance_m", "spaced"]
+__all__ = ["Pace", "PaceManager", "SpaceOptions", "WithPeople", "outline_distance_m", "spaced"]
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Pace:
     overdue: bool = False
 
 
-class PaceKeeper:
+class PaceManager:
     """Tells the pace from tick to tick; remembers how long it was waited."""
 
     def __init__(self, footprint: Footprint, options: SpaceOptions | None = None) -> None:

@@ -13,7 +13,7 @@ from skills.navigate.base import Base
 from skills.navigate.footprint import Footprint
 from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
-from skills.navigate.people_space import Pace, PaceKeeper, SpaceOptions, spaced
+from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
 from skills.perception.people_watch import PeopleOptions, PeopleWatch
 from skills.robot import Pose2D
 from skills.stack import LocalController
@@ -84,7 +84,7 @@ class Navigate(Skill[NavigateInputs]):
         self._footprint = Footprint.of(self.context.robot.capabilities())
         self._watch = LowObstacleWatch(self.context, self.options.low_obstacles)
         self._people = PeopleWatch(self.context, self.options.people)
-        self._pace = PaceKeeper(self._footprint, self.options.space)
+        self._pace = PaceManager(self._footprint, self.options.space)
         self._room_m = self.options.space.room_m
         self._person_s = self._person_since_s = -math.inf
         self._phase: Callable[[], Step] = self._localising

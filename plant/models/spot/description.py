@@ -15,7 +15,7 @@ import yaml
 
 FACTS = Path(__file__).with_name("spot.yaml")
 CAMERAS = Path(__file__).with_name("cameras.yaml")
-JAW = "arm_f1x"
+GRIPPER_JOINT = "arm_f1x"
 LEGS = ("fl", "fr", "hl", "hr")
 VISUALS_PACKAGE = "spot_visuals"
 _SIDES = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
@@ -183,7 +183,7 @@ def _add_lidar(robot: ElementTree.Element, lidar: Mapping[str, Any]) -> None:
 
 
 def arm_joint_names() -> Sequence[str]:
-    """The six arm joints from the shoulder on, without the jaw."""
+    """The six arm joints from the shoulder on, without the gripper."""
     return tuple(part["link"] for part in spot_facts()["arm"][:-1])
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError, read_snapshot
-from plant.snapshot.keeper import SnapshotKeeper
+from plant.snapshot.writer import SnapshotWriter
 from plant.worlds.world import load_world
 from skills.robot import LeaseError
 
@@ -99,11 +99,11 @@ def test_another_mission_begins_a_new_chapter_in_the_same_world(kept):
 
 def test_keeping_the_state_takes_less_than_a_millisecond(kept, tmp_path):
     simulation, _ = kept
-    keeper = SnapshotKeeper(tmp_path / "timed.plant", simulation.engine, simulation.referee, {}, ["Alice"])
+    writer = SnapshotWriter(tmp_path / "timed.plant", simulation.engine, simulation.referee, {}, ["Alice"])
     times = []
     for _ in range(100):
         begun = time.perf_counter()
-        keeper()
+        writer()
         times.append(time.perf_counter() - begun)
     assert np.median(times) < 1e-3
     assert read_snapshot(tmp_path / "timed.plant").number == 100

@@ -67,7 +67,7 @@ def test_the_arm_is_at_rest_in_time(engine, spot, lease, part):
     assert arm_rate(spot) < 0.1
 
 
-def test_a_moving_jaw_stays_where_it_is(engine, spot, lease):
+def test_a_moving_gripper_stays_where_it_is(engine, spot, lease):
     spot.set_gripper(1.4, 20.0, until_s=engine.now() + 5.0, lease=lease)
     engine.advance(0.2)
     spot.stop(lease=lease)
@@ -78,7 +78,7 @@ def test_a_moving_jaw_stays_where_it_is(engine, spot, lease):
     assert spot.gripper().opening_rad == pytest.approx(opening_rad, abs=0.02)
 
 
-def test_a_jaw_that_is_stopped_before_it_opens_stays_closed(engine, spot, lease):
+def test_a_gripper_that_is_stopped_before_it_opens_stays_closed(engine, spot, lease):
     spot.set_gripper(1.4, 20.0, until_s=engine.now() + 5.0, lease=lease)
     spot.stop(lease=lease)
     engine.advance(0.5)

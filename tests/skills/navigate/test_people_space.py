@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skills.navigate.footprint import Footprint
-from skills.navigate.people_space import PaceKeeper, SpaceOptions, WithPeople, outline_distance_m, spaced
+from skills.navigate.people_space import PaceManager, SpaceOptions, WithPeople, outline_distance_m, spaced
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 
@@ -33,9 +33,9 @@ def way(length_m=1.2):
     return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
 
 
-def pace(*people, keeper=None, now_s=0.0, ahead=None, goal=FAR_GOAL):
-    keeper = keeper or PaceKeeper(FOOTPRINT)
-    return keeper.pace(now_s, HERE, way() if ahead is None else ahead, people, FULL_M_S, goal)
+def pace(*people, manager=None, now_s=0.0, ahead=None, goal=FAR_GOAL):
+    manager = manager or PaceManager(FOOTPRINT)
+    return manager.pace(now_s, HERE, way() if ahead is None else ahead, people, FULL_M_S, goal)
 
 
 def test_distances_are_from_the_outline():
@@ -61,8 +61,8 @@ def test_a_person_ahead_is_heeded_before_the_robot_is_near():
 
 
 def test_it_waits_for_who_is_too_near_to_the_way_and_then_goes_past_slowly():
-    keeper, options = PaceKeeper(FOOTPRINT), SpaceOptions()
-    told = [pace(person(2.0), keeper=keeper, now_s=0.1 * k) for k in range(60)]
+    manager, options = PaceManager(FOOTPRINT), SpaceOptions()
+    told = [pace(person(2.0), manager=manager, now_s=0.1 * k) for k in range(60)]
     stood = [one for one in told if one.waiting]
     assert len(stood) == pytest.approx(10 * options.patience_s, abs=2)
     assert {one.most_m_s for one in stood} == {0.0}
@@ -72,13 +72,13 @@ def test_it_waits_for_who_is_too_near_to_the_way_and_then_goes_past_slowly():
 
 
 def test_patience_begins_anew_when_nobody_was_near_for_a_while():
-    keeper = PaceKeeper(FOOTPRINT)
+    manager = PaceManager(FOOTPRINT)
     for k in range(60):
-        pace(person(2.0), keeper=keeper, now_s=0.1 * k)
-    pace(keeper=keeper, now_s=7.0)
-    assert not pace(person(2.0), keeper=keeper, now_s=7.1).waiting
-    pace(keeper=keeper, now_s=12.0)
-    assert pace(person(2.0), keeper=keeper, now_s=12.1).waiting
+        pace(person(2.0), manager=manager, now_s=0.1 * k)
+    pace(manager=manager, now_s=7.0)
+    assert not pace(person(2.0), manager=manager, now_s=7.1).waiting
+    pace(manager=manager, now_s=12.0)
+    assert pace(person(2.0), manager=manager, now_s=12.1).waiting
 
 
 def test_a_way_that_leads_away_from_somebody_near_is_not_waited_on():
@@ -101,8 +101,8 @@ def test_who_is_behind_a_wall_of_distance_is_nobody():
 
 
 def test_a_slow_errand_is_not_made_faster():
-    keeper = PaceKeeper(FOOTPRINT)
-    assert keeper.pace(0.0, HERE, way(), [person(0.6, 2.0)], 0.2, FAR_GOAL).most_m_s <= 0.2
+    manager = PaceManager(FOOTPRINT)
+    assert manager.pace(0.0, HERE, way(), [person(0.6, 2.0)], 0.2, FAR_GOAL).most_m_s <= 0.2
 
 
 def test_people_take_up_room_in_the_costmap():

@@ -44,7 +44,7 @@ class KeptReferee(Protocol):
         """Go on with a record."""
 
 
-class SnapshotKeeper:
+class SnapshotWriter:
     """Writes a plant's whole state to a file whenever it is called. `facts` tell which world it is.
 
     It stands in for a world that stays while the executive is away: the mission itself goes on from its journal.

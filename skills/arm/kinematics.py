@@ -1,8 +1,8 @@
 """Kinematics of an arm with shoulder yaw, two parallel pitch joints and a spherical roll-pitch-roll wrist.
 
 All poses are in the body frame B; the hand frame H is the last arm link, x along the fingers, y along the
-gripper's hinge. The chain is read from the robot's own URDF. The inverse is solved in closed form, every branch and no seeds, or by
-the solver that the robot's capabilities bring.
+gripper's hinge. The chain is read from the robot's own URDF. The inverse is solved in closed form, every branch and no
+seeds, or by the solver that the robot's capabilities bring.
 """
 
 from __future__ import annotations

@@ -57,10 +57,8 @@ def main():
         plant = plant_factor(options.seed)
         rounds.append((stack, shown, plant, stack / plant))
         print(f"round {number + 1}: mission {stack:.2f}, recorded and shown {shown:.2f}, plant alone {plant:.2f}")
-    medians = [statistics.median(column) for column in zip(*rounds, strict=True)]
-    print(
-        "median: mission {:.2f}, recorded and shown {:.2f}, plant alone {:.2f}, mission / plant {:.2f}".format(*medians)
-    )
+    stack, shown, plant, ratio = (statistics.median(column) for column in zip(*rounds, strict=True))
+    print(f"median: mission {stack:.2f}, recorded and shown {shown:.2f}, plant alone {plant:.2f}, ratio {ratio:.2f}")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import math
 from typing import TypeVar
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from skills.robot import FloatArray, Pose2D
@@ -51,12 +52,5 @@ def inside_polygon(
     xy: FloatArray, polygon: tuple[tuple[float, float], ...], margin_m: float = 0.0
 ) -> NDArray[np.bool_]:
     """Which rows of xy (N, 2) lie in a convex polygon grown by margin_m; corners in either order."""
-    corners = np.asarray(polygon, dtype=float)
-    edges = np.roll(corners, -1, axis=0) - corners
-    area = float(np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - np.roll(corners[:, 0], -1) * corners[:, 1]))
-    lengths = np.linalg.norm(edges, axis=1)
-    keep = np.ones(len(xy), dtype=bool)
-    for corner, edge, length in zip(corners, edges, lengths, strict=True):
-        offset = edge[0] * (xy[:, 1] - corner[1]) - edge[1] * (xy[:, 0] - corner[0])
-        keep &= np.sign(area) * offset / max(float(length), 1e-9) > -margin_m
-    return keep
+    grown = shapely.Polygon(polygon).buffer(margin_m, join_style="mitre", mitre_limit=100.0)
+    return np.asarray(shapely.contains_xy(grown, xy))

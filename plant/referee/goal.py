@@ -6,6 +6,8 @@ import enum
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import shapely
+
 
 class GoalKind(enum.Enum):
     """What is to have happened, or to be so at the end."""
@@ -37,16 +39,7 @@ class Region:
     def contains(self, p_W: Iterable[float]) -> bool:
         """Whether a point (x, y, z) in the world lies inside."""
         x, y, z = p_W
-        return self.z_min_m <= z <= self.z_max_m and _inside(self.polygon_W, x, y)
-
-
-def _inside(polygon: tuple[tuple[float, float], ...], x: float, y: float) -> bool:
-    """Whether (x, y) lies in the polygon: a ray to the right crosses its outline an odd number of times."""
-    inside = False
-    for (x1, y1), (x2, y2) in zip(polygon, polygon[1:] + polygon[:1], strict=True):
-        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) * (x2 - x1) / (y2 - y1):
-            inside = not inside
-    return inside
+        return self.z_min_m <= z <= self.z_max_m and bool(shapely.contains_xy(shapely.Polygon(self.polygon_W), x, y))
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Where the seed puts things and people: pure functions of a world and a seed."""
+"""Where the seed puts objects and people: pure functions of a world and a seed."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import shapely
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.models.catalogue import ModelClass, load_catalogue
@@ -20,7 +21,7 @@ _OBJECT_STREAM, _PEOPLE_STREAM = 1, 2
 
 @dataclass(frozen=True)
 class Placement:
-    """A model in the world: X_WO is its pose at the start. Loose things rest on `surface`; people are welded."""
+    """A model in the world: X_WO is its pose at the start. Loose objects rest on `surface`; people are welded."""
 
     name: str
     class_name: str
@@ -73,7 +74,7 @@ def _place(
         for centre, yaw in _candidates(world, surface, rng):
             outline = outline_W(model, centre, yaw)
             inside = _inside(outline, surface.polygon_W, rules.rim_m)
-            if inside and all(_apart(outline, other, rules.clear_m) for other in obstacles):
+            if inside and all(polygon_distance(outline, other) >= rules.clear_m for other in obstacles):
                 z = surface.height_m + model.rest_height_m + rules.drop_m
                 X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z], dtype=np.float64))
                 return Placement(rule.name, rule.model, model.path(), X_WO, name), outline
@@ -117,41 +118,9 @@ def outline_W(model: ModelClass, centre: Point, yaw_rad: float) -> FloatArray:
 
 def _inside(outline: FloatArray, polygon: Polygon, rim_m: float) -> bool:
     """True when a convex polygon holds all corners at least rim_m from its edges."""
-    corners = np.array(polygon)
-    edges = np.roll(corners, -1, axis=0) - corners
-    area = np.sum(corners[:, 0] * np.roll(corners[:, 1], -1) - corners[:, 1] * np.roll(corners[:, 0], -1))
-    normals = np.sign(area) * np.stack([-edges[:, 1], edges[:, 0]], axis=1)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    depth = np.einsum("ek,pek->pe", normals, outline[:, None, :] - corners[None, :, :])
-    return bool(np.all(depth >= rim_m))
-
-
-def _apart(a: FloatArray, b: FloatArray, least_m: float) -> bool:
-    """Whether two convex polygons are that far apart, which mostly the upright boxes about them tell already."""
-    gaps = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
-    return bool(gaps.max() >= least_m) or polygon_distance(a, b) >= least_m
+    return bool(shapely.Polygon(polygon).buffer(-rim_m).covers(shapely.Polygon(outline)))
 
 
 def polygon_distance(a: FloatArray, b: FloatArray) -> float:
-    """Distance between two convex polygons (m), 0 when they overlap."""
-    if _overlap(a, b):
-        return 0.0
-    return min(_corners_to_edges(a, b), _corners_to_edges(b, a))
-
-
-def _overlap(a: FloatArray, b: FloatArray) -> bool:
-    """Separating axis test."""
-    for polygon in (a, b):
-        edges = np.roll(polygon, -1, axis=0) - polygon
-        for normal in np.stack([-edges[:, 1], edges[:, 0]], axis=1):
-            from_a, from_b = a @ normal, b @ normal
-            if from_a.max() < from_b.min() or from_b.max() < from_a.min():
-                return False
-    return True
-
-
-def _corners_to_edges(points: FloatArray, polygon: FloatArray) -> float:
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    offset = points[:, None, :] - polygon[None, :, :]
-    along = np.clip(np.sum(offset * edges, axis=-1) / np.sum(edges**2, axis=-1), 0.0, 1.0)
-    return float(np.min(np.linalg.norm(offset - along[..., None] * edges, axis=-1)))
+    """Distance between two polygons (m), 0 when they overlap."""
+    return float(shapely.distance(shapely.Polygon(a), shapely.Polygon(b)))

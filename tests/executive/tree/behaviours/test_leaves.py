@@ -41,7 +41,10 @@ def test_a_pause_lasts_on_the_robots_clock(context, clock):
 
 
 def near_plan(context, within_m):
-    tops = [Surface("far", ((3.0, 0.0), (4.0, 0.0), (4.0, 1.0)), 0.9), Surface("near", ((1.0, -1.0), (1.0, 1.0)), 0.9)]
+    tops = [
+        Surface("far", ((3.0, 0.0), (4.0, 0.0), (4.0, 1.0)), 0.9),
+        Surface("near", ((1.0, -1.0), (2.0, 0.0), (1.0, 1.0)), 0.9),
+    ]
     return SurfacesNear(
         path_id="alice/n", name="n", surfaces=tops, within_m=within_m, key="alice/near", otherwise="so what",
         context=context,

@@ -29,8 +29,8 @@ from plant.worlds.placement import Placement, place_objects, place_people
 from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 
-CONTROL_PERIOD_S = 0.0125
-CONTROL_PERIOD_STEPS = 2
+STEP_S = 0.0125
+CONTROL_STEPS = 2
 SLEEP_PERIOD_STEPS = 4
 REFEREE_PERIOD_STEPS = 4
 SETTLING_S = 1.5
@@ -93,23 +93,23 @@ class Engine:
         return self._sleepers.asleep
 
     def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
-        """Call `observer(now_s)` after every control period, or every so many."""
+        """Call `observer(now_s)` after every step, or every so many."""
         self._observers.append((every, observer))
 
     def now(self) -> float:
         """Simulated seconds since the start."""
-        return self._steps * CONTROL_PERIOD_S
+        return self._steps * STEP_S
 
     def advance(self, dt_s: float) -> None:
-        """Step the plant by dt_s, rounded to whole control periods (at least one)."""
-        for _ in range(max(1, round(dt_s / CONTROL_PERIOD_S))):
+        """Step the plant by dt_s, rounded to whole steps (at least one)."""
+        for _ in range(max(1, round(dt_s / STEP_S))):
             if self._steps % SLEEP_PERIOD_STEPS == 0:
                 self._sleepers.update(self.now())
-            if self._steps % CONTROL_PERIOD_STEPS == 0:
+            if self._steps % CONTROL_STEPS == 0:
                 self._command_robots()
             self._steps += 1
             self._simulator.AdvanceTo(self.now(), interruptible=False)
-            self.work["plant_steps"] += round(CONTROL_PERIOD_S / self.world.plant.time_step())
+            self.work["plant_steps"] += round(STEP_S / self.world.plant.time_step())
             for every, observer in self._observers:
                 if self._steps % every == 0:
                     observer(self.now())
@@ -151,7 +151,7 @@ class Engine:
 
     def _command_robots(self) -> None:
         for spot in self._spots.values():
-            spot.control(self.now(), CONTROL_PERIOD_STEPS * CONTROL_PERIOD_S)
+            spot.control(self.now(), CONTROL_STEPS * STEP_S)
 
 
 class Simulation:

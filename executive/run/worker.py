@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
@@ -62,11 +63,39 @@ class _Thread:
         self._work.put(None)
 
 
+class _NoCollection:
+    """Keeps the process's garbage collector still while any worker is busy.
+
+    It runs in whichever thread allocates, and what it finds may be an earlier run's renderer, whose graphics context
+    belongs to the main thread: freed by a worker it aborts the process.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._busy, self._enabled = threading.Lock(), 0, True
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._busy == 0:
+                self._enabled = gc.isenabled()
+                gc.disable()
+            self._busy += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._busy -= 1
+            if self._busy == 0 and self._enabled:
+                gc.enable()
+
+
+_NO_COLLECTION: Final = _NoCollection()  # one, since a process has one collector
+
+
 def _work_off(given: SimpleQueue[_Work | None]) -> None:
     for work, future in iter(given.get, None):
-        if future.set_running_or_notify_cancel():
-            fulfil(future, work)
-        del work, future
+        with _NO_COLLECTION:
+            if future.set_running_or_notify_cancel():
+                fulfil(future, work)
+            del work, future
 
 
 def fulfil(future: Future[ResultT], work: Callable[[], ResultT]) -> None:

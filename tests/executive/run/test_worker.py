@@ -1,5 +1,6 @@
 """The lock-step worker and the thread worker."""
 
+import gc
 import threading
 import time
 
@@ -126,3 +127,30 @@ def test_thread_worker_does_not_block_and_raises_later():
     with pytest.raises(ZeroDivisionError):
         bad.result()
     worker.close()
+
+
+class Cycle:
+    """Garbage that only the collector finds; it notes in which thread it goes."""
+
+    def __init__(self, threads):
+        self.itself, self.threads = self, threads
+
+    def __del__(self):
+        self.threads.append(threading.current_thread().name)
+
+
+def test_garbage_is_never_collected_in_a_job(worker, clock):
+    threads = []
+    for _ in range(50):
+        Cycle(threads)
+    enabled = gc.isenabled()
+    job = worker.submit(lambda: (gc.isenabled(), [[] for _ in range(50_000)])[0], latency_s=0.1, name="allocate")
+    clock.advance(0.1)
+    assert job.result() is False
+    job.withdraw()
+    worker.submit(lambda: None, latency_s=0.0, name="after")
+    worker.close()
+    gc.collect()
+    assert gc.isenabled() is enabled
+    assert len(threads) == 50
+    assert set(threads) == {threading.current_thread().name}

@@ -21,12 +21,12 @@ import numpy as np
 
 from executive.record.reader import read_events
 from executive.store.resuming import told_before
+from plant.simulation import STEP_S
 from plant.snapshot.file import SnapshotError, read_snapshot
 
 FETCH = ("Hey Alice, can you fetch me a drink from the kitchen", 50.0)
 TIDY = ("Hey Alice, take a drink from the kitchen to the sideboard", 60.0)
 MISSIONS = (FETCH, TIDY)
-STEP_S = 0.01
 
 
 @dataclass(frozen=True)

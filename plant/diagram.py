@@ -70,13 +70,12 @@ def build_diagram(
     carried: bool = True,
     locomotion: FloatingBaseLimits | None = None,
     render: bool = True,
-    time_step_s: float = TIME_STEP_S,
     renderer_parameters: RenderEngineVtkParams | None = None,
     meshcat: Meshcat | None = None,
 ) -> WorldDiagram:
     """A Diagram of the directives' world (or an empty one) with models and robots.
 
-    SAP contact at `time_step_s`; sampled outputs, which would double the cost of a step, are off, so that evaluating
+    SAP contact at `TIME_STEP_S`; sampled outputs, which would double the cost of a step, are off, so that evaluating
     contact results solves once more. Positions of the models are defaults, the robots' are set by the caller.
     `renderer_parameters` set light and sky; `meshcat` shows the world there.
     `visuals` draws Spot with meshes where they are installed; `render` makes the scene for cameras. `locomotion` limits
@@ -91,11 +90,10 @@ def build_diagram(
         carried=carried,
         locomotion=locomotion,
         render=False,
-        time_step_s=time_step_s,
     )
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(
-        time_step=time_step_s, discrete_contact_approximation="sap", use_sampled_output_ports=False
+        time_step=TIME_STEP_S, discrete_contact_approximation="sap", use_sampled_output_ports=False
     )
     plant, scene_graph = AddMultibodyPlant(config, builder)
     parser = parser_of(plant)

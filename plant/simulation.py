@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from plant.diagram import LooseModel, WorldDiagram, build_diagram
+from plant.diagram import TIME_STEP_S, LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
 from plant.locomotion.floating_base import FloatingBaseLimits
 from plant.recording import Recorder, View, save_html
@@ -29,7 +29,6 @@ from plant.worlds.placement import Placement, place_objects, place_people
 from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 
-STEP_S = 0.0125
 CONTROL_STEPS = 2
 SLEEP_PERIOD_STEPS = 4
 REFEREE_PERIOD_STEPS = 4
@@ -98,18 +97,18 @@ class Engine:
 
     def now(self) -> float:
         """Simulated seconds since the start."""
-        return self._steps * STEP_S
+        return self._steps * TIME_STEP_S
 
     def advance(self, dt_s: float) -> None:
         """Step the plant by dt_s, rounded to whole steps (at least one)."""
-        for _ in range(max(1, round(dt_s / STEP_S))):
+        for _ in range(max(1, round(dt_s / TIME_STEP_S))):
             if self._steps % SLEEP_PERIOD_STEPS == 0:
                 self._sleepers.update(self.now())
             if self._steps % CONTROL_STEPS == 0:
                 self._command_robots()
             self._steps += 1
-            self._simulator.AdvanceTo(self.now(), interruptible=False)
-            self.work["plant_steps"] += round(STEP_S / self.world.plant.time_step())
+            self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
+            self.work["plant_steps"] += 1
             for every, observer in self._observers:
                 if self._steps % every == 0:
                     observer(self.now())
@@ -151,7 +150,7 @@ class Engine:
 
     def _command_robots(self) -> None:
         for spot in self._spots.values():
-            spot.control(self.now(), CONTROL_STEPS * STEP_S)
+            spot.control(self.now(), CONTROL_STEPS * TIME_STEP_S)
 
 
 class Simulation:

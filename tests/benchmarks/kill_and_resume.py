@@ -21,7 +21,7 @@ import numpy as np
 
 from executive.record.reader import read_events
 from executive.store.resuming import told_before
-from plant.simulation import STEP_S
+from plant.diagram import TIME_STEP_S
 from plant.snapshot.file import SnapshotError, read_snapshot
 
 FETCH = ("Hey Alice, can you fetch me a drink from the kitchen", 50.0)
@@ -73,7 +73,7 @@ def _kill_at(process: subprocess.Popen[bytes], plant: Path, moment_s: float) -> 
     """Kill the process when its plant's clock has come to the moment; False when it ended before."""
     while process.poll() is None:
         try:
-            now_s = read_snapshot(plant).values["engine"]["steps"] * STEP_S
+            now_s = read_snapshot(plant).values["engine"]["steps"] * TIME_STEP_S
         except SnapshotError:
             now_s = 0.0
         if now_s >= moment_s:

@@ -11,7 +11,7 @@ import pytest
 
 from executive.record.reader import read_events
 from executive.store.resuming import told_before
-from plant.simulation import STEP_S
+from plant.diagram import TIME_STEP_S
 from plant.snapshot.file import SnapshotError, read_snapshot
 
 ERRAND = (sys.executable, "-m", "executive.cli")
@@ -32,7 +32,7 @@ def kill_in(leaf: str, after_s: float, process: subprocess.Popen, out: Path) -> 
 
 def clock_s(out: Path) -> float:
     try:
-        return read_snapshot(out / "missions.plant").values["engine"]["steps"] * STEP_S
+        return read_snapshot(out / "missions.plant").values["engine"]["steps"] * TIME_STEP_S
     except SnapshotError:
         return 0.0
 

@@ -66,11 +66,11 @@ class Draft:
 
     def shell(self, part: Mesh, density: float, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> None:
         """Add a part that is a thin shell."""
-        placed = self.look(part, R, p)
+        placed = self.visual(part, R, p)
         self._bodies.append(shell_mass(placed, density))
         self._collide(placed)
 
-    def look(self, part: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> Mesh:
+    def visual(self, part: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> Mesh:
         """Add a part that weighs nothing; the part as placed."""
         placed = Mesh(self.materials)
         placed.add_mesh(part, R, p)

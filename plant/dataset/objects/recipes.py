@@ -206,7 +206,7 @@ class _Assembly:
             elif part.shell is not None:
                 self.draft.shell(mesh, self._number(part.shell, names), R, p)
             else:
-                self.draft.look(mesh, R, p)
+                self.draft.visual(mesh, R, p)
 
     def _lathe(self, material: str, part: Part, names: Names, mesh: Mesh) -> Mesh:
         """Turn the profile about z; `bands` of heights have materials of their own. Returns the closed body."""

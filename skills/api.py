@@ -322,6 +322,8 @@ class Skill(ABC, Generic[InputsT]):
     ports and their types; `causes` documents which failures it gives and when. `default_timeout_s` counts the
     robot's clock. `checkpoint` holds what a later `resume` needs beyond the inputs, as JSON values; it is kept durably.
     `changes_world` marks what must not be done twice: after a restart such a skill is told to `resume` and looks first.
+    `gripper_before` says whether the gripper has to hold something (False: to be empty) when it begins, `gripper_after`
+    whether it does when it has succeeded; None: it does not matter, and nothing changes.
     `Options` is a frozen dataclass of what a stack file may set of the skill, all with defaults.
     `max_data_age_s` says how old (s) the data may be on which a success rests, by name: a sense verb (not `image`),
     "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.
@@ -334,6 +336,8 @@ class Skill(ABC, Generic[InputsT]):
     default_timeout_s: ClassVar[float] = 60.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {}
     changes_world: ClassVar[bool] = False
+    gripper_before: ClassVar[bool | None] = None
+    gripper_after: ClassVar[bool | None] = None
     Options: ClassVar[type] = NoOptions
     checkpoint: Mapping[str, Any] = MappingProxyType({})
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from functools import cache
 from pathlib import Path
 
-from executive.cli.goal_conditions import conditions_of
+from executive.cli.goal_conditions import verdict_of
 from executive.mission.errors import InputError
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
@@ -23,6 +24,7 @@ from skills.stack import DetectorComponent, RobotStack, default_stack
 
 def simulate(world: World, *, seed: int, robot_name: str, record: bool, stack: RobotStack | None = None) -> Simulation:
     """The plant of a world, things set by the seed. Raises InputError when they do not fit into it."""
+    logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
     locomotion = (stack or default_stack()).locomotion
     try:
         return Simulation(world, seed=seed, robot_names=(robot_name,), record=record, locomotion=locomotion)
@@ -86,5 +88,4 @@ def take_up_plant(simulation: Simulation, path: Path, *, label: str | None) -> N
 
 def judge(simulation: Simulation, tree: CompiledTree, result: RobotResult) -> Verdict:
     """What the referee says of the mission's goal conditions."""
-    verdict: Verdict = simulation.referee.judge(conditions_of(tree, result))
-    return verdict
+    return verdict_of(tree, result, simulation.referee.judge)

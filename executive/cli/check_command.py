@@ -11,15 +11,14 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from executive.cli.feasibility import abilities_of, route_planner_of
+from executive.cli.feasibility import check_prepared, route_planner_of
 from executive.cli.output import BAD_INPUT, console_for, print_json
 from executive.cli.requests import prepare
 from executive.cli.stack_command import STACK
 from executive.mission.errors import InputError
 from executive.mission.request import Request
-from executive.tree.check import check_tree
 from executive.tree.compiler import CompiledTree
-from executive.tree.estimate import Estimate, RoutePlanner, load_estimates
+from executive.tree.estimate import Estimate, RoutePlanner
 from executive.tree.node_view import node_view
 from executive.view.collapse import folded_to
 from executive.view.text import to_rich
@@ -58,18 +57,11 @@ class Checker:
         """Check one file; raises nothing for what stands in it."""
         tree: CompiledTree | None = None
         try:
-            prepared = prepare(Request(file=file, world=self._world), ask=None)
+            prepared = prepare(Request(file=file, world=self._world, stack=self._stack), ask=None)
             tree, world = prepared.tree, prepared.world
             if world.folder not in self._routes:
                 self._routes[world.folder] = route_planner_of(world, self._stack)
-            checked = check_tree(
-                tree,
-                knowledge=prepared.knowledge,
-                start=world.start,
-                abilities=abilities_of(),
-                planner=self._routes[world.folder],
-                estimates=load_estimates(),
-            )
+            checked = check_prepared(prepared, self._routes[world.folder])
         except InputError as error:
             return CheckedFile(file, _placed(file, (error, *error.others)), tree)
         return CheckedFile(file, _placed(file, checked.errors), tree, checked.estimate)

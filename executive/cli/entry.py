@@ -5,7 +5,6 @@ Help and start-up would otherwise import the plant, the sentence parser and the 
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -95,7 +94,6 @@ def _errand() -> None:
 
 def main() -> None:
     """The entry point of the console script."""
-    logging.getLogger("drake").setLevel(logging.WARNING)
     app()
 
 

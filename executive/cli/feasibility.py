@@ -6,11 +6,12 @@ from functools import cache, cached_property
 from pathlib import Path
 from xml.etree import ElementTree
 
+from executive.cli.requests import Prepared
 from executive.cli.route_cache import RouteCache, route_cache_of
-from executive.mission.errors import InputError
+from executive.mission.errors import InputError, Problems
 from executive.mission.stack_file import load_stack
-from executive.tree.check import Abilities, PlannedRoutes
-from executive.tree.estimate import Route, RoutePlanner
+from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
+from executive.tree.estimate import Route, RoutePlanner, load_estimates
 from plant.models.catalogue import load_catalogue
 from plant.models.spot.description import FACTS
 from plant.spot.capabilities import spot_capabilities
@@ -61,6 +62,31 @@ def route_planner_of(world: World, stack_file: Path | None = None) -> RouteCache
     stack = None if stack_file is None else load_stack(stack_file)
     files = (FACTS,) if stack_file is None else (FACTS, stack_file)
     return route_cache_of(world, _RoutesOnMap(world, stack), *files)
+
+
+def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> Checked:
+    """What speaks against a request that was understood, and what it takes; `planner` is one that knows routes.
+
+    Raises:
+        InputError: the world's map or the request's stack file cannot be used.
+    """
+    world = prepared.world
+    return check_tree(
+        prepared.tree,
+        knowledge=prepared.knowledge,
+        start=world.start,
+        abilities=abilities_of(),
+        planner=planner or route_planner_of(world, prepared.request.stack),
+        estimates=load_estimates(),
+    )
+
+
+def refuse_impossible(prepared: Prepared) -> None:
+    """Raise InputError for all that `errand check` finds, before anything moves."""
+    problems = Problems()
+    for error in check_prepared(prepared).errors:
+        problems.add(error)
+    problems.raise_any()
 
 
 @cache

@@ -2,25 +2,64 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from executive.mission.errors import listing
 from executive.mission.goal import Area, GoalCondition
-from executive.run.outcome import RobotResult
-from executive.tree.compiler import CompiledTree
+from executive.run.outcome import Outcome, RobotResult
+from executive.tree.compiler import CompiledTree, StepPart
 from plant import referee
+
+
+def verdict_of(
+    tree: CompiledTree, result: RobotResult, judge: Callable[[Sequence[referee.GoalCondition]], referee.Verdict]
+) -> referee.Verdict:
+    """The verdict on a tree that has run; `judge` is the referee's, on the goal conditions.
+
+    A run that did not end with success has not fulfilled its mission, whatever holds. One with a step that has no goal
+    condition is not judged, unless a condition of another step does not hold.
+    """
+    verdict = judge(conditions_of(tree, result))
+    without = [part for part in _done(tree, result) if part.goal is None]
+    if result.outcome is not Outcome.SUCCESS:
+        return replace(
+            verdict, success=False, why=_joined(f"The mission ended with {result.outcome.value}.", verdict.why)
+        )
+    if verdict.success is False or not (without or verdict.success is None):
+        return verdict
+    names = {node.path_id: node.name for node in tree.root.walk()}
+    steps = listing(dict.fromkeys(names.get(part.path_id, part.path_id) for part in without))
+    missing = f"No goal condition stands for {steps}." if without else "There are no goal conditions."
+    return replace(verdict, success=None, why=_joined(missing, verdict.why))
 
 
 def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.GoalCondition, ...]:
     """The goal conditions of a tree that has run: of all its parts but those that its own result tells were skipped.
 
-    A count is one condition, however many trips it takes; an answer belongs to the check that gave it.
+    A count is one condition, however many trips it takes; an answer belongs to the check that gave it; what comes
+    before a step without condition needs to have been so at some time only.
     """
     found: list[referee.GoalCondition] = []
-    for part in tree.parts:
-        if part.goal is None or part.was_skipped({path: state.status for path, state in result.states.items()}):
+    parts = _done(tree, result)
+    for n, part in enumerate(parts):
+        if part.goal is None:
             continue
         below = f"{part.path_id}/"
         answers = (answer for path, answer in result.answers.items() if f"{path}/".startswith(below))
-        found.append(condition_of(part.goal, robot=tree.robot_name, answer=next(answers, None)))
+        condition = condition_of(part.goal, robot=tree.robot_name, answer=next(answers, None))
+        found.append(replace(condition, passing=any(later.goal is None for later in parts[n + 1 :])))
     return tuple(found)
+
+
+def _done(tree: CompiledTree, result: RobotResult) -> list[StepPart]:
+    """The parts that were not skipped."""
+    statuses = {path: state.status for path, state in result.states.items()}
+    return [part for part in tree.parts if not part.was_skipped(statuses)]
+
+
+def _joined(*sentences: str) -> str:
+    return " ".join(filter(None, sentences))
 
 
 def condition_of(condition: GoalCondition, *, robot: str, answer: bool | None) -> referee.GoalCondition:
@@ -32,6 +71,7 @@ def condition_of(condition: GoalCondition, *, robot: str, answer: bool | None) -
         source=tuple(map(_region, condition.source)),
         goal=tuple(map(_region, condition.goal)),
         person=condition.person,
+        wanted=condition.wanted,
         answer=answer,
         robot=robot,
     )

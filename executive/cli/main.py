@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from executive.cli.durable import STORE, give_up_broken, kept, new_run, run_arguments
+from executive.cli.feasibility import refuse_impossible
 from executive.cli.listen_command import hear_request
 from executive.cli.mission_run import Finished
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
@@ -37,6 +38,7 @@ Questions = Annotated[
     typer.Option(help="What becomes of other questions; asked at a terminal, else refused, unless a file says."),
 ]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
+Anyway = Annotated[bool, typer.Option("--anyway", help="Begin although `errand check` would refuse it.")]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 PageOf = Callable[[Prepared], PageView | None]
 
@@ -57,6 +59,7 @@ def run(
     profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: Store = None,
     stack: STACK = None,
+    anyway: Anyway = False,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
     view_port: Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0 takes a free one.")] = 0,
@@ -75,7 +78,9 @@ def run(
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=not no_wake, console=console)
         asked = Request(say, file, world, not no_wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
-        finished, page = _run_kept(asked, kept_in, quiet=quiet, console=console, page=page_of, profile=timing)
+        finished, page = _run_kept(
+            asked, kept_in, anyway=anyway, quiet=quiet, console=console, page=page_of, profile=timing
+        )
     if timing is not None:
         for line in lines(timing.table()):
             console.print(line, markup=False)
@@ -97,6 +102,7 @@ def evaluate(
     answer: Answer = None,
     questions: Questions = None,
     stack: STACK = None,
+    anyway: Anyway = False,
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
     as_json: AsJson = False,
 ) -> None:
@@ -104,7 +110,8 @@ def evaluate(
     with refusals():
         chosen = seed_range(seeds)
         asked = Request(say, file, world, not no_wake, tuple(answer or ()), questions, stack=stack)
-        arguments = run_arguments(asked, prepare(asked))
+        prepared = _prepared(asked, anyway=anyway)
+        arguments = run_arguments(asked, prepared)
     console = console_for(as_json)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as bar:
@@ -119,15 +126,23 @@ def evaluate(
     console.print(f"{len(reports)} runs: {counts}")
     if as_json:
         print_json(result)
-    if result["referee_successes"] < len(reports) or result["false_claims"]:
+    if not all(report.achieved for report in reports):
         raise typer.Exit(NOT_ACHIEVED)
 
 
+def _prepared(asked: Request, *, anyway: bool) -> Prepared:
+    """The request understood, and refused where it cannot be done. Raises InputError."""
+    prepared = prepare(asked)
+    if not anyway:
+        refuse_impossible(prepared)
+    return prepared
+
+
 def _run_kept(
-    asked: Request, store: Path, *, quiet: bool, console: Console, page: PageOf, profile: Profile | None
+    asked: Request, store: Path, *, anyway: bool, quiet: bool, console: Console, page: PageOf, profile: Profile | None
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
-    prepared = prepare(asked)
+    prepared = _prepared(asked, anyway=anyway)
     shown = page(prepared)
     with MissionStore(store) as missions, missions.claimed():
         mission = missions.add(prepared.request.from_anywhere(), queued=False)

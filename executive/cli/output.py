@@ -30,9 +30,10 @@ def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:
 
 @contextmanager
 def refusals() -> Iterator[None]:
-    """Bad input becomes one line on standard error and exit status 2."""
+    """Bad input becomes one line on standard error for each error, and exit status 2."""
     try:
         yield
     except InputError as error:
-        typer.echo(f"errand: {error}", err=True)
+        for each in (error, *error.others):
+            typer.echo(f"errand: {each}", err=True)
         raise typer.Exit(BAD_INPUT) from error

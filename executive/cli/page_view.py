@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Console
 
 from executive.cli.backend import Scene
+from executive.cli.feasibility import refuse_impossible
 from executive.cli.replay_command import served, wait
 from executive.cli.requests import Prepared, prepare
 from executive.cli.talk import conversation_of, load_ahead
@@ -109,7 +110,9 @@ def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], s
 
     def later(sentence: str) -> str:
         asked = Request(sentence, world=before.world or before.world_name, seed=before.seed, out=out)
-        request = prepare(asked).request.from_anywhere()
+        prepared = prepare(asked)
+        refuse_impossible(prepared)
+        request = prepared.request.from_anywhere()
         with MissionStore(store) as missions:
             number = missions.add(request, queued=True).id
         return f"queued as mission {number}: {'; '.join(request.commands)} (errand queue run --out {out})"

@@ -38,6 +38,7 @@ def add(
     out: Out = Path("out"),
     store: Store = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
+    anyway: Annotated[bool, typer.Option("--anyway", help="Queue it although `errand check` would refuse it.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Queue a sentence or a mission file, checked."""
@@ -46,7 +47,12 @@ def add(
         asked = Request(
             say, file, world, require_wake=not no_wake, seed=seed, out=out, record=not no_record, stack=stack
         )
-        request = prepare(asked).request.from_anywhere()
+        prepared = prepare(asked)
+        if not anyway:
+            from executive.cli.feasibility import refuse_impossible
+
+            refuse_impossible(prepared)
+        request = prepared.request.from_anywhere()
         with MissionStore(store or out / STORE) as missions:
             mission = missions.add(request, queued=True)
     console_for(as_json).print(f"Mission {mission.id} is queued: {request.name}", markup=False)

@@ -11,16 +11,20 @@ from rich.markup import escape
 
 @dataclass(frozen=True)
 class RefereeReport:
-    """The referee's verdict with its counts, and one sentence for each lift, drop and bump."""
+    """The referee's verdict with its counts, and one sentence for each lift, drop and bump.
 
-    success: bool
+    `success` is None when the referee has not judged all that was asked for.
+    """
+
+    success: bool | None
     why: str
     collisions: int
     drops: int
     events: tuple[str, ...] = ()
 
 
-NOT_JUDGED: Final = RefereeReport(False, "there is no referee", 0, 0)
+NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)
+VERDICTS: Final[Mapping[bool | None, str]] = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
 
 
 @dataclass(frozen=True)
@@ -52,18 +56,18 @@ class RunReport:
 
     @property
     def achieved(self) -> bool:
-        """The tree says so, and the referee agrees where there is one."""
-        return self.claimed and (self.referee is None or self.referee.success)
+        """The tree says so, and no referee denies it."""
+        return self.claimed and self.seen.success is not False
 
     @property
     def seen(self) -> RefereeReport:
-        """What the referee saw: nothing where there is none."""
+        """What the referee saw: nothing judged where there is none."""
         return self.referee or NOT_JUDGED
 
     @property
     def false_claim(self) -> bool:
-        """The tree says so and the referee does not agree."""
-        return self.claimed and not self.achieved
+        """The tree says so and the referee denies it."""
+        return self.claimed and self.seen.success is False
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values; the referee's events are for people only."""
@@ -89,14 +93,14 @@ class RunReport:
         claims = f"[bold]The tree claims:[/bold] {_mark(self.claimed)} {self.outcome}{cause}: {escape(self.message)}"
         if self.referee is None:
             return claims, figures
-        seen = "the mission is fulfilled" if self.referee.success else "the mission is not fulfilled"
+        verdict = f"{_mark(self.referee.success)} {VERDICTS[self.referee.success]}"
         return (
             claims,
-            f"[bold]The referee saw:[/bold] {_mark(self.referee.success)} {seen}: {escape(self.referee.why)}",
+            f"[bold]The referee saw:[/bold] {verdict}: {escape(self.referee.why)}",
             f"{self.referee.collisions} collisions, {self.referee.drops} drops; {figures}",
             *(escape(f"  {event}") for event in self.referee.events),
         )
 
 
-def _mark(good: bool) -> str:
-    return "[green]✓[/green]" if good else "[red]✗[/red]"
+def _mark(good: bool | None) -> str:
+    return {True: "[green]✓[/green]", False: "[red]✗[/red]", None: "[yellow]?[/yellow]"}[good]

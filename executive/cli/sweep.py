@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from executive.cli.report import RefereeReport, RunReport
+from executive.cli.report import VERDICTS, RefereeReport, RunReport
 from executive.mission.errors import InputError
 
 
@@ -37,7 +37,7 @@ def _span(part: str) -> range:
 def sweep(
     arguments: Sequence[str], seeds: Sequence[int], *, jobs: int, out: Path, done: Callable[[RunReport], None]
 ) -> tuple[RunReport, ...]:
-    """Run `errand run ARGUMENTS` for each seed; `done` is called as each ends. In the order of the seeds."""
+    """Run `errand run ARGUMENTS` for each seed, unchecked; `done` is called as each ends. In the order of the seeds."""
     with ThreadPoolExecutor(max_workers=jobs) as pool:
         futures = {pool.submit(_run_one, tuple(arguments), seed, out / f"seed-{seed:03d}"): seed for seed in seeds}
         try:
@@ -54,7 +54,7 @@ def _told(report: RunReport, done: Callable[[RunReport], None]) -> RunReport:
 
 
 def _run_one(arguments: tuple[str, ...], seed: int, out: Path) -> RunReport:
-    own = ("--seed", str(seed), "--out", str(out), "--json", "--quiet", "--no-record")
+    own = ("--seed", str(seed), "--out", str(out), "--json", "--quiet", "--no-record", "--anyway")
     command = [sys.executable, "-m", "executive.cli", "run", *arguments, *own]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     last = ended.stdout.strip().rpartition("\n")[2]
@@ -88,7 +88,7 @@ def totals(reports: Sequence[RunReport]) -> dict[str, Any]:
     return {
         "runs": [report.to_json() for report in reports],
         "successes": sum(report.claimed for report in reports),
-        "referee_successes": sum(report.seen.success for report in reports),
+        "referee_successes": sum(report.seen.success is True for report in reports),
         "false_claims": sum(report.false_claim for report in reports),
     }
 
@@ -99,7 +99,7 @@ def rows(reports: Sequence[RunReport]) -> Iterator[tuple[str, ...]]:
         yield (
             str(report.seed),
             report.outcome,
-            "yes" if report.seen.success else "no",
+            VERDICTS[report.seen.success],
             str(report.seen.collisions),
             str(report.seen.drops),
             f"{report.sim_time_s:.1f}",

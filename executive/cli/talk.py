@@ -6,6 +6,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import replace
 
+from executive.cli.feasibility import refuse_impossible
 from executive.cli.requests import Prepared
 from executive.conversation import Conversation, Speech
 from executive.language import Understanding, load_parser, understand
@@ -47,8 +48,10 @@ def _understood(text: str, memory: Memory | None, prepared: Prepared) -> Underst
 
 
 def _compiled(commands: Sequence[Command], taken: frozenset[str], prepared: Prepared) -> CompiledTree:
-    """The tree of a mission of these commands, under a name that is not taken. Raises InputError."""
+    """The tree of a mission of these commands, under a name that is not taken. Raises InputError, as `check` does."""
     mission = mission_from_commands(commands, world=prepared.world.name, robot_name=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
-    return compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=installed_skills())
+    tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=installed_skills())
+    refuse_impossible(replace(prepared, tree=tree))
+    return tree

@@ -40,8 +40,8 @@ class Area:
 
 @dataclass(frozen=True)
 class GoalCondition:
-    """One condition. `classes` fulfil it, `count` of them; they come from a `source` area (none: anywhere) and they or
-    the robot go to a `goal` area; `person` is the one to be handed to (None: anyone)."""
+    """One condition. `classes` fulfil it, `count` of them, together called `wanted`; they come from a `source` area
+    (none: anywhere) and they or the robot go to a `goal` area; `person` is the one to be handed to (None: anyone)."""
 
     kind: GoalKind
     classes: tuple[str, ...] = ()
@@ -49,6 +49,7 @@ class GoalCondition:
     source: tuple[Area, ...] = ()
     goal: tuple[Area, ...] = ()
     person: str | None = None
+    wanted: str = ""
 
 
 def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition:
@@ -91,24 +92,25 @@ def _areas(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -
 
 def _grasped(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
     classes, areas = _classes(command.object, knowledge), _areas(command, knowledge, elsewhere)
-    return GoalCondition(GoalKind.GRASPED, classes, command.object_count, areas)
+    return GoalCondition(GoalKind.GRASPED, classes, command.object_count, areas, wanted=str(command.object))
 
 
 def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
     classes, areas = _classes(command.object, knowledge), _areas(command, knowledge, elsewhere)
-    return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, areas)
+    return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, areas, wanted=str(command.object))
 
 
 def _carried(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition:
-    classes, goal = _classes(command.item or command.object, knowledge), command.goal
+    item, goal = command.item or command.object, command.goal
     assert goal is not None
+    classes = _classes(item, knowledge)
     person = knowledge.person(goal)
     if goal == START or person is not None:
-        return GoalCondition(GoalKind.HANDED_OVER, classes, command.item_count, person=person)
+        return GoalCondition(GoalKind.HANDED_OVER, classes, command.item_count, person=person, wanted=str(item))
     place = knowledge.place(goal)
     assert place is not None
     goals = tuple(surface_area(knowledge, name) for name in knowledge.surfaces_in(place))
-    return GoalCondition(GoalKind.PLACED, classes, command.item_count, goal=goals)
+    return GoalCondition(GoalKind.PLACED, classes, command.item_count, goal=goals, wanted=str(item))
 
 
 def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from executive.mission.command import Task
 from executive.mission.errors import InputError, listing
+from executive.mission.gripper import UNNAMED, InGripper, after_command, cannot_take, objection
 from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
-from skills.api import Costmap, PlanningError
+from skills.api import Costmap, PlanningError, Skill
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import path_length
 from skills.robot import Pose2D
@@ -74,11 +76,37 @@ def check_tree(
     abilities: Abilities,
     planner: RoutePlanner,
     estimates: Estimates,
+    held: InGripper | None = None,
 ) -> Checked:
-    """Check a compiled mission that begins at `start`: are its objects there and light enough, its places in reach?"""
+    """Check a compiled mission that begins at `start` with `held` in the gripper: are its objects there and light
+    enough, its places in reach, and does the gripper hold in each step what that step needs?"""
     impossible = tuple(error for part in tree.parts for error in _impossible(part, tree, knowledge, abilities))
+    grasps = tuple(_gripper_errors(tree, knowledge, held))
     estimate, unreachable = estimate_tree(tree.root, start=start, planner=planner, estimates=estimates)
-    return Checked((*impossible, *unreachable), estimate)
+    return Checked((*impossible, *grasps, *unreachable), estimate)
+
+
+def _gripper_errors(tree: CompiledTree, knowledge: Knowledge, held: InGripper | None) -> Iterator[InputError]:
+    """The steps that need something else in the gripper than the steps before leave there."""
+    for part in tree.parts:
+        against = None
+        if part.command is not None:
+            against = objection(part.command, held, knowledge)
+            held = after_command(part.command, held, knowledge)
+        elif part.skill is not None:
+            against = _skill_objection(part.skill, held)
+            held = {None: held, True: UNNAMED, False: None}[part.skill.gripper_after]
+        if against is not None:
+            yield _at(part, tree, *against)
+
+
+def _skill_objection(skill: type[Skill[Any]], held: InGripper | None) -> tuple[str, str] | None:
+    """Why a skill cannot run with what is held, and a hint; None when it can."""
+    if skill.gripper_before is True and held is None:
+        return f"{skill.name} needs an object in the gripper, and no step before has grasped one", "grasp one first"
+    if skill.gripper_before is False and held is not None:
+        return cannot_take(held, "another object")
+    return None
 
 
 def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[InputError]:

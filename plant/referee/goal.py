@@ -46,10 +46,11 @@ class Region:
 class GoalCondition:
     """One goal condition.
 
-    `classes` are the object classes that fulfil it and `count` how many objects (0 counts as 1); `source` is where
-    they were to be taken from (empty: anywhere) or, for an answer, where was to be looked; `goal` where they or the
-    robot were to go (any of the regions); `person` the one to be handed to (None: anyone); `answer` what was said;
-    `robot` who was to do it (None: any).
+    `classes` are the object classes that fulfil it, `wanted` what they are called together (empty: the classes) and
+    `count` how many objects (0 counts as 1); `source` is where they were to be taken from (empty: anywhere) or, for an
+    answer, where was to be looked; `goal` where they or the robot were to go (any of the regions); `person` the one to
+    be handed to (None: anyone); `answer` what was said; `robot` who was to do it (None: any); with `passing` it is
+    enough that it was so at some time, since later steps may undo it.
     """
 
     kind: GoalKind
@@ -60,6 +61,8 @@ class GoalCondition:
     person: str | None = None
     answer: bool | None = None
     robot: str | None = None
+    wanted: str = ""
+    passing: bool = False
 
     @property
     def needed(self) -> int:
@@ -69,9 +72,10 @@ class GoalCondition:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the referee saw: whether all goal conditions hold, a sentence on each, and the counts of the whole run."""
+    """What the referee saw: whether all goal conditions hold (None: that was not judged), a sentence on each, and the
+    counts of the whole run."""
 
-    success: bool
+    success: bool | None
     why: str
     collisions: int
     drops: int

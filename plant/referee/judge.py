@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from plant.referee.goal import GoalCondition, GoalKind, Region, Verdict
-from plant.referee.object_history import ObjectHistory
+from plant.referee.object_history import Lift, ObjectHistory
 from skills.robot import FloatArray
 
 REACH_OF_PERSON_M = 1.0
 OFFER_HEIGHT_M = 0.4
+NAMED_REGIONS = 3
 _STATE_KINDS = (GoalKind.WENT, GoalKind.PLACED, GoalKind.HANDED_OVER)
 
 
@@ -45,13 +46,13 @@ def offered(history: ObjectHistory, p_WP: FloatArray) -> bool:
 def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: int, drops: int) -> Verdict:
     """The verdict on all conditions: the last is judged by the present state, earlier ones by the record."""
     findings = [_judge_one(conditions, i, truth) for i in range(len(conditions))]
-    why = " ".join(finding.sentence for finding in findings) or "There are no goal conditions."
-    return Verdict(all(finding.holds for finding in findings), why, collisions, drops)
+    success = all(finding.holds for finding in findings) if findings else None
+    return Verdict(success, " ".join(finding.sentence for finding in findings), collisions, drops)
 
 
 def _judge_one(conditions: Sequence[GoalCondition], i: int, truth: Truth) -> Finding:
     """One condition; a state that a later condition overtakes may have passed."""
-    past = any(_overtakes(later, conditions[i]) for later in conditions[i + 1 :])
+    past = conditions[i].passing or any(_overtakes(later, conditions[i]) for later in conditions[i + 1 :])
     finding = _JUDGES[conditions[i].kind](conditions[i], truth, past)
     return Finding(finding.holds, finding.sentence[0].upper() + finding.sentence[1:])
 
@@ -65,15 +66,13 @@ def _overtakes(later: GoalCondition, condition: GoalCondition) -> bool:
 
 def _judge_grasped(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     """Lifted from the source at some time."""
-    done = [history for history in _of_class(condition, truth) if _lifted_from(history, condition)]
+    done = {history: lift for history in _of_class(condition, truth) if (lift := _lift(history, condition)) is not None}
     if len(done) >= condition.needed:
-        return Finding(True, f"{_names(done)} was lifted from {_where(condition.source)}.")
-    lifted = [history for history in truth.histories if history.lifts]
-    other = f"; {_names(lifted)} was" if lifted else ""
-    wanted = _wanted(condition)
-    return Finding(
-        False, f"{len(done)} of {condition.needed} {wanted} was lifted from {_where(condition.source)}{other}."
-    )
+        froms = (f"the {history.name} was lifted{_from(condition, lift)}" for history, lift in done.items())
+        return Finding(True, f"{' and '.join(froms)}.")
+    other = [history for history in truth.histories if history.lifts and history not in done]
+    was = f"; {_names(other)} {_were(other)}" if other else ""
+    return Finding(False, f"{_tally(done, condition)} lifted{_out_of(condition.source)}{was}.")
 
 
 def _judge_handed_over(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
@@ -81,7 +80,7 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth, past: bool) -> Fi
     people = {name: p for name, p in truth.persons.items() if condition.person in (None, name)}
     if not people:
         return Finding(False, f"There is no person {condition.person or ''} to hand anything to.".replace("  ", " "))
-    objects = [history for history in _of_class(condition, truth) if _lifted_from(history, condition)]
+    objects = [history for history in _of_class(condition, truth) if _lift(history, condition) is not None]
     if past:
         done = [history for history in objects if any((history.name, person) in truth.offers for person in people)]
     else:
@@ -97,7 +96,7 @@ def _why_not_handed(
     """The sentence on a hand-over that failed: of the object in a gripper, or else of what was wanted."""
     held = [history for history in objects if history.held_by is not None]
     if not held:
-        return f"No {_wanted(condition)} from {_where(condition.source)} is in a gripper."
+        return f"No {_wanted(condition)}{_out_of(condition.source)} is in a gripper."
     history = held[0]
     if not history.held_out:
         return f"The {history.name} is in the gripper but not held out free."
@@ -107,16 +106,21 @@ def _why_not_handed(
 
 def _judge_placed(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     """Resting in the goal, let go."""
-    objects = [history for history in _of_class(condition, truth) if _lifted_from(history, condition)]
-    done = [history for history in objects if _rests_in(history, condition, past)]
+    objects = [history for history in _of_class(condition, truth) if _lift(history, condition) is not None]
+    done = {history: p for history in objects if (p := _rest_in(history, condition, past)) is not None}
     if len(done) >= condition.needed:
-        return Finding(True, f"{_names(done)} {'was put' if past else 'rests'} on {_where(condition.goal)}.")
+        verb = "was put" if past else "rests"
+        ons = (f"the {history.name} {verb} on {_region_at(condition.goal, p)}" for history, p in done.items())
+        return Finding(True, f"{' and '.join(ons)}.")
     if not objects:
-        return Finding(False, f"No {_wanted(condition)} was brought from {_where(condition.source)}.")
-    x, y, z = objects[0].last.p_WO
-    state = "is in a gripper" if objects[0].held_by else "is" if objects[0].resting else "moves"
-    where = f"at ({x:.2f}, {y:.2f}, {z:.2f})"
-    return Finding(False, f"The {objects[0].name} {state} {where}, not resting on {_where(condition.goal)}.")
+        return Finding(False, f"No {_wanted(condition)} was brought{_out_of(condition.source)}.")
+    elsewhere = [history for history in objects if history not in done]
+    if not elsewhere:
+        return Finding(False, f"{_tally(done, condition)} put on {_where(condition.goal)}.")
+    x, y, z = elsewhere[0].last.p_WO
+    state = "is in a gripper" if elsewhere[0].held_by else "is" if elsewhere[0].resting else "moves"
+    missed = f"the {elsewhere[0].name} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting on {_where(condition.goal)}"
+    return Finding(False, f"{_tally(done, condition)} put there; {missed}." if done else f"{missed}.")
 
 
 def _judge_went(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
@@ -124,21 +128,27 @@ def _judge_went(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     robots = [name for name in truth.bases if condition.robot in (None, name)]
     for name in robots:
         points = truth.paths[name] if past else truth.bases[name][None, :]
-        if any(region.contains(p) for p in points for region in condition.goal):
-            return Finding(True, f"{name} {'was' if past else 'is'} in {_where(condition.goal)}.")
+        there = next((on for p in points if (on := _region_at(condition.goal, p)) is not None), None)
+        if there is not None:
+            return Finding(True, f"{name} {'was' if past else 'is'} at {there}.")
     if not robots:
         return Finding(False, f"There is no robot {condition.robot}.")
     x, y, _ = truth.bases[robots[0]]
-    return Finding(False, f"{robots[0]} is at ({x:.2f}, {y:.2f}), not in {_where(condition.goal)}.")
+    return Finding(False, f"{robots[0]} is at ({x:.2f}, {y:.2f}), not at {_where(condition.goal)}.")
 
 
 def _judge_answered(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     """The answer equal to the truth."""
-    there = [s for s in _of_class(condition, truth) if s.resting and _in_any(condition.source, s.last.p_WO)]
+    there = {
+        history: on
+        for history in _of_class(condition, truth)
+        if history.resting and (on := _region_at(condition.source, history.last.p_WO)) is not None
+    }
     fact = len(there) >= condition.needed
     said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
-    found = f"{_names(there)} is" if there else f"there is no {_wanted(condition)}"
-    return Finding(condition.answer is fact, f"The answer was {said}, and {found} in {_where(condition.source)}.")
+    where = " and ".join(f"the {history.name} is on {on}" for history, on in there.items())
+    found = where or f"there is no {_wanted(condition)}{_in(condition.source)}"
+    return Finding(condition.answer is fact, f"the answer was {said}, and {found}.")
 
 
 _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth, bool], Finding]] = {
@@ -154,23 +164,33 @@ def _of_class(condition: GoalCondition, truth: Truth) -> list[ObjectHistory]:
     return [history for history in truth.histories if history.class_name in condition.classes]
 
 
-def _lifted_from(history: ObjectHistory, condition: GoalCondition) -> bool:
-    """Whether the condition's robot lifted it, and from the source where one was named."""
-    return any(
-        condition.robot in (None, lift.robot) and (not condition.source or _in_any(condition.source, lift.from_W))
-        for lift in history.lifts
+def _lift(history: ObjectHistory, condition: GoalCondition) -> Lift | None:
+    """The first time that the condition's robot lifted it, from the source where one was named."""
+    return next(
+        (
+            lift
+            for lift in history.lifts
+            if condition.robot in (None, lift.robot)
+            and (not condition.source or _region_at(condition.source, lift.from_W) is not None)
+        ),
+        None,
     )
 
 
-def _rests_in(history: ObjectHistory, condition: GoalCondition, past: bool) -> bool:
-    """Whether it rests in the goal, or did after it was carried."""
-    if past:
-        return any(_in_any(condition.goal, p) for p in history.rests_W[1:])
-    return history.resting and _in_any(condition.goal, history.last.p_WO)
+def _rest_in(history: ObjectHistory, condition: GoalCondition, past: bool) -> FloatArray | None:
+    """Where in the goal it rests, or did after it was carried; None when nowhere."""
+    rests = history.rests_W[1:] if past else [history.last.p_WO] if history.resting else []
+    return next((p for p in rests if _region_at(condition.goal, p) is not None), None)
 
 
-def _in_any(regions: Sequence[Region], p_W: FloatArray) -> bool:
-    return any(region.contains(p_W) for region in regions)
+def _region_at(regions: Sequence[Region], p_W: FloatArray) -> str | None:
+    """The name, with its article, of the first region that a point lies in."""
+    return next((_the(region.name) for region in regions if region.contains(p_W)), None)
+
+
+def _the(name: str) -> str:
+    """A place's name with the article; a pose or a proper name has none."""
+    return name if name.startswith(("(", "the ")) or name[:1].isupper() else f"the {name}"
 
 
 def _apart_m(p: FloatArray, q: FloatArray) -> float:
@@ -178,16 +198,43 @@ def _apart_m(p: FloatArray, q: FloatArray) -> float:
     return float(np.hypot(p[0] - q[0], p[1] - q[1]))
 
 
-def _names(histories: Sequence[ObjectHistory]) -> str:
+def _names(histories: Iterable[ObjectHistory]) -> str:
     return " and ".join(f"the {history.name}" for history in histories)
 
 
+def _were(histories: Sequence[ObjectHistory]) -> str:
+    return "was" if len(histories) == 1 else "were"
+
+
 def _wanted(condition: GoalCondition) -> str:
-    return " or ".join(condition.classes)
+    return condition.wanted or " or ".join(condition.classes)
+
+
+def _tally(done: Collection[ObjectHistory], condition: GoalCondition) -> str:
+    """How much of what was asked for was done: "no beer was", "1 of 2 beer was", "2 of 3 beer were"."""
+    if condition.needed == 1:
+        return f"no {_wanted(condition)} was"
+    return f"{len(done)} of {condition.needed} {_wanted(condition)} {'was' if len(done) == 1 else 'were'}"
+
+
+def _from(condition: GoalCondition, lift: Lift) -> str:
+    """The source that a lift was from."""
+    region = _region_at(condition.source, lift.from_W)
+    return "" if region is None else f" from {region}"
 
 
 def _where(regions: Sequence[Region]) -> str:
-    return " or ".join(dict.fromkeys(region.name for region in regions)) or "anywhere"
+    """Regions by name while they are few, else how many."""
+    names = tuple(dict.fromkeys(_the(region.name) for region in regions))
+    return " or ".join(names) if len(names) <= NAMED_REGIONS else f"any of {len(names)} places"
+
+
+def _out_of(regions: Sequence[Region]) -> str:
+    return f" from {_where(regions)}" if regions else ""
+
+
+def _in(regions: Sequence[Region]) -> str:
+    return f" on {_where(regions)}" if regions else ""
 
 
 def _either(people: Mapping[str, FloatArray]) -> str:

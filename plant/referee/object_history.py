@@ -60,7 +60,7 @@ class Lift:
     from_W: FloatArray
 
 
-@dataclass
+@dataclass(eq=False)
 class ObjectHistory:
     """The record of one object; `take` is called with every sample."""
 

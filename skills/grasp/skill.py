@@ -84,6 +84,8 @@ class Grasp(ArmSkill[GraspInputs]):
     default_timeout_s = 120.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
     changes_world = True
+    gripper_before = False
+    gripper_after = True
 
     def undone(self, inputs: GraspInputs) -> str | None:
         """Judged by the gripper."""

@@ -66,6 +66,7 @@ class HandOver(ArmSkill[HandOverInputs]):
     default_timeout_s = 120.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
     changes_world = True
+    gripper_before = True
 
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
         """Find, go, hold out."""

@@ -70,6 +70,8 @@ class Place(ArmSkill[PlaceInputs]):
     default_timeout_s = 150.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
     changes_world = True
+    gripper_before = True
+    gripper_after = False
 
     def undone(self, inputs: PlaceInputs) -> str | None:
         """Judged by the gripper."""

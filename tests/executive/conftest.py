@@ -179,6 +179,7 @@ def scripted_skill(
         Inputs: ClassVar[type] = inputs_type
         outputs: ClassVar[Mapping[str, type]] = outputs_
         default_timeout_s: ClassVar[float] = 30.0
+        gripper_before, gripper_after = GRIPPER.get(skill_name, (None, None))
 
         def begin(self, inputs: Any) -> None:
             script.begun.append(skill_name)
@@ -280,6 +281,8 @@ PORTS: dict[str, tuple[type, dict[str, type]]] = {
     "relocalise": (NoInputs, {}),
     "charge": (ChargeInputs, {}),
 }
+
+GRIPPER = {"grasp": (False, True), "place": (True, False), "hand_over": (True, None)}  # held before, held after
 
 KNOWLEDGE = {
     "robot": {"name": "Alice"},

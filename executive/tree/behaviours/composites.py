@@ -104,8 +104,8 @@ class MemorySelector(MemoryComposite):
 
     Child that does not apply (`Conditional`): passed over, it stays idle. Child RUNNING: RUNNING. Child SUCCESS:
     SUCCESS. Child FAILURE: on to the next in the same tick; after the last: FAILURE with the sentences of all that
-    could begin. Its cause is ERROR when one child had that, else the first that is neither PRECONDITION nor
-    POSTCONDITION, else `exhausted_cause` where given, else the last child's.
+    could begin, the decisive ones first. Its cause is ERROR when one child had that, else the first that is neither
+    PRECONDITION nor POSTCONDITION, else `exhausted_cause` where given, else the last child's.
     """
 
     goes_on_after = frozenset({Status.FAILURE})
@@ -121,8 +121,10 @@ class MemorySelector(MemoryComposite):
             return self.exhausted_cause or Cause.PRECONDITION, self.exhausted_message or "nothing of it applies"
         cause = self._decisive_cause([cause_of(one) for one in failed])
         tried = [one for one in failed if cause_of(one) is not Cause.PRECONDITION] or failed
+        tried.sort(key=lambda one: cause_of(one) is not cause)
         sentences = list(dict.fromkeys(map(message_of, tried)))
-        shown = "; ".join(sentences[:4]) + (f"; and {len(sentences) - 4} more" if len(sentences) > 4 else "")
+        more = f"; and {len(sentences) - 4} more" if len(sentences) > 4 else ""
+        shown = f"{'; '.join(sentences[:4])}{more}"
         return cause, f"{self.exhausted_message}: {shown}" if self.exhausted_message else shown
 
     def _decisive_cause(self, causes: Sequence[Cause]) -> Cause:

@@ -56,14 +56,30 @@ class Recovery:
         return any(trigger.fits(attempt) for trigger in self.triggers)
 
 
+@dataclass(frozen=True)
+class _AttemptFailure:
+    """How an attempt failed, and how many steps of it had succeeded by then."""
+
+    cause: Cause
+    message: str
+    steps: int
+
+    @staticmethod
+    def of(attempt: Behaviour) -> _AttemptFailure:
+        steps = sum(child.status == Status.SUCCESS for child in attempt.children)
+        return _AttemptFailure(cause_of(attempt), message_of(attempt), steps)
+
+
 @dataclass(kw_only=True, eq=False, repr=False)
 class Recover(MemoryComposite):
     """An attempt (the first child), with recoveries (the others, each with its `Recovery`) before the next attempt.
 
     Attempt RUNNING or SUCCESS: the same. Attempt FAILURE: the first recovery that fits and is not used up is run from
-    the next tick on; none: FAILURE with the attempt's cause. Recovery RUNNING: RUNNING. Recovery SUCCESS: RUNNING, and
-    at the next tick the attempt starts anew. Recovery FAILURE: the next that fits; none: FAILURE with the attempt's
-    cause (ERROR when the recovery had that) and both sentences. No attempts left: FAILURE with the attempt's cause.
+    the next tick on; none: FAILURE. Recovery RUNNING: RUNNING. Recovery SUCCESS: RUNNING, and at the next tick the
+    attempt starts anew. Recovery FAILURE: the next that fits; none: FAILURE. No attempts left: FAILURE.
+    A failure has the cause and the sentence of the attempt that came farthest, the last of those: when a grasp slips
+    and the object is then not seen any more, the slip is decisive. An attempt comes as far as children of it succeeded.
+    After it stand the last attempt's sentence and a failed recovery's (its cause counts when it is ERROR).
     When it starts anew, recoveries are counted from zero and the blackboard keys in `forgets` are empty.
     """
 
@@ -74,6 +90,7 @@ class Recover(MemoryComposite):
     attempt: int = field(default=1, init=False)
     _uses: list[int] = field(default_factory=list, init=False)
     _due: list[int] = field(default_factory=list, init=False)
+    _farthest: _AttemptFailure | None = field(default=None, init=False)
 
     def tick(self) -> Iterator[Behaviour]:
         """Tick the attempt or the recovery that is under way, and see what comes of it."""
@@ -91,7 +108,7 @@ class Recover(MemoryComposite):
 
     def _restart(self) -> None:
         super()._restart()
-        self.attempt, self._uses, self._due = 1, [0] * len(self.recoveries), []
+        self.attempt, self._uses, self._due, self._farthest = 1, [0] * len(self.recoveries), [], None
         self.board.forget(self.forgets)
 
     def _attempt_ended(self) -> None:
@@ -100,11 +117,14 @@ class Recover(MemoryComposite):
         if attempt.status == Status.SUCCESS:
             self._end(Status.SUCCESS, None, message_of(attempt))
             return
+        failure = _AttemptFailure.of(attempt)
+        if self._farthest is None or failure.steps >= self._farthest.steps:
+            self._farthest = failure
         fitting = [i for i, r in enumerate(self.recoveries) if self._uses[i] < r.uses and r.fits(attempt)]
         self._due = fitting if self.attempt < self.attempts else []
         if not self._next_recovery():
             tried = f" (after {self.attempt} attempts)" if self.attempt > 1 else ""
-            self._end(Status.FAILURE, cause_of(attempt), f"{message_of(attempt)}{tried}")
+            self._fail(tried)
 
     def _next_recovery(self) -> bool:
         """Turn to the next recovery that is due; False when there is none."""
@@ -124,9 +144,15 @@ class Recover(MemoryComposite):
             said = f"attempt {self.attempt}, since {message_of(self.children[0])}"
             self.status, self.cause, self.message = Status.RUNNING, None, said
         elif not self._next_recovery():
-            failed = Cause.ERROR if cause_of(recovery) is Cause.ERROR else cause_of(self.children[0])
-            said = f"{message_of(self.children[0])}; {recovery.name}: {message_of(recovery)}"
-            self._end(Status.FAILURE, failed, said)
+            error = Cause.ERROR if cause_of(recovery) is Cause.ERROR else None
+            self._fail(f"; {recovery.name}: {message_of(recovery)}", error)
+
+    def _fail(self, addition: str, cause: Cause | None = None) -> None:
+        """End with what is decisive, and what came last."""
+        last = _AttemptFailure.of(self.children[0])
+        decisive = self._farthest or last
+        then = "" if decisive.message == last.message else f", then {last.message}"
+        self._end(Status.FAILURE, cause or decisive.cause, f"{decisive.message}{then}{addition}")
 
     def _end(self, status: Status, cause: Cause | None, message: str) -> None:
         self.cause, self.message = cause, message

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Any, Final
 
 from py_trees.common import Status
 
@@ -12,6 +12,7 @@ from executive.mission.command import START, Command, Task
 from executive.mission.errors import InputError, Problems, SourceLine
 from executive.mission.file.model import Mission, MissionStep, StepPolicy
 from executive.mission.goal import GoalCondition, command_goal, drive_goal
+from executive.mission.gripper import UNNAMED, InGripper, after_command, is_same
 from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import Constant
 from executive.tree.compiling.builder import PlanBuilder, Registry, slug, start_key
@@ -21,6 +22,7 @@ from executive.tree.compiling.skill_steps import skill_plan
 from executive.tree.compiling.steps import step_plan
 from executive.tree.compiling.trips import are_trips, refuse_several, trips_plan
 from executive.tree.node import NodeSpec
+from skills.api import Skill
 from skills.robot import Pose2D
 
 __all__ = ["Assembled", "StepPart", "assemble", "step_name"]
@@ -34,13 +36,14 @@ _SKIPPING: Final = frozenset({"skip", "ask"})
 class StepPart:
     """A part of a mission with something to show for it: a command, or a skill on its own.
 
-    `path_id` is that of its subtree, `goal` what is to be so when it is done; of skills on their own only a drive to a
-    fixed pose has one. `excused` are pairs of path ids: when the first succeeded although the second failed, the part
-    was skipped.
+    `path_id` is that of its subtree, `skill` the skill on its own, `goal` what is to be so when it is done; of skills
+    on their own only a drive to a fixed pose has one. `excused` are pairs of path ids: when the first succeeded
+    although the second failed, the part was skipped.
     """
 
     path_id: str
     command: Command | None = None
+    skill: type[Skill[Any]] | None = None
     goal: GoalCondition | None = None
     excused: tuple[tuple[str, str], ...] = ()
 
@@ -101,12 +104,14 @@ def step_name(command: Command) -> str:
 
 @dataclass
 class _Assembler:
-    """Makes the subtrees of one mission; `names` are the outputs of the skills so far, with their blackboard keys."""
+    """Makes the subtrees of one mission; `names` are the outputs of the skills so far, with their blackboard keys, and
+    `held` is what the gripper holds by then."""
 
     knowledge: Knowledge
     registry: Registry
     start_key: str
     names: dict[str, str] = field(default_factory=dict)
+    held: InGripper | None = None
 
     def builder(self, path_id: str, source: SourceLine | None) -> PlanBuilder:
         """The builder of nodes that belong to no one command."""
@@ -141,7 +146,11 @@ class _Assembler:
                     trips = trips_plan(self._command_builder(item, base), following)
                     commands = (item.command, following)
                     goals = (command_goal(command, self.knowledge) for command in commands)
-                    parts = tuple(map(StepPart, (trips.path_id,) * 2, commands, goals))
+                    parts = tuple(
+                        StepPart(trips.path_id, command, goal=goal)
+                        for command, goal in zip(commands, goals, strict=True)
+                    )
+                    self.held = None
                     made += Assembled((trips,), parts)
                 else:
                     made += self._item(item, following, base)
@@ -163,12 +172,17 @@ class _Assembler:
                 registry=self.registry,
                 names=self.names,
             )
-            return Assembled((leaf,), (StepPart(path_id, goal=_drive_goal(leaf)),))
+            skill: type[Skill[Any]] = leaf.options["skill"]
+            self.held = {None: self.held, True: UNNAMED, False: None}[skill.gripper_after]
+            return Assembled((leaf,), (StepPart(path_id, skill=skill, goal=_drive_goal(leaf)),))
         builder = replace(self._command_builder(item, base), avoided=_goals(following, self.knowledge))
         refuse_several(builder)
+        command = builder.command
+        builder = replace(builder, in_gripper=is_same(self.held, command.object, self.knowledge))
         node = step_plan(builder)
-        goal = command_goal(builder.command, self.knowledge, _elsewhere(builder))
-        return Assembled((node,), (StepPart(builder.path_id, builder.command, goal),))
+        self.held = after_command(command, self.held, self.knowledge)
+        goal = command_goal(command, self.knowledge, _elsewhere(builder))
+        return Assembled((node,), (StepPart(builder.path_id, command, goal=goal),))
 
     def _used(self, step: MissionStep, used: Mission, base: str) -> Assembled:
         """The subtree of a mission that a step uses."""

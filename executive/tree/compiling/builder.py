@@ -46,7 +46,7 @@ class PlanBuilder:
     """Makes the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
 
     `anywhere` says whether an object that is not in its place is looked for elsewhere, too, but never on the surfaces
-    in `avoided`: what lies there is where it is to go.
+    in `avoided`: what lies there is where it is to go. With `in_gripper` an earlier step has grasped the object.
     """
 
     knowledge: Knowledge
@@ -57,6 +57,7 @@ class PlanBuilder:
     source: SourceLine | None
     anywhere: bool = True
     avoided: frozenset[str] = frozenset()
+    in_gripper: bool = False
 
     def at(self, *parts: str) -> PlanBuilder:
         """The builder of a subtree below."""

@@ -96,6 +96,14 @@ def tuck_plan(builder: PlanBuilder) -> NodeSpec:
     return builder.node("selector", "tuck the arm in", twice, as_it_is, part="tucked-in")
 
 
+def held_plan(builder: PlanBuilder, thing: Thing) -> NodeSpec:
+    """What an earlier step grasped: nothing to do while the gripper holds something."""
+    below = builder.at("in-gripper")
+    return below.node(
+        "only if holding", f"the {thing} is in the gripper", below.pause("settle", "hold it", LOOK_AGAIN_S)
+    )
+
+
 def tidied(builder: PlanBuilder, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
     """Work after which the arm is stowed, whatever came of it."""
     name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"

@@ -12,7 +12,7 @@ from executive.mission.geometry import inside
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
-from executive.tree.compiling.handling import go_near_plan, pick_up_plan, tidied, tuck_plan, unless_dropped
+from executive.tree.compiling.handling import go_near_plan, held_plan, pick_up_plan, tidied, tuck_plan, unless_dropped
 from executive.tree.compiling.search import (
     look_plans,
     required_surfaces,
@@ -38,7 +38,8 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     """Find it, stand before it, take it, tuck the arm in.
 
     When standing or taking fails, what fits the failure is done and the robot looks again and tries anew; when nothing
-    is to be found that is final. With `anywhere`, it is looked for elsewhere, too, when it is not in its place.
+    is to be found that is final. With `anywhere`, it is looked for elsewhere, too, when it is not in its place. What an
+    earlier step grasped is not looked for, unless the gripper is empty.
     """
     thing = _required(builder, builder.command.object)
     if builder.command.item is not None:
@@ -51,10 +52,11 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     around = tuple(builder.surface(name) for name in builder.knowledge.surfaces if name in surfaces)
     key = f"{builder.path_id}/detection"
     search = search_plan(builder.at("find"), thing, place, key, anywhere=anywhere)
-    return builder.sequence(
-        f"get {thing} {where(place)}",
-        pick_up_plan(builder, thing, search, key, around),
-        tuck_plan(builder),
+    get = (pick_up_plan(builder, thing, search, key, around), tuck_plan(builder))
+    if not builder.in_gripper:
+        return builder.sequence(f"get {thing} {where(place)}", *get)
+    return builder.node(
+        "selector", f"have {thing}", held_plan(builder, thing), builder.at("get").sequence("get it", *get)
     )
 
 

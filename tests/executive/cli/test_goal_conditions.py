@@ -2,12 +2,12 @@
 
 import pytest
 
-from executive.cli.goal_conditions import condition_of, conditions_of
+from executive.cli.goal_conditions import condition_of, conditions_of, verdict_of
 from executive.mission.command import parse_command
 from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from executive.mission.goal import command_goal
 from executive.tree.compiler import compile_mission
-from plant.referee import GoalKind
+from plant.referee import GoalKind, Verdict
 
 
 def conditions(knowledge, *texts):
@@ -102,3 +102,50 @@ def test_an_answer_belongs_to_its_own_check(conditions_by, script):
     find = "Take [Nothing] to [{}] and do [find] to [coke]"
     kitchen, bedroom = conditions_by(step(find.format("kitchen")), step(find.format("bedroom")))
     assert (kitchen.answer, bedroom.answer) == (True, False)
+
+
+@pytest.fixture
+def verdict_on(knowledge, registry, run_tree):
+    """The verdict on a mission that ran with the scripted robot, when all its conditions hold or none does."""
+
+    def after_running(*steps, holds=True):
+        tree = compile_mission(Mission("m", "flat", "Alice", steps), knowledge=knowledge, registry=registry)
+
+        def judge(conditions):
+            return Verdict(holds if conditions else None, "seen", 0, 0)
+
+        return verdict_of(tree, run_tree(tree).robots[0], judge)
+
+    return after_running
+
+
+STOW = MissionStep(skill=SkillCall("stow"))
+
+# steps, whether their conditions hold -> the verdict
+VERDICTS = [
+    ((step(GO, StepPolicy()),), True, True),
+    ((step(GO, StepPolicy()),), False, False),
+    ((STOW,), True, None),
+    ((step(GO, StepPolicy()), STOW), True, None),
+    ((step(GO, StepPolicy()), STOW), False, False),
+]
+
+
+@pytest.mark.parametrize(("steps", "holds", "success"), VERDICTS)
+def test_a_mission_with_a_step_without_condition_is_not_judged(verdict_on, steps, holds, success):
+    assert verdict_on(*steps, holds=holds).success is success
+
+
+def test_a_step_without_condition_is_named(verdict_on):
+    assert "stow" in verdict_on(STOW).why
+
+
+def test_what_stands_before_a_step_without_condition_may_be_undone_by_it(conditions_by):
+    assert [one.passing for one in conditions_by(step(GO), STOW, step(GO))] == [True, False]
+
+
+def test_a_mission_that_failed_is_never_fulfilled(verdict_on, script):
+    script.seen_on = ()
+    verdict = verdict_on(step(GET, StepPolicy()), holds=True)
+    assert verdict.success is False
+    assert "failure" in verdict.why

@@ -165,6 +165,25 @@ def test_run_shows_commands_tree_and_both_verdicts(no_plant, tmp_path):
     assert any(line.startswith("The referee saw: ✓") for line in lines)
 
 
+def impossible_file(tmp_path):
+    file = tmp_path / "mission.yaml"
+    file.write_text(
+        "name: put\nworld: flat\nsteps:\n  - {to: kitchen table, take: coke}\n  - {to: bedroom, take: beer}\n"
+    )
+    return str(file)
+
+
+@pytest.mark.parametrize("command", [("run",), ("queue", "add"), ("evaluate", "--seeds", "1-2")])
+def test_what_check_refuses_is_refused_before_anything_moves(no_plant, tmp_path, command):
+    result = invoke(*command, impossible_file(tmp_path), "--out", str(tmp_path / "out"))
+    assert (result.exit_code, [line.split(":")[2] for line in result.stderr.splitlines()]) == (2, ["4", "5"])
+    assert not (tmp_path / "out").exists()
+
+
+def test_anyway_begins_what_check_refuses(no_plant, tmp_path):
+    assert invoke("run", impossible_file(tmp_path), "--anyway", "--out", str(tmp_path / "out")).exit_code == 0
+
+
 AMBIGUOUS = "Hey Alice, put the cube on the table"
 
 

@@ -49,4 +49,14 @@ def test_totals_count_claims_that_the_referee_denies():
     denied = RunReport.from_json({**report(2).to_json(), "referee": vars(RefereeReport(False, "no", 0, 0))})
     result = totals([report(1), denied, report(3, "failure")])
     assert [result[key] for key in ("successes", "referee_successes", "false_claims")] == [2, 1, 1]
-    assert [row[:3] for row in rows([report(1), denied])] == [("1", "success", "yes"), ("2", "success", "no")]
+    assert [row[:3] for row in rows([report(1), denied])] == [
+        ("1", "success", "fulfilled"),
+        ("2", "success", "not fulfilled"),
+    ]
+
+
+def test_a_run_that_was_not_judged_is_neither_a_success_by_the_referee_nor_a_false_claim():
+    unjudged = RunReport.from_json({**report(2).to_json(), "referee": vars(RefereeReport(None, "no", 0, 0))})
+    result = totals([unjudged])
+    assert [result[key] for key in ("successes", "referee_successes", "false_claims")] == [1, 0, 0]
+    assert unjudged.achieved

@@ -174,3 +174,27 @@ def test_ways_are_planned_on_the_map_for_the_whole_body(walled):
             ways.route(here, Pose2D(1.0, 1.0, 0.0))
     with pytest.raises(ValueError, match="blocked"):
         ways.route(here, Pose2D(-1.9, 1.0, 0.0))
+
+
+BRING = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
+DROPPED = SkillCall("place", {"surface": "counter"})
+
+# steps -> lines of the errors
+IN_GRIPPER = [
+    ((GET.format("coke"), BRING.format("coke", "counter")), []),
+    ((GET.format("coke"), GET.format("coke"), BRING.format("coke", "counter")), []),
+    ((GET.format("coke"), GET.format("beer")), [2]),
+    ((BRING.format("coke", "counter"),), [1]),
+    ((GET.format("coke"), BRING.format("beer", "counter")), [2]),
+    ((GET.format("coke"), BRING.format("coke", "counter"), BRING.format("coke", "shelf")), [3]),
+    ((GET.format("coke"), BRING.format("coke", "Sam"), GET.format("beer")), [3]),
+    ((GET.format("coke"), BRING.format("coke", "Sam"), GET.format("coke")), [3]),
+    ((GET.format("coke"), BRING.format("coke", "Sam"), BRING.format("coke", "counter")), []),
+    ((DROPPED,), [1]),
+    ((GET.format("coke"), DROPPED, GET.format("beer")), []),
+]
+
+
+@pytest.mark.parametrize(("steps", "lines"), IN_GRIPPER)
+def test_what_the_gripper_holds_is_followed_step_by_step(check, steps, lines):
+    assert [line for line, _ in told(check(*steps))] == lines

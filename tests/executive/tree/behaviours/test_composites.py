@@ -83,11 +83,11 @@ def test_exhausted_selector_has_the_decisive_cause(causes, exhausted, expected):
     assert (root.status, root.cause) == (F, expected)
 
 
-def test_exhausted_selector_tells_the_sentences_of_all_that_began():
+def test_exhausted_selector_tells_the_sentences_of_all_that_began_the_decisive_first():
     children = (Fails(Cause.PRECONDITION, "not begun"), Fails(Cause.POSTCONDITION, "a"), Fails(Cause.PLANNING, "b"))
     root = selector(*children, exhausted_message="found nothing")
     root.tick_once()
-    assert root.message == "found nothing: a; b"
+    assert root.message == "found nothing: b; a"
 
 
 def test_round_goes_on_whatever_becomes_of_each():
@@ -102,7 +102,7 @@ def test_round_goes_on_whatever_becomes_of_each():
 def test_round_of_which_nothing_works_fails_with_the_decisive_cause():
     root = round_of(Fails(Cause.POSTCONDITION, "a"), Fails(Cause.PLANNING, "b"), Fails(Cause.POSTCONDITION, "c"))
     assert table(root, 1) == [(F, F, F, F)]
-    assert (root.cause, root.message) == (Cause.PLANNING, "a; b; c")
+    assert (root.cause, root.message) == (Cause.PLANNING, "b; a; c")
 
 
 @pytest.mark.parametrize("kind", [sequence, selector])

@@ -105,6 +105,19 @@ def test_when_all_recoveries_fail_both_sentences_are_told(cause, expected):
     assert (root.cause, root.message) == (expected, "go 1; clear: clear 1")
 
 
+def test_the_attempt_that_came_farthest_is_decisive():
+    # attempt   find  take
+    # 1         S     POST (the object slips)
+    # 2         POST  -    (it is not seen any more)
+    find, take = Leaf("find", S, POST), Leaf("take", POST)
+    attempt = MemorySequence(path_id="alice/get", name="get", children=[find, take])
+    root = recover(attempt, recovery(Leaf("wait", S), POST), attempts=2)
+    while root.status != F:
+        root.tick_once()
+    assert root.cause is POST
+    assert root.message.index("take") < root.message.index("find")
+
+
 def test_a_new_start_counts_recoveries_from_zero_and_forgets_what_attempts_shared():
     board, clear = Board("alice"), Leaf("clear", S)
     root = recover(Leaf("go", PLANNING), recovery(clear, PLANNING), forgets=("alice/tried",), board=board)

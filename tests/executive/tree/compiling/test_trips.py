@@ -67,3 +67,26 @@ def test_what_no_trips_can_be_made_of_is_refused(compiled, get, bring, says):
     with pytest.raises(InputError, match=says) as error:
         compiled(get, f"{bring} and do [Nothing] to [Nothing]")
     assert error.value.hint
+
+
+GET = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
+PUT = (
+    "Take [Nothing] to [Nothing] and do [grasp] to [coke]",
+    "Take [coke] to [bedside table] and do [Nothing] to [Nothing]",
+)
+
+
+def test_what_an_earlier_step_grasped_is_not_looked_for(compiled, run_tree, script):
+    assert run_tree(compiled(GET, *PUT)).outcome is Outcome.SUCCESS
+    assert script.begun.count("grasp") == 1
+
+
+def test_what_is_no_longer_in_the_gripper_is_looked_for_again(compiled, run_tree, script, robot):
+    def drop(skill):
+        skill.context.robot._robot.holding = False
+        return Succeeded("there")
+
+    script.ends["navigate"] = drop
+    go = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
+    run_tree(compiled(GET, go, *PUT))
+    assert script.begun.count("grasp") > 1

@@ -1,0 +1,85 @@
+"""What the gripper holds as a mission goes on, when all goes well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from executive.mission.command import START, Command, Task, Thing
+from executive.mission.knowledge import Knowledge
+
+__all__ = ["UNNAMED", "InGripper", "after_command", "cannot_take", "is_same", "objection"]
+
+
+@dataclass(frozen=True)
+class InGripper:
+    """What is held; `thing` is None where only that something is held is known. `offered_to` names who it is held out
+    to: it stays in the gripper then, since the robot cannot let go into a hand."""
+
+    thing: Thing | None = None
+    offered_to: str | None = None
+
+    def __str__(self) -> str:
+        return "an object" if self.thing is None else f"the {self.thing}"
+
+
+UNNAMED: Final = InGripper()
+
+
+def after_command(command: Command, held: InGripper | None, knowledge: Knowledge) -> InGripper | None:
+    """What is held after a command that went well; None for nothing."""
+    if command.task is Task.GRASP:
+        return held if is_same(held, command.object, knowledge) else InGripper(command.object)
+    carried = _carried(command)
+    if carried is None:
+        return held
+    to_person = command.goal == START or (command.goal is not None and knowledge.person(command.goal) is not None)
+    return InGripper(carried, command.goal) if to_person else None
+
+
+def is_same(held: InGripper | None, thing: Thing | None, knowledge: Knowledge) -> bool:
+    """Whether what is held, and not held out to somebody, is what `thing` asks for."""
+    if held is None or held.offered_to is not None:
+        return False
+    return _fits(held, thing, knowledge)
+
+
+def objection(command: Command, held: InGripper | None, knowledge: Knowledge) -> tuple[str, str] | None:
+    """Why a command cannot be carried out with what is held, and a hint; None when it can."""
+    if command.task is Task.GRASP:
+        if held is None or is_same(held, command.object, knowledge):
+            return None
+        return cannot_take(held, f"the {command.object}")
+    carried = _carried(command)
+    if carried is None:
+        return None
+    if held is None:
+        return f"the {carried} is not in the gripper: no step before has grasped it", f"grasp the {carried} first"
+    if not _fits(held, carried, knowledge):
+        return f"the gripper holds {held} then, not the {carried}", f"put {held} down, then grasp the {carried}"
+    return None
+
+
+def cannot_take(held: InGripper, what: str) -> tuple[str, str]:
+    """Why nothing can be grasped while something is held, and a hint."""
+    if held.offered_to is None:
+        return f"{what} cannot be grasped: the gripper holds {held} then", f"put {held} down before"
+    to = "you" if held.offered_to == START else held.offered_to
+    return (
+        f"{what} cannot be grasped: {held} stays in the gripper when it is held out to {to}, "
+        "since the robot cannot let go into a hand",
+        "ask for one at a time, or have them put on a table",
+    )
+
+
+def _carried(command: Command) -> Thing | None:
+    """What a command carries."""
+    return command.object if command.task is Task.PLACE and command.item is None else command.item
+
+
+def _fits(held: InGripper, thing: Thing | None, knowledge: Knowledge) -> bool:
+    """Whether what is held is surely what `thing` names; an object that is not known may be anything."""
+    if held.thing is None or thing is None:
+        return True
+    of_held, asked = (set(knowledge.classes(knowledge.thing(one.name) or one.name)) for one in (held.thing, thing))
+    return of_held <= asked and set(thing.attributes) <= set(held.thing.attributes)

@@ -91,8 +91,8 @@ def refuse_impossible(prepared: Prepared) -> None:
 
 @cache
 def abilities_of() -> Abilities:
-    """What the robot can lift, and what the things weigh that there are models of."""
-    masses = {name: _mass_kg(one.path()) for name, one in load_catalogue().items() if one.file is not None}
+    """What the robot can lift, and what the lightest form of each class weighs."""
+    masses = {name: min(_mass_kg(form.path()) for form in one.forms.values()) for name, one in load_catalogue().items()}
     arm = spot_capabilities().arm
     lift_kg = 0.0 if arm is None else arm.max_payload_kg
     return Abilities(masses, lift_kg, frozenset(class_forms()), known_attributes())

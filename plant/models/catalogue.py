@@ -5,27 +5,33 @@ from __future__ import annotations
 from pathlib import Path
 
 import yaml
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 MODELS_FOLDER = Path(__file__).resolve().parent
 
 
+class ModelForm(BaseModel):
+    """One form of a class: its SDF file, its outline seen from above, and its resting height (m)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    file: str
+    half_extents_m: tuple[float, float]
+    rest_height_m: float
+    round: bool = False
+
+    def path(self) -> Path:
+        """The SDF file."""
+        return MODELS_FOLDER / self.file
+
+
 class ModelClass(BaseModel):
-    """One class: its id (0 is Nothing) and, where a model exists, its file, outline and resting height (m)."""
+    """One class: its id (0 is Nothing), and its forms by name."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     id: int
-    file: str | None = None
-    half_extents_m: tuple[float, float] = (0.0, 0.0)
-    rest_height_m: float = 0.0
-    round: bool = False
-
-    def path(self) -> Path:
-        """The SDF file. Raises FileNotFoundError for a class without a model."""
-        if self.file is None:
-            raise FileNotFoundError(f"class {self.id} of {MODELS_FOLDER / 'catalogue.yaml'} has no model file")
-        return MODELS_FOLDER / self.file
+    forms: dict[str, ModelForm] = Field(min_length=1)
 
 
 def load_catalogue() -> dict[str, ModelClass]:

@@ -10,13 +10,13 @@ import numpy as np
 import shapely
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.models.catalogue import ModelClass, load_catalogue
+from plant.models.catalogue import ModelClass, ModelForm, load_catalogue
 from plant.worlds.world import ObjectRule, PersonRule, Point, Polygon, SurfaceTop, World, WorldError
 from skills.robot import FloatArray
 
 ATTEMPTS = 500
 ROUND_SIDES = 16
-_OBJECT_STREAM, _PEOPLE_STREAM = 1, 2
+_OBJECT_STREAM, _PEOPLE_STREAM, _FORM_STREAM = 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -25,22 +25,27 @@ class Placement:
 
     name: str
     class_name: str
-    model_path: Path
+    form: ModelForm
     X_WO: RigidTransform
     surface: str | None = None
+
+    @property
+    def model_path(self) -> Path:
+        """The SDF file."""
+        return self.form.path()
 
 
 def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
     """The world's loose things, each at rest on one of its surfaces. Raises WorldError when they don't fit.
 
-    Surface and pose vary with the seed; each thing has its own random stream, so that another thing more or less in
-    the world moves only what is in its way.
+    Form, surface and pose vary with the seed; each thing has its own random streams, so that another thing more or
+    less in the world moves only what is in its way.
     """
     catalogue, outlines, placed = load_catalogue(), list[FloatArray](), list[Placement]()
     for index, rule in enumerate(world.seed_rules.objects):
-        model = _model_class(catalogue, rule.model, world)
+        form = _form(_model_class(catalogue, rule.model, world), seed, index)
         rng = np.random.default_rng([seed, _OBJECT_STREAM, index])
-        placement, outline = _place(world, rule, model, outlines, rng)
+        placement, outline = _place(world, rule, form, outlines, rng)
         placed.append(placement)
         outlines.append(outline)
     return tuple(placed)
@@ -50,20 +55,25 @@ def place_people(world: World, seed: int) -> tuple[Placement, ...]:
     """The people, who stand on the floor before the start pose and look at the robot."""
     catalogue = load_catalogue()
     return tuple(
-        _place_person(world, rule, _model_class(catalogue, rule.model, world), seed, index)
+        _place_person(world, rule, _form(_model_class(catalogue, rule.model, world), seed, index), seed, index)
         for index, rule in enumerate(world.seed_rules.people)
     )
 
 
 def _model_class(catalogue: dict[str, ModelClass], name: str, world: World) -> ModelClass:
-    if name not in catalogue or catalogue[name].file is None:
-        known = ", ".join(key for key, entry in catalogue.items() if entry.file)
-        raise WorldError(f"{world.folder / 'objects.yaml'}: no model {name!r}; there are {known}")
+    if name not in catalogue:
+        raise WorldError(f"{world.folder / 'objects.yaml'}: no model {name!r}; there are {', '.join(catalogue)}")
     return catalogue[name]
 
 
+def _form(model: ModelClass, seed: int, index: int) -> ModelForm:
+    """The form that an object has at a seed."""
+    forms = tuple(model.forms.values())
+    return forms[int(np.random.default_rng([seed, _FORM_STREAM, index]).integers(len(forms)))]
+
+
 def _place(
-    world: World, rule: ObjectRule, model: ModelClass, others: Sequence[FloatArray], rng: np.random.Generator
+    world: World, rule: ObjectRule, form: ModelForm, others: Sequence[FloatArray], rng: np.random.Generator
 ) -> tuple[Placement, FloatArray]:
     """A free pose for one thing, and its outline there."""
     rules = world.seed_rules.rules
@@ -72,12 +82,12 @@ def _place(
     for name in (*rule.surfaces[first:], *rule.surfaces[:first]):
         surface = world.surfaces[name]
         for centre, yaw in _candidates(world, surface, rng):
-            outline = outline_W(model, centre, yaw)
+            outline = outline_W(form, centre, yaw)
             inside = _inside(outline, surface.polygon_W, rules.rim_m)
             if inside and all(polygon_distance(outline, other) >= rules.clear_m for other in obstacles):
-                z = surface.height_m + model.rest_height_m + rules.drop_m
+                z = surface.height_m + form.rest_height_m + rules.drop_m
                 X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z], dtype=np.float64))
-                return Placement(rule.name, rule.model, model.path(), X_WO, name), outline
+                return Placement(rule.name, rule.model, form, X_WO, name), outline
     raise WorldError(f"{world.folder / 'objects.yaml'}: {rule.name} finds no free spot on {', '.join(rule.surfaces)}")
 
 
@@ -93,21 +103,21 @@ def _candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> 
         yield (float(centre[0]), float(centre[1])), float(rng.uniform(-np.pi, np.pi))
 
 
-def _place_person(world: World, rule: PersonRule, model: ModelClass, seed: int, index: int) -> Placement:
+def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, index: int) -> Placement:
     rng = np.random.default_rng([seed, _PEOPLE_STREAM, index])
     direction = world.start.yaw_rad + rng.uniform(*rule.bearing_rad)
     distance = rng.uniform(*rule.distance_m)
     yaw = direction + np.pi + rng.uniform(*rule.turned_rad)
     x = world.start.x_m + distance * np.cos(direction)
     y = world.start.y_m + distance * np.sin(direction)
-    X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, model.rest_height_m], dtype=np.float64))
-    return Placement(rule.name, rule.model, model.path(), X_WO)
+    X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m], dtype=np.float64))
+    return Placement(rule.name, rule.model, form, X_WO)
 
 
-def outline_W(model: ModelClass, centre: Point, yaw_rad: float) -> FloatArray:
-    """A model's convex outline from above at a pose, as (K, 2) corners in the world."""
-    half = np.array(model.half_extents_m)
-    if model.round:
+def outline_W(form: ModelForm, centre: Point, yaw_rad: float) -> FloatArray:
+    """A form's convex outline from above at a pose, as (K, 2) corners in the world."""
+    half = np.array(form.half_extents_m)
+    if form.round:
         angle = np.arange(ROUND_SIDES) * 2 * np.pi / ROUND_SIDES
         corners = np.stack([np.cos(angle), np.sin(angle)], axis=1) * half
     else:

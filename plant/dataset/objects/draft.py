@@ -11,10 +11,13 @@ from numpy.typing import ArrayLike
 from plant.models.builder.inertia import scaled_to, shell_mass, solid_mass, together
 from plant.models.builder.mesh import IDENTITY, Colour, Material, Mesh
 from plant.models.builder.pictures import to_picture
-from plant.models.builder.shapes import Box, MassProperties, Shape, Sphere
+from plant.models.builder.shapes import Box, Cylinder, MassProperties, Shape, Sphere
 from skills.robot import FloatArray, Picture
 
 PROUD_M = 0.0003
+RIM_POINTS = 8
+SAME_RADIUS = 0.15
+SHORTEST_M = 0.001
 
 
 @dataclass(frozen=True)
@@ -78,10 +81,14 @@ class Draft:
         return placed
 
     def _collide(self, part: Mesh) -> None:
-        """What has weight collides as the box around it, with small spheres proud at its corners to rest on."""
+        """What has weight collides: an upright round part as cylinders, any other as the box around it; small spheres
+        stand proud at the rims or corners to rest on."""
         points = np.concatenate([p for _, p, _, _ in part.groups()])
         low, high = points.min(axis=0), points.max(axis=0)
         size, middle = np.maximum(high - low, 1e-3), (low + high) / 2
+        if _is_round(points - middle, size):
+            self._collisions += _cylinders(points, middle, low[2], high[2])
+            return
         small = min(0.004, float(size.min()) / 4)
         self._collisions.append(Box(size=_tuple(size), p=_tuple(middle)))
         for signs in itertools.product((-1, 1), repeat=3):
@@ -104,6 +111,39 @@ class Draft:
         pictures = {name: picture for name, picture in self._pictures.items() if name in used}
         shapes = tuple(replace(shape, p=_tuple(np.array(shape.p) - origin)) for shape in self._collisions)
         return Finished(moved, pictures, shapes, mass, _tuple(high - low))
+
+
+def _is_round(points: FloatArray, size: FloatArray) -> bool:
+    """Whether points (N, 3) about their middle fill a circle seen from above."""
+    return (
+        abs(size[0] - size[1]) < 0.02 * size[0] and float(np.hypot(points[:, 0], points[:, 1]).max()) < 0.52 * size[0]
+    )
+
+
+def _cylinders(points: FloatArray, middle: FloatArray, low_m: float, high_m: float) -> list[Shape]:
+    """A round part about the vertical through `middle` as cylinders, one on the other, with spheres at both rims."""
+    radius = np.hypot(points[:, 0] - middle[0], points[:, 1] - middle[1])
+    levels, ring = np.unique(np.round(points[:, 2], 4), return_inverse=True)
+    widest = np.zeros(len(levels))
+    np.maximum.at(widest, ring, radius)
+    sections: list[tuple[float, float, float]] = []
+    for z0, z1, r in zip(levels, levels[1:], np.maximum(widest[1:], widest[:-1]), strict=False):
+        last = sections[-1] if sections else None
+        if last is not None and abs(r - last[2]) < SAME_RADIUS * last[2]:
+            sections[-1] = (last[0], float(z1), max(float(r), last[2]))
+        else:
+            sections.append((float(z0), float(z1), float(r)))
+    shapes: list[Shape] = [
+        Cylinder(radius=r, length=z1 - z0, p=_tuple((middle[0], middle[1], (z0 + z1) / 2)))
+        for z0, z1, r in sections
+        if z1 - z0 >= SHORTEST_M
+    ]
+    for z, inward, r in ((low_m, 1.0, sections[0][2]), (high_m, -1.0, sections[-1][2])):
+        small = min(0.003, r / 4)
+        for angle in np.arange(RIM_POINTS) * 2 * np.pi / RIM_POINTS:
+            xy = middle[:2] + (r - 2 * small) * np.array([np.cos(angle), np.sin(angle)])
+            shapes.append(Sphere(radius=small, p=_tuple((*xy, z + inward * (small - PROUD_M)))))
+    return shapes
 
 
 def _tuple(values: ArrayLike) -> tuple[float, float, float]:

@@ -14,7 +14,8 @@ from plant.worlds.world import World, WorldError, load_world
 from skills.robot import Pose2D
 
 SEEDS = range(51)
-HOME = {"coke": "kitchen", "beer": "kitchen", "hammer": "workshop", "cube": "workshop"}
+TOOLS = ("hammer", "cube", "extinguisher", "wrench", "screwdriver", "cylinder")
+HOME = {"coke": "kitchen", "beer": "kitchen", **dict.fromkeys(TOOLS, "workshop")}
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,7 @@ def placed(world: World) -> dict[int, tuple[Placement, ...]]:
 
 def outline(placement: Placement) -> np.ndarray:
     pose = Pose2D.from_transform(placement.X_WO)
-    return outline_W(load_catalogue()[placement.class_name], (pose.x_m, pose.y_m), pose.yaw_rad)
+    return outline_W(placement.form, (pose.x_m, pose.y_m), pose.yaw_rad)
 
 
 def test_each_thing_lies_in_its_room(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
@@ -42,7 +43,7 @@ def test_each_thing_starts_a_millimetre_above_its_surface(
 ) -> None:
     for thing in itertools.chain(*placed.values()):
         top = world.surfaces[thing.surface or ""].height_m
-        rest = load_catalogue()[thing.class_name].rest_height_m
+        rest = thing.form.rest_height_m
         assert thing.X_WO.translation()[2] - rest - top == pytest.approx(0.001)
         assert thing.X_WO.rotation().matrix()[2, 2] == pytest.approx(1.0)
 
@@ -79,6 +80,12 @@ def test_things_keep_clear_of_each_other_and_of_fixtures(
 def test_every_allowed_surface_is_used(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
     used = {(thing.name, thing.surface) for thing in itertools.chain(*placed.values())}
     assert used == {(rule.name, surface) for rule in world.seed_rules.objects for surface in rule.surfaces}
+
+
+def test_every_form_of_a_class_is_used(placed: dict[int, tuple[Placement, ...]]) -> None:
+    used = {(thing.class_name, thing.form.file) for thing in itertools.chain(*placed.values())}
+    forms = {(name, form.file) for name, entry in load_catalogue().items() for form in entry.forms.values()}
+    assert used == {pair for pair in forms if pair[0] != "person"}
 
 
 def test_poses_differ_between_seeds_and_not_within_one(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:

@@ -115,9 +115,8 @@ class Draft:
 
 def _is_round(points: FloatArray, size: FloatArray) -> bool:
     """Whether points (N, 3) about their middle fill a circle seen from above."""
-    return (
-        abs(size[0] - size[1]) < 0.02 * size[0] and float(np.hypot(points[:, 0], points[:, 1]).max()) < 0.52 * size[0]
-    )
+    widest = float(np.hypot(points[:, 0], points[:, 1]).max())
+    return bool(abs(size[0] - size[1]) < 0.02 * size[0] and widest < 0.52 * size[0])
 
 
 def _cylinders(points: FloatArray, middle: FloatArray, low_m: float, high_m: float) -> list[Shape]:

@@ -68,7 +68,6 @@ def test_a_good_file_alone_is_ok():
     [
         ("name: x\nsteps:\n  - {skill: navigate, with: {x: 0.0, y: 0.0}}\n", 3, "blocked"),
         ("name: x\nsteps:\n  - {skill: navigate, with: {x: 60.0, y: 0.0}}\n", 3, "blocked"),
-        ("name: x\nsteps:\n  - say: bring the extinguisher from the workshop to the kitchen\n", 3, "no 'extinguisher'"),
         ("name: x\nworld: moon\nsteps:\n  - say: go to the kitchen\n", 2, "unknown world 'moon'"),
     ],
 )

@@ -33,7 +33,6 @@ from tests.executive.conftest import (
 )
 
 TICK_S, FASTEST = 0.05, 8.0
-SHARE = 0.05
 STEPS_EACH = 40
 SUCCESS = py_trees.common.Status.SUCCESS
 
@@ -103,4 +102,3 @@ def test_a_tick_of_a_fetch_with_log_and_journal(benchmark, tmp_path):
     benchmark.extra_info["bare_py_trees_tick_us"] = 1e6 * bare_s
     benchmark.extra_info["times_the_bare_tick"] = mean_s / bare_s
     benchmark.extra_info["share_at_8_x_real_time"] = mean_s / (TICK_S / FASTEST)
-    assert ordered[len(ordered) // 2] < SHARE * TICK_S / FASTEST

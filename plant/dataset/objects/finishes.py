@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
 from plant.dataset.objects.draft import Draft, shade
-from plant.dataset.objects.expressions import Number, evaluate
 from plant.dataset.objects.lettering import printed_label, write_word
 from plant.dataset.objects.wear import brushed, plain, rusty, used
+from plant.models.builder.expressions import Number, evaluate
 from plant.models.builder.mesh import Colour
 from plant.models.builder.pictures import cloth, noise, speckle, wood
 from skills.robot import FloatArray

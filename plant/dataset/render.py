@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -39,7 +39,7 @@ from plant.dataset.objects import ObjectModel
 from plant.dataset.room import Room, texture_file
 from plant.dataset.silhouette import silhouette
 from plant.dataset.textures import texture
-from plant.dataset.views import View, any_view, camera_specs, hand_view, roll_deg, view_of
+from plant.dataset.views import View, any_view, camera_specs, roll_deg, view_of
 from plant.models.builder.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture
 from plant.sensors.camera_spec import NEAR_M, colour_render_camera
@@ -100,7 +100,7 @@ def _views(rng: np.random.Generator, scene: Scene, count: int) -> list[View]:
     views += [any_view(rng, scene.room, specs) for _ in range(count - len(views))]
     by_hand = [k for k, view in enumerate(views) if view.camera == "hand"]
     shown = by_hand[: count // 4 if scene.held else count // 8 * int(rng.random() < 0.5)]
-    return [hand_view(rng, view) if k in shown else view for k, view in enumerate(views)]
+    return [replace(view, in_hand=True) if k in shown else view for k, view in enumerate(views)]
 
 
 class Stage:

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, write_text
-from plant.models.builder.pictures import write_png
 from plant.models.builder.sdf import Model, model_sdf
+from plant.pictures import save_png
 from plant.worlds.builder.furniture import Piece
 from plant.worlds.builder.maps import Placement, pgm_bytes, rasterise, yaml_text
 from plant.worlds.builder.materials import materials, pictures
@@ -23,8 +23,8 @@ def build(folder: Path) -> None:
     """Write meshes, models, directives and maps into a world's folder. The same source gives the same bytes."""
     palette, plan = materials(), load_plan()
     for name, picture in pictures().items():
-        write_png(folder / "furniture" / name, picture)
-    write_png(folder / "furniture" / "palette.png", palette_picture(palette))
+        save_png(folder / "furniture" / name, picture, 9)
+    save_png(folder / "furniture" / "palette.png", palette_picture(palette), 9)
     _write_model(
         folder, Model("shell", "shell.obj", shell_collisions(), comment="floor and walls"), shell_mesh(palette)
     )

@@ -24,7 +24,7 @@ def contact_sheet(folder: Path, shots: Sequence[Mapping[str, Any]], path: Path) 
     cells = [_cell(folder, shot) for shot in chosen]
     cells += [np.full((CELL_PX[1], CELL_PX[0], 3), 255, np.uint8)] * (-len(cells) % COLUMNS)
     rows = [np.concatenate(cells[k : k + COLUMNS], axis=1) for k in range(0, len(cells), COLUMNS)]
-    save_png(path, cv2.cvtColor(np.concatenate(rows, axis=0), cv2.COLOR_BGR2RGB))
+    save_png(path, np.ascontiguousarray(np.concatenate(rows, axis=0)[..., ::-1]))
 
 
 def _cell(folder: Path, shot: Mapping[str, Any]) -> Picture:

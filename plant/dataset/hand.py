@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from pydrake.math import RollPitchYaw
 
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.surfaces import add_rounded_box
+from plant.models.spot.description import spot_facts
 
-_FACTS = Path(__file__).resolve().parents[1] / "models" / "spot" / "spot.yaml"
 _PALM, _FINGER = "arm_wr1", "arm_f1x"
 
 
 def hand_mesh(opening_rad: float) -> Mesh:
     """Palm, fixed jaw and finger in the frame of the hand's link, the finger opened by an angle."""
-    facts = _facts()
+    facts = spot_facts()
     links = {link["link"]: link for link in facts["arm"]}
     yellow, black = (tuple(facts["colours"][name][:3]) for name in ("yellow", "black"))
     mesh = Mesh({"yellow": Material(yellow), "black": Material(black), "pad": Material((0.16, 0.16, 0.17))})
@@ -39,12 +36,6 @@ def hand_mesh(opening_rad: float) -> Mesh:
     c, s = np.cos(-opening_rad), np.sin(-opening_rad)
     mesh.add_mesh(finger, [[c, 0, s], [0, 1, 0], [-s, 0, c]], links[_FINGER]["offset"])
     return mesh
-
-
-@cache
-def _facts() -> Mapping[str, Any]:
-    facts: Mapping[str, Any] = yaml.safe_load(_FACTS.read_text(encoding="utf-8"))
-    return facts
 
 
 def _add_box(mesh: Mesh, material: str, shape: Mapping[str, Any]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from plant.pictures import save_png
 from skills.robot import Picture
 
 COLUMNS, ROWS = 8, 6
@@ -23,10 +24,7 @@ def contact_sheet(folder: Path, shots: Sequence[Mapping[str, Any]], path: Path) 
     cells = [_cell(folder, shot) for shot in chosen]
     cells += [np.full((CELL_PX[1], CELL_PX[0], 3), 255, np.uint8)] * (-len(cells) % COLUMNS)
     rows = [np.concatenate(cells[k : k + COLUMNS], axis=1) for k in range(0, len(cells), COLUMNS)]
-    ok, data = cv2.imencode(".png", np.concatenate(rows, axis=0))
-    if not ok:
-        raise OSError(f"{path}: the picture could not be encoded")
-    path.write_bytes(data.tobytes())
+    save_png(path, np.ascontiguousarray(np.concatenate(rows, axis=0)[..., ::-1]))
 
 
 def _cell(folder: Path, shot: Mapping[str, Any]) -> Picture:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.common.value import Value
@@ -39,9 +38,10 @@ from plant.dataset.objects import ObjectModel
 from plant.dataset.room import Room, texture_file
 from plant.dataset.silhouette import silhouette
 from plant.dataset.textures import texture
-from plant.dataset.views import View, any_view, camera_specs, hand_view, roll_deg, view_of
+from plant.dataset.views import View, any_view, camera_specs, roll_deg, view_of
 from plant.models.builder.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture
+from plant.pictures import png_bytes
 from plant.sensors.camera_spec import NEAR_M, colour_render_camera
 from skills.robot import Picture
 
@@ -100,7 +100,7 @@ def _views(rng: np.random.Generator, scene: Scene, count: int) -> list[View]:
     views += [any_view(rng, scene.room, specs) for _ in range(count - len(views))]
     by_hand = [k for k, view in enumerate(views) if view.camera == "hand"]
     shown = by_hand[: count // 4 if scene.held else count // 8 * int(rng.random() < 0.5)]
-    return [hand_view(rng, view) if k in shown else view for k, view in enumerate(views)]
+    return [replace(view, in_hand=True) if k in shown else view for k, view in enumerate(views)]
 
 
 class Stage:
@@ -186,21 +186,13 @@ def _mesh_file(folder: Path, name: str, mesh: Mesh, room: Room | None, physical:
         return MeshShape(str(path))
     path.write_text(obj_text(mesh, f"{name}.mtl"), encoding="utf-8")
     (folder / f"{name}.mtl").write_text(mtl_text(mesh, f"{name}_palette.png"), encoding="utf-8")
-    (folder / f"{name}_palette.png").write_bytes(_png(palette_picture(mesh.materials)))
+    (folder / f"{name}_palette.png").write_bytes(png_bytes(palette_picture(mesh.materials)))
     return MeshShape(str(path))
 
 
 @lru_cache(maxsize=256)
 def _texture_bytes(role: str, number: int) -> bytes:
-    return _png(texture(role, number))
-
-
-def _png(picture: Picture) -> bytes:
-    """The file of an RGB picture, little compressed."""
-    ok, data = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 1])
-    if not ok:
-        raise OSError("a texture could not be encoded")
-    return data.tobytes()
+    return png_bytes(texture(role, number))
 
 
 def _shot(

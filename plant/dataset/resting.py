@@ -51,15 +51,10 @@ def _poses_of(folder: Path) -> tuple[Resting, ...]:
     for normal, offset in _faces_below(hull, com):
         margin = _margin(points, hull, normal, offset, com)
         if margin > LEAST_MARGIN:
-            poses.append(Resting(_to_down(normal), -offset_of(points, normal), margin, bool(normal[2] < -0.99)))
+            poses.append(Resting(_to_down(normal), float((points @ normal).max()), margin, bool(normal[2] < -0.99)))
     if not poses:
         poses = [Resting(np.eye(3), -float(points[:, 2].min()), 0.0, True)]
     return tuple(sorted(poses, key=lambda pose: (not pose.upright, -pose.margin)))
-
-
-def offset_of(points: FloatArray, normal: FloatArray) -> float:
-    """Minus the farthest reach of the points along a direction."""
-    return -float((points @ normal).max())
 
 
 def _faces_below(hull: ConvexHull, com: FloatArray) -> list[tuple[FloatArray, float]]:

@@ -14,7 +14,6 @@ import json
 import multiprocessing
 import os
 import shutil
-import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -32,6 +31,7 @@ from plant.dataset.errors import DatasetError
 from plant.dataset.objects import sources_digest
 from plant.dataset.overview import contact_sheet
 from plant.dataset.render import Shot, render_scene, views_in
+from plant.models.cache import kept_folder
 
 FORMAT: Final = 1
 MANIFEST: Final = "dataset.json"
@@ -177,15 +177,13 @@ def write_scene(out: Path, seed: int, index: int) -> None:
     folder = _scene_folder(out, index)
     if shutil.disk_usage(out).free < LEAST_FREE_BYTES:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(out))
-    shots = render_scene(seed, index)
-    fresh = Path(tempfile.mkdtemp(prefix=".making-", dir=folder.parent))
-    try:
-        entries = [_write_shot(fresh, folder.relative_to(out), number, shot) for number, shot in enumerate(shots)]
+
+    def fill(fresh: Path) -> None:
+        shots = enumerate(render_scene(seed, index))
+        entries = [_write_shot(fresh, folder.relative_to(out), number, shot) for number, shot in shots]
         (fresh / "shots.json").write_text(json.dumps(entries, separators=(",", ":")), encoding="utf-8")
-        fresh.chmod(0o755)
-        fresh.rename(folder)
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
+
+    kept_folder(folder, fill)
 
 
 def _write_shot(folder: Path, shown_as: Path, number: int, shot: Shot) -> dict[str, Any]:

@@ -71,11 +71,6 @@ def any_view(rng: np.random.Generator, room: Room, specs: Mapping[str, CameraSpe
     return View("hand", look_at(eye, target), _varied(rng, specs["hand"].intrinsics()), False, False)
 
 
-def hand_view(rng: np.random.Generator, view: View) -> View:
-    """The same view with the hand before the camera."""
-    return View(view.camera, view.X_WC, view.intrinsics, view.grey, True)
-
-
 def _aim(thing: Placed) -> FloatArray:
     """The middle of an object; of a person a point of the upper body."""
     points = thing.model.surface.points

@@ -5,23 +5,14 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from pydrake.geometry import GeometryId
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
 
-
-class Placed(Protocol):
-    """A model put into the world: the name of its model instance, and its class."""
-
-    @property
-    def name(self) -> str:
-        """Name of the model instance."""
-
-    @property
-    def class_name(self) -> str:
-        """Class of the object, as in `plant/models`."""
+if TYPE_CHECKING:
+    from plant.worlds.placement import Placement
 
 
 class Kind(enum.Enum):
@@ -49,23 +40,17 @@ class Entity:
     label: str
 
 
-@dataclass(frozen=True)
-class LinkNames:
-    """How a robot's links are told apart: exact names of gripper links and trunk, prefix of arm links; else legs."""
+HAND_LINK, BASE_LINK = "arm_wr1", "body"
+_GRIPPER_LINKS, _TRUNK_LINKS = frozenset({"arm_wr1", "arm_f1x"}), frozenset({"body", "lidar"})
 
-    gripper: frozenset[str] = frozenset({"arm_wr1", "arm_f1x"})
-    arm_prefix: str = "arm_"
-    trunk: frozenset[str] = frozenset({"body", "lidar"})
-    hand: str = "arm_wr1"
-    base: str = "body"
 
-    def kind(self, link: str) -> Kind:
-        """What a link is."""
-        if link in self.gripper:
-            return Kind.GRIPPER
-        if link.startswith(self.arm_prefix):
-            return Kind.ARM
-        return Kind.BODY if link in self.trunk else Kind.LEG
+def _kind(link: str) -> Kind:
+    """What a robot's link is."""
+    if link in _GRIPPER_LINKS:
+        return Kind.GRIPPER
+    if link.startswith("arm_"):
+        return Kind.ARM
+    return Kind.BODY if link in _TRUNK_LINKS else Kind.LEG
 
 
 @dataclass(frozen=True)
@@ -86,10 +71,9 @@ class Entities:
     @staticmethod
     def of(
         plant: MultibodyPlant,
-        placements: Iterable[Placed],
+        placements: Iterable[Placement],
         robots: Sequence[str],
         persons: Sequence[str],
-        links: LinkNames,
         scenery: Mapping[GeometryId, str],
     ) -> Entities:
         """Read the entities off a finalized plant. Raises ValueError that names what is not there.
@@ -104,8 +88,11 @@ class Entities:
             entities |= {int(body.index()): Entity(Kind.PERSON, name, name) for body in _bodies(plant, name)}
         for name in robots:
             for body in _bodies(plant, name):
-                kind = links.kind(body.name())
+                kind = _kind(body.name())
                 entities[int(body.index())] = Entity(kind, name, f"{name}'s {kind.value} ({body.name()})")
+        bases = _links(plant, robots, BASE_LINK)
+        for name in set(robots) - set(bases):
+            raise ValueError(f"robot {name!r} has no link {BASE_LINK!r}")
         pieces = {name: plant.num_bodies() + number for number, name in enumerate(sorted({*scenery.values()}))}
         entities |= {number: Entity(Kind.SCENERY, name, f"the {name}") for name, number in pieces.items()}
         return Entities(
@@ -114,8 +101,8 @@ class Entities:
             objects=objects,
             classes={placed.name: placed.class_name for placed in things},
             persons={name: _first_body(plant, name) for name in persons},
-            bases={name: _link(plant, name, links.base) for name in robots},
-            hands={name: _link(plant, name, links.hand) for name in robots if _has_link(plant, name, links.hand)},
+            bases=bases,
+            hands=_links(plant, robots, HAND_LINK),
         )
 
 
@@ -148,13 +135,6 @@ def _first_body(plant: MultibodyPlant, instance_name: str) -> RigidBody:
     return _bodies(plant, instance_name)[0]
 
 
-def _has_link(plant: MultibodyPlant, instance_name: str, link: str) -> bool:
-    return any(body.name() == link for body in _bodies(plant, instance_name))
-
-
-def _link(plant: MultibodyPlant, instance_name: str, link: str) -> RigidBody:
-    """A robot's link. Raises ValueError when it is not there."""
-    for body in _bodies(plant, instance_name):
-        if body.name() == link:
-            return body
-    raise ValueError(f"robot {instance_name!r} has no link {link!r}")
+def _links(plant: MultibodyPlant, robots: Iterable[str], link: str) -> dict[str, RigidBody]:
+    """A link of those robots that have it."""
+    return {name: body for name in robots for body in _bodies(plant, name) if body.name() == link}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import GeometryId
@@ -13,12 +14,15 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
-from plant.referee.entities import Entities, Kind, LinkNames, Placed
+from plant.referee.entities import Entities, Kind
 from plant.referee.goal import GoalCondition, Verdict
 from plant.referee.judge import Truth, judge, offered
 from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
 from plant.snapshot.values import State, array_of
 from skills.robot import FloatArray
+
+if TYPE_CHECKING:
+    from plant.worlds.placement import Placement
 
 PATH_STEP_M = 0.02
 
@@ -29,11 +33,10 @@ class Referee:
     def __init__(
         self,
         plant: MultibodyPlant,
-        placements: Iterable[Placed],
+        placements: Iterable[Placement],
         *,
         robots: Sequence[str],
         persons: Sequence[str] = (),
-        links: LinkNames | None = None,
         scenery: Mapping[GeometryId, str] = MappingProxyType({}),
     ) -> None:
         """Build for a finalized plant; `scenery` names the pieces of furniture whose shapes are the world body's.
@@ -42,7 +45,7 @@ class Referee:
         robots. Raises ValueError that names what the plant does not have.
         """
         self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
-        self._entities = Entities.of(plant, placements, robots, persons, links or LinkNames(), scenery)
+        self._entities = Entities.of(plant, placements, robots, persons, scenery)
         self._counter = CollisionCounter(self._entities.all)
         self._histories = {name: ObjectHistory(name, self._entities.classes[name]) for name in self._entities.objects}
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant.snapshot.values import State, restore_rng, rng_state
+from plant.sensors.noisy import NoisySensor
 from skills.robot import Battery
 
 
@@ -23,14 +23,17 @@ class BatterySpec:
     charge_s: float = 300.0
 
 
-class BatteryModel:
+class BatteryModel(NoisySensor):
     """The battery of one robot."""
+
+    kept = ("charge", "stamp_s")
 
     def __init__(self, rng: np.random.Generator, charge: float = 1.0, spec: BatterySpec | None = None) -> None:
         """Start with a charge from 0 to 1. Raises ValueError for another."""
         if not 0.0 <= charge <= 1.0:
             raise ValueError(f"battery charge must be from 0 to 1, not {charge}")
-        self._rng, self._spec, self._charge = rng, spec or BatterySpec(), charge
+        super().__init__(rng)
+        self._spec, self._charge = spec or BatterySpec(), charge
         self._stamp_s: float | None = None
 
     def update(self, stamp_s: float, load: float, *, docked: bool = False) -> Battery:
@@ -43,15 +46,6 @@ class BatteryModel:
             self._charge = discharged(self._charge, elapsed, load, self._spec)
         read = self._charge + float(self._rng.normal(0.0, self._spec.sigma))
         return Battery(stamp_s, float(np.clip(round(read, 3), 0.0, 1.0)))
-
-    def state(self) -> State:
-        """What changes from one reading to the next."""
-        return {"rng": rng_state(self._rng), "charge": self._charge, "stamp_s": self._stamp_s}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        restore_rng(self._rng, state["rng"])
-        self._charge, self._stamp_s = state["charge"], state["stamp_s"]
 
 
 def discharged(charge: float, elapsed_s: float, load: float, spec: BatterySpec) -> float:

@@ -11,7 +11,7 @@ from pydrake.geometry import ColorRenderCamera, FrameId, QueryObject
 
 from plant.sensors.camera_noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from plant.sensors.camera_spec import CameraSpec, colour_render_camera, depth_render_camera
-from plant.snapshot.values import State, restore_rng, rng_state
+from plant.sensors.noisy import NoisySensor
 from skills.robot import FrameTree, Image
 
 _FAINT = 4
@@ -19,7 +19,7 @@ _NO_PICTURE = np.zeros((0, 0), dtype=np.uint8)
 _NO_DEPTH = np.zeros((0, 0), dtype=np.float32)
 
 
-class Camera:
+class Camera(NoisySensor):
     """One camera of one robot. Deterministic for a seed and an order of pictures."""
 
     def __init__(
@@ -37,6 +37,7 @@ class Camera:
 
         What is rendered is counted in `work`, by size.
         """
+        super().__init__(rng)
         self._work = Counter() if work is None else work
         self.spec = spec
         self._link_frame, self._X_LC = link_frame, spec.X_link_camera()
@@ -44,7 +45,6 @@ class Camera:
         self._colour_camera = colour_render_camera(picture, renderer)
         self._depth_camera = depth_render_camera(depth, renderer, spec.depth_range_m)
         self._faint_camera = colour_render_camera(spec.shrunk(_FAINT * spec.depth_shrink), renderer)
-        self._rng = rng
         self._picture = PictureDegrader(
             rng, picture.height, picture.width, picture_noise or PictureNoise(), spec.picture_shrink
         )
@@ -76,14 +76,6 @@ class Camera:
             depth_m=self._take_depth(query_object, grey) if depth else _NO_DEPTH,
             frames=frames,
         )
-
-    def state(self) -> State:
-        """What changes from one picture to the next."""
-        return {"rng": rng_state(self._rng)}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        restore_rng(self._rng, state["rng"])
 
     def _take_depth(self, query_object: QueryObject, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Noisy depth; where no picture was taken, a small one shows what is too dark or too shiny."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant.snapshot.values import State, restore_rng, rng_state
+from plant.sensors.noisy import NoisySensor
 from skills.robot import Gripper
 
 
@@ -26,12 +26,15 @@ class GripperNoise:
     holding_after_s: float = 0.15
 
 
-class GripperModel:
+class GripperModel(NoisySensor):
     """The gripper of one robot."""
+
+    kept = ("holding", "changing_since_s")
 
     def __init__(self, rng: np.random.Generator, noise: GripperNoise | None = None) -> None:
         """Start empty. A share of the force error is systematic and drawn here."""
-        self._rng, self._noise = rng, noise or GripperNoise()
+        super().__init__(rng)
+        self._noise = noise or GripperNoise()
         self._force_scale = 1.0 + float(rng.normal(0.0, self._noise.force_share))
         self._holding = False
         self._changing_since_s: float | None = None
@@ -46,15 +49,6 @@ class GripperModel:
         gripped = force >= self._noise.holding_force_n and opening > self._noise.closed_rad
         self._settle(stamp_s, gripped)
         return Gripper(stamp_s, max(0.0, opening), force, self._holding)
-
-    def state(self) -> State:
-        """What changes from one reading to the next."""
-        return {"rng": rng_state(self._rng), "holding": self._holding, "changing_since_s": self._changing_since_s}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        restore_rng(self._rng, state["rng"])
-        self._holding, self._changing_since_s = state["holding"], state["changing_since_s"]
 
     def _settle(self, stamp_s: float, gripped: bool) -> None:
         """Change the belief once the readings have said so for long enough."""

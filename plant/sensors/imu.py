@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from plant.snapshot.values import State, array_of, restore_rng, rng_state
+from plant.sensors.noisy import NoisySensor
 from skills.robot import FloatArray, Imu
 
 GRAVITY_W = np.array([0.0, 0.0, -9.81])
@@ -23,15 +24,18 @@ class ImuNoise:
     accelerometer_m_s2: float = 0.05
 
 
-class ImuModel:
+class ImuModel(NoisySensor):
     """The IMU of one robot; acceleration comes from the change of velocity between two updates."""
+
+    kept = ("last",)
 
     def __init__(self, rng: np.random.Generator, noise: ImuNoise | None = None) -> None:
         """Draw this run's biases."""
-        self._rng, self._noise = rng, noise or ImuNoise()
+        super().__init__(rng)
+        self._noise = noise or ImuNoise()
         self._gyro_bias = rng.normal(0.0, self._noise.gyro_bias_rad_s, 3)
         self._force_bias = rng.normal(0.0, self._noise.accelerometer_bias_m_s2, 3)
-        self._last: tuple[float, FloatArray] | None = None
+        self._last: list[Any] | None = None
 
     def update(self, stamp_s: float, X_WB: RigidTransform, w_WB_W: FloatArray, v_WB_W: FloatArray) -> Imu:
         """Reading at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
@@ -46,20 +50,9 @@ class ImuModel:
             (float(force[0]), float(force[1]), float(force[2])),
         )
 
-    def state(self) -> State:
-        """What changes from one reading to the next."""
-        last = None if self._last is None else [self._last[0], self._last[1].tolist()]
-        return {"rng": rng_state(self._rng), "last": last}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        restore_rng(self._rng, state["rng"])
-        last = state["last"]
-        self._last = None if last is None else (last[0], array_of(last[1]))
-
     def _acceleration(self, stamp_s: float, v_WB_W: FloatArray) -> FloatArray:
         """Mean acceleration since the last update, zero at the first."""
-        last, self._last = self._last, (stamp_s, v_WB_W.copy())
+        last, self._last = self._last, [stamp_s, v_WB_W.tolist()]
         if last is None or stamp_s <= last[0]:
             return np.zeros(3)
         return np.asarray((v_WB_W - last[1]) / (stamp_s - last[0]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant.snapshot.values import State, restore_rng, rng_state
+from plant.sensors.noisy import NoisySensor
 from skills.robot import FloatArray, Joints
 
 
@@ -21,12 +21,13 @@ class JointNoise:
     effort_nm: float = 0.3
 
 
-class JointModel:
+class JointModel(NoisySensor):
     """All joint sensors of one robot."""
 
     def __init__(self, rng: np.random.Generator, names: Sequence[str], noise: JointNoise | None = None) -> None:
         """`names` gives the order of the arrays in `update`."""
-        self._rng, self._names, self._noise = rng, tuple(names), noise or JointNoise()
+        super().__init__(rng)
+        self._names, self._noise = tuple(names), noise or JointNoise()
         self._offsets = rng.normal(0.0, self._noise.offset_rad, len(self._names))
 
     def update(
@@ -41,11 +42,3 @@ class JointModel:
         )
         position, velocity, effort = (dict(zip(self._names, row.tolist(), strict=True)) for row in read)
         return Joints(stamp_s, position, velocity, effort)
-
-    def state(self) -> State:
-        """What changes from one reading to the next."""
-        return {"rng": rng_state(self._rng)}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        restore_rng(self._rng, state["rng"])

@@ -14,9 +14,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
 
+from plant.sensors.noisy import NoisySensor
 from plant.sensors.ray_cast import NO_RETURN_M, cast_rays
 from plant.sensors.ray_shapes import RayScene
-from plant.snapshot.values import State, restore_rng, rng_state
 from skills.robot import Scan
 
 
@@ -45,7 +45,7 @@ class LidarSpec:
         return -np.pi + np.arange(columns, dtype=np.float64) * (2.0 * np.pi / columns)
 
 
-class Lidar:
+class Lidar(NoisySensor):
     """The LiDAR of one robot, fixed to a body of it."""
 
     def __init__(
@@ -65,9 +65,10 @@ class Lidar:
         `unseen` are the model instances that the beams pass through, by default the one that carries the lidar.
         The rays cast are counted in `work`.
         """
+        super().__init__(rng)
         self._work = Counter() if work is None else work
         self.spec = spec or LidarSpec()
-        self._plant, self._body, self._X_BL, self._rng = plant, body, X_BL, rng
+        self._plant, self._body, self._X_BL = plant, body, X_BL
         self._scene = RayScene(plant, inspector, (body.model_instance(),) if unseen is None else unseen)
         self._elevations, self._azimuths = self.spec.elevations_rad(), self.spec.azimuths_rad()
 
@@ -82,14 +83,6 @@ class Lidar:
             X_BL=self._X_BL,
             X_OB=X_OB,
         )
-
-    def state(self) -> State:
-        """What changes from one scan to the next."""
-        return {"rng": rng_state(self._rng)}
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-        restore_rng(self._rng, state["rng"])
 
     def true_ranges(self, plant_context: Context, X_WL: RigidTransform) -> NDArray[np.float32]:
         """Ranges (rings, azimuths) without noise from a pose, `NO_RETURN_M` where nothing is hit."""

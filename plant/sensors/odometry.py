@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.snapshot.values import State, restore_rng, rng_state
+from plant.sensors.noisy import NoisySensor
+from plant.snapshot.values import State
 from skills.robot import FloatArray, Odometry, Pose2D
 
 
@@ -42,12 +43,13 @@ class _Last:
     estimate: Pose2D
 
 
-class OdometryModel:
+class OdometryModel(NoisySensor):
     """Odometry of one robot. `odom` (O) lies on the floor under the body at the first update."""
 
     def __init__(self, rng: np.random.Generator, noise: OdometryNoise | None = None) -> None:
         """Draw this run's systematic errors."""
-        self._rng, self._noise = rng, noise or OdometryNoise()
+        super().__init__(rng)
+        self._noise = noise or OdometryNoise()
         scale, turn_scale, drift = np.clip(rng.standard_normal(3), -2.0, 2.0)
         self._scale = 1.0 + self._noise.scale * float(scale)
         self._turn_scale = 1.0 + self._noise.turn_scale * float(turn_scale)
@@ -69,11 +71,11 @@ class OdometryModel:
     def state(self) -> State:
         """What changes from one reading to the next."""
         last = self._last and [self._last.stamp_s, *_numbers(self._last.true), *_numbers(self._last.estimate)]
-        return {"rng": rng_state(self._rng), "last": last}
+        return {**super().state(), "last": last}
 
     def restore(self, state: State) -> None:
         """Go on from such a state."""
-        restore_rng(self._rng, state["rng"])
+        super().restore(state)
         last = state["last"]
         self._last = last and _Last(last[0], Pose2D(*last[1:4]), Pose2D(*last[4:]))
 

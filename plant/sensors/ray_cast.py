@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from skills.robot import FloatArray
 
+Rays = tuple[FloatArray, FloatArray, FloatArray]
+"""Of one column, in a shape's frame: origin, the horizontal direction and up, (3,) each."""
 FunctionT = TypeVar("FunctionT", bound=Callable[..., object])
 
 NO_RETURN_M = 1.0e6
@@ -63,14 +65,15 @@ def cast_rays(
                 continue
             across = R_LG[0] * cos_a[column] + R_LG[1] * sin_a[column]
             row = ranges[column]
+            rays = (origin, across, R_LG[2])
             if kinds[i] == 0:
-                _cast_box(row, origin, across, R_LG[2], cos_e, sin_e, half_extents[i])
+                _cast_box(row, rays, cos_e, sin_e, half_extents[i])
             elif kinds[i] == 1:
-                _cast_cylinder(row, origin, across, R_LG[2], cos_e, sin_e, half_extents[i])
+                _cast_cylinder(row, rays, cos_e, sin_e, half_extents[i])
             elif kinds[i] == 2:
-                _cast_capsule(row, origin, across, R_LG[2], cos_e, sin_e, half_extents[i])
+                _cast_capsule(row, rays, cos_e, sin_e, half_extents[i])
             else:
-                _cast_ellipsoid(row, origin, across, R_LG[2], cos_e, sin_e, half_extents[i])
+                _cast_ellipsoid(row, rays, cos_e, sin_e, half_extents[i])
             farthest[column] = row.max()
     return ranges
 
@@ -115,16 +118,9 @@ def _columns_spanned(R_LG: FloatArray, p_LG: FloatArray, half: FloatArray, azimu
 
 
 @_compiled
-def _cast_box(
-    row: FloatArray,
-    origin: FloatArray,
-    across: FloatArray,
-    up: FloatArray,
-    cos_e: FloatArray,
-    sin_e: FloatArray,
-    half: FloatArray,
-) -> None:
+def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
     """Shorten one column's ranges to a box; the loop has no branches, so that it runs on vector units."""
+    origin, across, up = rays
     ox, oy, oz = origin[0], origin[1], origin[2]
     hx, hy, hz = half[0], half[1], half[2]
     for ring in range(len(cos_e)):
@@ -144,16 +140,9 @@ def _cast_box(
 
 
 @_compiled
-def _cast_cylinder(
-    row: FloatArray,
-    origin: FloatArray,
-    across: FloatArray,
-    up: FloatArray,
-    cos_e: FloatArray,
-    sin_e: FloatArray,
-    half: FloatArray,
-) -> None:
+def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
     """Shorten one column's ranges to a cylinder along its z: the round wall cut by the slab of the caps."""
+    origin, across, up = rays
     ox, oy, oz = origin[0], origin[1], origin[2]
     c = ox * ox + oy * oy - half[0] * half[0]
     for ring in range(len(cos_e)):
@@ -173,16 +162,9 @@ def _cast_cylinder(
 
 
 @_compiled
-def _cast_ellipsoid(
-    row: FloatArray,
-    origin: FloatArray,
-    across: FloatArray,
-    up: FloatArray,
-    cos_e: FloatArray,
-    sin_e: FloatArray,
-    half: FloatArray,
-) -> None:
+def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
     """Shorten one column's ranges to an ellipsoid, by scaling space until it is the unit ball."""
+    origin, across, up = rays
     ox, oy, oz = origin[0] / half[0], origin[1] / half[1], origin[2] / half[2]
     c = ox * ox + oy * oy + oz * oz - 1.0
     for ring in range(len(cos_e)):
@@ -198,20 +180,13 @@ def _cast_ellipsoid(
 
 
 @_compiled
-def _cast_capsule(
-    row: FloatArray,
-    origin: FloatArray,
-    across: FloatArray,
-    up: FloatArray,
-    cos_e: FloatArray,
-    sin_e: FloatArray,
-    half: FloatArray,
-) -> None:
+def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
     """Shorten one column's ranges to a capsule along its z: a cylinder and two balls (half[2] includes a ball)."""
+    origin, across, up = rays
     straight = half[2] - half[0]
     barrel = np.array([half[0], half[0], straight])
     ball = np.array([half[0], half[0], half[0]])
     end = np.array([0.0, 0.0, straight])
-    _cast_cylinder(row, origin, across, up, cos_e, sin_e, barrel)
-    _cast_ellipsoid(row, origin - end, across, up, cos_e, sin_e, ball)
-    _cast_ellipsoid(row, origin + end, across, up, cos_e, sin_e, ball)
+    _cast_cylinder(row, rays, cos_e, sin_e, barrel)
+    _cast_ellipsoid(row, (origin - end, across, up), cos_e, sin_e, ball)
+    _cast_ellipsoid(row, (origin + end, across, up), cos_e, sin_e, ball)

@@ -7,7 +7,7 @@ hulls stand in by their oriented bounding boxes, half spaces by a very wide box 
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,30 +150,10 @@ def shape_row(inspector: SceneGraphInspector, geometry: GeometryId) -> Row:
     return ShapeKind.BOX, np.asarray(box.half_width(), dtype=np.float64), X_FG @ box.pose()
 
 
-def _box(shape: Box) -> tuple[ShapeKind, FloatArray]:
-    return ShapeKind.BOX, np.asarray(shape.size()) / 2.0
-
-
-def _cylinder(shape: Cylinder) -> tuple[ShapeKind, FloatArray]:
-    return ShapeKind.CYLINDER, np.array([shape.radius(), shape.radius(), shape.length() / 2.0])
-
-
-def _capsule(shape: Capsule) -> tuple[ShapeKind, FloatArray]:
-    return ShapeKind.CAPSULE, np.array([shape.radius(), shape.radius(), shape.length() / 2.0 + shape.radius()])
-
-
-def _sphere(shape: Sphere) -> tuple[ShapeKind, FloatArray]:
-    return ShapeKind.ELLIPSOID, np.full(3, shape.radius())
-
-
-def _ellipsoid(shape: Ellipsoid) -> tuple[ShapeKind, FloatArray]:
-    return ShapeKind.ELLIPSOID, np.array([shape.a(), shape.b(), shape.c()])
-
-
-_MAKERS: dict[type[Shape], Callable[..., tuple[ShapeKind, FloatArray]]] = {
-    Box: _box,
-    Cylinder: _cylinder,
-    Capsule: _capsule,
-    Sphere: _sphere,
-    Ellipsoid: _ellipsoid,
+_MAKERS: Mapping[type[Shape], Callable[..., tuple[ShapeKind, Sequence[float]]]] = {
+    Box: lambda shape: (ShapeKind.BOX, shape.size() / 2.0),
+    Cylinder: lambda shape: (ShapeKind.CYLINDER, (shape.radius(), shape.radius(), shape.length() / 2.0)),
+    Capsule: lambda shape: (ShapeKind.CAPSULE, (shape.radius(), shape.radius(), shape.length() / 2.0 + shape.radius())),
+    Sphere: lambda shape: (ShapeKind.ELLIPSOID, (shape.radius(),) * 3),
+    Ellipsoid: lambda shape: (ShapeKind.ELLIPSOID, (shape.a(), shape.b(), shape.c())),
 }

@@ -12,16 +12,6 @@ from skills.robot import FloatArray
 State = dict[str, Any]
 
 
-def rng_state(rng: np.random.Generator) -> State:
-    """Where a generator stands."""
-    return dict(rng.bit_generator.state)
-
-
-def restore_rng(rng: np.random.Generator, state: State) -> None:
-    """Let a generator of the same kind go on from there."""
-    rng.bit_generator.state = state
-
-
 def transform_state(X: RigidTransform | None) -> list[list[float]] | None:
     """A transform as the rows of its 3 x 4 matrix."""
     return None if X is None else X.GetAsMatrix34().tolist()

@@ -4,44 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from plant.snapshot.file import Snapshot, SnapshotError, SnapshotFile, encoded
-from plant.snapshot.values import State
-from skills.robot import FloatArray
+
+if TYPE_CHECKING:
+    from plant.referee.referee import Referee
+    from plant.simulation import Engine
 
 PERIOD_S: Final = 1.0
 _WORLD: Final = "world: "
 _PATH: Final = "path: "
-
-
-class KeptEngine(Protocol):
-    """The part of the engine that a snapshot needs."""
-
-    def now(self) -> float:
-        """Simulated seconds since the start."""
-
-    def state(self) -> State:
-        """Time and robots."""
-
-    def world_state(self) -> Mapping[str, FloatArray]:
-        """Positions and velocities of all that moves."""
-
-    def restore(self, state: State, world: Mapping[str, FloatArray]) -> None:
-        """Go on from there."""
-
-
-class KeptReferee(Protocol):
-    """The part of the referee that a snapshot needs."""
-
-    def state(self) -> State:
-        """The record but the paths."""
-
-    def points(self, robot: str) -> Sequence[FloatArray]:
-        """A robot's path, which only grows."""
-
-    def restore(self, state: State, paths: Mapping[str, FloatArray]) -> None:
-        """Go on with a record."""
 
 
 class SnapshotWriter:
@@ -51,7 +24,7 @@ class SnapshotWriter:
     """
 
     def __init__(
-        self, path: Path, engine: KeptEngine, referee: KeptReferee, facts: Mapping[str, Any], robots: Sequence[str]
+        self, path: Path, engine: Engine, referee: Referee, facts: Mapping[str, Any], robots: Sequence[str]
     ) -> None:
         self._file, self._engine, self._referee, self._facts = SnapshotFile(path), engine, referee, dict(facts)
         self._paths = {robot: bytearray() for robot in robots}
@@ -84,7 +57,7 @@ class SnapshotWriter:
         return (len(points), 3), raw
 
 
-def restore(snapshot: Snapshot, engine: KeptEngine, referee: KeptReferee, facts: Mapping[str, Any]) -> None:
+def restore(snapshot: Snapshot, engine: Engine, referee: Referee, facts: Mapping[str, Any]) -> None:
     """Bring a plant to a snapshot's state; all of `facts` must be as they were.
 
     Raises:

@@ -84,15 +84,15 @@ class SpotRobot:
 
     def odometry(self) -> Odometry:
         """Latest dead reckoning."""
-        return self._sensors.odometry()
+        return self._sensors.odometry
 
     def imu(self) -> Imu:
         """Latest inertial measurement."""
-        return self._sensors.imu()
+        return self._sensors.imu
 
     def scan(self) -> Scan | None:
         """Latest LiDAR revolution, None before the first."""
-        return self._sensors.scan()
+        return self._sensors.scan
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Take a picture with depth now, or only one of the two. Raises ValueError for an unknown source."""
@@ -100,15 +100,15 @@ class SpotRobot:
 
     def joints(self) -> Joints:
         """Latest joint state."""
-        return self._sensors.joints()
+        return self._sensors.joints
 
     def gripper(self) -> Gripper:
         """Latest gripper state."""
-        return self._sensors.gripper()
+        return self._sensors.gripper
 
     def battery(self) -> Battery:
         """Latest battery state."""
-        return self._sensors.battery()
+        return self._sensors.battery
 
     def faults(self) -> tuple[str, ...]:
         """Present faults, empty when well."""

@@ -6,7 +6,6 @@ import math
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Protocol
 
 import numpy as np
 from pydrake.geometry import FrameId, SceneGraph
@@ -22,6 +21,7 @@ from plant.sensors.gripper import GripperModel
 from plant.sensors.imu import ImuModel
 from plant.sensors.joints import JointModel
 from plant.sensors.lidar import Lidar
+from plant.sensors.noisy import NoisySensor
 from plant.sensors.odometry import OdometryModel
 from plant.snapshot.values import State
 from plant.spot.model import SpotModel
@@ -35,18 +35,8 @@ _DOCKED_WITHIN_M = 0.2
 _STILL_M_S = 0.02
 
 
-class _Kept(Protocol):
-    """A sensor that can be restored."""
-
-    def state(self) -> State:
-        """What changes."""
-
-    def restore(self, state: State) -> None:
-        """Go on from such a state."""
-
-
 class SpotSensors:
-    """All sensors of one Spot. Pictures are taken when asked for, all else at `update`."""
+    """All sensors of one Spot. Pictures are taken when asked for; `update` takes the readings, which are attributes."""
 
     def __init__(
         self,
@@ -81,7 +71,7 @@ class SpotSensors:
             name: Camera(spec, self._link_frame(spec.link), next(rngs), renderer=RENDERER, work=work)
             for name, spec in load_cameras(CAMERAS).items()
         }
-        self._scan: Scan | None = None
+        self.scan: Scan | None = None
         self.update(0.0)
 
     def _make_lidar(self, rng: np.random.Generator, work: Counter[str] | None) -> Lidar:
@@ -100,19 +90,19 @@ class SpotSensors:
         X_WB = plant.EvalBodyPoseInWorld(self._context, self._model.body)
         V_WB = plant.EvalBodySpatialVelocityInWorld(self._context, self._model.body)
         w_WB, v_WB = _array(V_WB.rotational()), _array(V_WB.translational())
-        self._odometry = self._odometry_model.update(now_s, X_WB, w_WB, v_WB)
-        self._imu = self._imu_model.update(now_s, X_WB, w_WB, v_WB)
+        self.odometry: Odometry = self._odometry_model.update(now_s, X_WB, w_WB, v_WB)
+        self.imu: Imu = self._imu_model.update(now_s, X_WB, w_WB, v_WB)
         positions = _array(plant.GetPositions(self._context)[index.positions])
         rates = _array(plant.GetVelocities(self._context)[index.velocities])
         efforts = self._efforts(positions, rates)
-        self._joints = self._joint_model.update(now_s, positions, rates, efforts)
-        self._gripper = self._gripper_model.update(
+        self.joints: Joints = self._joint_model.update(now_s, positions, rates, efforts)
+        self.gripper: Gripper = self._gripper_model.update(
             now_s, -float(positions[index.gripper]), self._clamp_force_n(rates, efforts)
         )
         load = min(1.0, float(np.linalg.norm(v_WB)) + float(np.abs(rates[index.arm]).sum()) / 4.0)
-        self._battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
-        if self._scan is None or now_s - self._scan.stamp_s >= _LIDAR_PERIOD_S - 1e-6:
-            self._scan = self._lidar.scan(self._context, now_s, self._odometry.X_OB)
+        self.battery: Battery = self._battery_model.update(now_s, load, docked=self._docked(X_WB, v_WB))
+        if self.scan is None or now_s - self.scan.stamp_s >= _LIDAR_PERIOD_S - 1e-6:
+            self.scan = self._lidar.scan(self._context, now_s, self.odometry.X_OB)
 
     def _efforts(self, positions: FloatArray, rates: FloatArray) -> FloatArray:
         """What the motors do: the servos' law with limits, as the plant's solver has it at the end of a step."""
@@ -140,10 +130,10 @@ class SpotSensors:
         """Go on from such a state, and take readings."""
         for name, part in self._parts().items():
             part.restore(state[name])
-        self._scan = None
+        self.scan = None
         self.update(now_s)
 
-    def _parts(self) -> Mapping[str, _Kept]:
+    def _parts(self) -> Mapping[str, NoisySensor]:
         return {
             "odometry": self._odometry_model,
             "imu": self._imu_model,
@@ -159,30 +149,6 @@ class SpotSensors:
         if abs(float(rates[self._index.gripper])) > _GRIPPER_MOVES_RAD_S:
             return 0.0
         return max(0.0, float(efforts[self._index.gripper])) / float(spot_facts()["gripper"]["tip_radius"])
-
-    def odometry(self) -> Odometry:
-        """Latest dead reckoning."""
-        return self._odometry
-
-    def imu(self) -> Imu:
-        """Latest inertial measurement."""
-        return self._imu
-
-    def scan(self) -> Scan | None:
-        """Latest LiDAR revolution."""
-        return self._scan
-
-    def joints(self) -> Joints:
-        """Latest joint state."""
-        return self._joints
-
-    def gripper(self) -> Gripper:
-        """Latest gripper state."""
-        return self._gripper
-
-    def battery(self) -> Battery:
-        """Latest battery state."""
-        return self._battery
 
     def image(self, source: str, *, visual: bool, depth: bool) -> Image:
         """Render a picture, its depth, or both.
@@ -201,7 +167,7 @@ class SpotSensors:
     def _frames(self) -> FrameTree:
         """The frame tree from odometry and joint encoders."""
         edges = {
-            "body": ("odom", self._odometry.X_OB),
+            "body": ("odom", self.odometry.X_OB),
             "hand": ("body", self._X_BHand()),
             "lidar": ("body", RigidTransform(spot_facts()["lidar"]["xyz"])),
         }
@@ -212,9 +178,7 @@ class SpotSensors:
     def _X_BHand(self) -> RigidTransform:
         plant = self._model.plant
         for name in arm_joint_names():
-            plant.GetJointByName(name, self._model.instance).set_angle(
-                self._kinematics, self._joints.position_rad[name]
-            )
+            plant.GetJointByName(name, self._model.instance).set_angle(self._kinematics, self.joints.position_rad[name])
         hand = plant.GetBodyByName(HAND_LINK, self._model.instance).body_frame()
         X_BHand: RigidTransform = plant.CalcRelativeTransform(self._kinematics, self._model.body.body_frame(), hand)
         return X_BHand

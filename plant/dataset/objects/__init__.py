@@ -5,16 +5,19 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from plant.dataset.objects.cache import cache_folder, kept_folder, sources_digest
 from plant.dataset.objects.draft import Draft, Finished
 from plant.dataset.objects.model import ObjectModel, Surface, held_out, read_model, write_model
 from plant.dataset.objects.recipes import build, load_recipes
 from plant.dataset.objects.repainting import in_one_colour, plainly_painted
+from plant.models.cache import kept_folder, user_cache
 from plant.models.catalogue import load_catalogue
 
 __all__ = [
@@ -47,6 +50,16 @@ _ONE_COLOUR: Mapping[str, float] = {"extinguisher": 0.0, "hammer": 0.4, "screwdr
 """Those classes, and how often they are of a single colour: not what is told by its colours."""
 CLASSES: tuple[str, ...] = tuple(load_recipes("classes"))
 DISTRACTORS: tuple[str, ...] = tuple(sorted(load_recipes("distractors")))
+
+
+@cache
+def sources_digest() -> str:
+    """Ten hexadecimal digits that change whenever a source of the models does."""
+    plant, digest = Path(__file__).resolve().parents[2], hashlib.sha256()
+    found = [path for folder in ("dataset/objects", "models/builder") for path in (plant / folder).rglob("*")]
+    for path in sorted(path for path in found if path.suffix in (".py", ".yaml")):
+        digest.update(path.relative_to(plant).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:10]
 
 
 def numbers(category: str, *, for_training: bool) -> list[int]:
@@ -99,7 +112,10 @@ def make(category: str, seed: int) -> tuple[Finished, str, str]:
 
 
 def instance(category: str, seed: int) -> ObjectModel:
-    """The instance of a category by its number, made now unless the cache has it. Raises KeyError, ValueError."""
+    """The instance of a category by its number, made now unless the cache has it. Raises KeyError, ValueError.
+
+    `ERRAND_MODEL_CACHE` names another place than the user's cache.
+    """
 
     def fill(folder: Path) -> None:
         made, kind, colour = make(category, seed)
@@ -108,4 +124,6 @@ def instance(category: str, seed: int) -> ObjectModel:
         model = ObjectModel(folder, category, seed, class_id, kind, colour, made.mass.mass_kg, (x, y, z), made.size_m)
         write_model(folder, model, made)
 
-    return read_model(kept_folder(cache_folder() / f"{category}_{seed:03d}", fill))
+    chosen = os.environ.get("ERRAND_MODEL_CACHE")
+    folder = (Path(chosen) if chosen else user_cache() / "models") / sources_digest()
+    return read_model(kept_folder(folder / f"{category}_{seed:03d}", fill))

@@ -10,36 +10,12 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
 from plant.dataset.objects.draft import Draft, shade
-from plant.dataset.objects.expressions import Number, evaluate
-from plant.dataset.objects.lettering import printed_label, write_word
+from plant.dataset.objects.lettering import COLOURS, printed_label, write_word
 from plant.dataset.objects.wear import brushed, plain, rusty, used
+from plant.models.builder.expressions import Number, evaluate
 from plant.models.builder.mesh import Colour
 from plant.models.builder.pictures import cloth, noise, speckle, wood
 from skills.robot import FloatArray
-
-COLOURS: Final[Mapping[str, Colour]] = {
-    "white": (0.92, 0.92, 0.90),
-    "black": (0.08, 0.08, 0.09),
-    "grey": (0.50, 0.51, 0.53),
-    "red": (0.78, 0.08, 0.07),
-    "blue": (0.10, 0.25, 0.66),
-    "green": (0.11, 0.47, 0.21),
-    "yellow": (0.94, 0.78, 0.09),
-    "orange": (0.92, 0.44, 0.07),
-    "brown": (0.42, 0.28, 0.17),
-    "pink": (0.90, 0.55, 0.66),
-    "cream": (0.90, 0.86, 0.74),
-    "teal": (0.15, 0.52, 0.54),
-    "purple": (0.40, 0.20, 0.54),
-}
-GREYS: Final[tuple[Colour, ...]] = (
-    (0.50, 0.50, 0.51),
-    (0.65, 0.65, 0.67),
-    (0.78, 0.78, 0.80),
-    (0.33, 0.33, 0.35),
-    (0.20, 0.20, 0.21),
-    (0.08, 0.08, 0.08),
-)
 
 Colours = str | tuple[Any, ...] | dict[str, Any]
 """A name, "any", "main", three numbers, several of these to choose from, or those by a name of the recipe's own."""

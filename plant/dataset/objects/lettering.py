@@ -1,49 +1,26 @@
-"""Words and emblems on pictures, and names that we invent for them."""
+"""Words, emblems and invented names on pictures; their fonts, syllables and colours are in `decoration.yaml`."""
 
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any, Final
 
 import cv2
 import numpy as np
+import yaml
 from numpy.typing import ArrayLike
 
+from plant.models.builder.mesh import Colour
 from skills.robot import FloatArray
 
-_FACES = (
-    "DejaVuSans-Bold.ttf",
-    "DejaVuSans-BoldOblique.ttf",
-    "DejaVuSerif-Bold.ttf",
-    "DejaVuSerif-BoldItalic.ttf",
-    "DejaVuSerif-Italic.ttf",
-    "STIXGeneralBolIta.ttf",
-    "STIXGeneralBol.ttf",
-    "DejaVuSansMono-Bold.ttf",
-    "cmb10.ttf",
+_DECORATION: Final[Mapping[str, Any]] = yaml.load(
+    Path(__file__).with_name("decoration.yaml").read_text(encoding="utf-8"), Loader=yaml.CSafeLoader
 )
-_STARTS = ("Al", "Bro", "Cas", "Dun", "El", "Far", "Gol", "Hal", "Kra", "Lor", "Mon", "Nor", "Ost", "Pel", "Rav", "Sol")
-_MIDDLES = ("", "a", "de", "en", "i", "ko", "lo", "ma", "ri", "ta", "ve")
-_ENDS = (
-    "berg",
-    "do",
-    "feld",
-    "field",
-    "hof",
-    "ia",
-    "ka",
-    "land",
-    "lin",
-    "mar",
-    "na",
-    "rado",
-    "stein",
-    "ton",
-    "vik",
-    "za",
-)
+COLOURS: Final[Mapping[str, Colour]] = {name: tuple(rgb) for name, rgb in _DECORATION["colours"].items()}
+GREYS: Final[tuple[Colour, ...]] = tuple(tuple(rgb) for rgb in _DECORATION["greys"])
 
 
 @cache
@@ -57,12 +34,12 @@ def _font_folder() -> Path:
 
 @cache
 def _face(index: int) -> cv2.FontFace:
-    return cv2.FontFace(str(_font_folder() / _FACES[index % len(_FACES)]))
+    return cv2.FontFace(str(_font_folder() / _DECORATION["fonts"][index % len(_DECORATION["fonts"])]))
 
 
 def brand(rng: np.random.Generator) -> str:
     """An invented name."""
-    return str(rng.choice(_STARTS)) + str(rng.choice(_MIDDLES)) + str(rng.choice(_ENDS))
+    return "".join(str(rng.choice(_DECORATION[part])) for part in ("starts", "middles", "ends"))
 
 
 def word_mask(text: str, shape: tuple[int, int], *, face: int = 0, fill: float = 0.9) -> FloatArray:
@@ -126,20 +103,11 @@ def emblem(size: int, rng: np.random.Generator) -> FloatArray:
     points = int(rng.integers(5, 9))
     angle = np.arange(2 * points) * np.pi / points - np.pi / 2
     radius = np.where(np.arange(2 * points) % 2 == 0, 0.48, rng.choice([0.22, 0.48]))
-    figures = (*_FIGURES, np.column_stack([0.5 + radius * np.cos(angle), 0.5 + radius * np.sin(angle)]))
+    figures = (*_DECORATION["figures"], np.column_stack([0.5 + radius * np.cos(angle), 0.5 + radius * np.sin(angle)]))
     canvas = np.zeros((size * 4, size * 4), np.uint8)
     outline = np.array(figures[int(rng.integers(len(figures)))])
     cv2.fillPoly(canvas, [np.round(outline * size * 4).astype(np.int32)], 255)
     return np.asarray(cv2.resize(canvas, (size, size), interpolation=cv2.INTER_AREA) / 255.0)
-
-
-_FIGURES = (
-    ((0.1, 0.08), (0.9, 0.08), (0.9, 0.5), (0.75, 0.8), (0.5, 0.97), (0.25, 0.8), (0.1, 0.5)),
-    ((0.1, 0.85), (0.05, 0.3), (0.3, 0.55), (0.5, 0.12), (0.7, 0.55), (0.95, 0.3), (0.9, 0.85)),
-    ((0.05, 0.9), (0.1, 0.4), (0.5, 0.08), (0.95, 0.05), (0.9, 0.5), (0.55, 0.85)),
-    ((0.02, 0.92), (0.36, 0.2), (0.52, 0.5), (0.68, 0.3), (0.98, 0.92)),
-)
-"""A shield, a crown, a leaf and a mountain."""
 
 
 def printed_label(

@@ -6,7 +6,6 @@ import json
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +13,11 @@ from numpy.typing import NDArray
 from plant.dataset.objects.draft import Finished
 from plant.models.builder.gltf import gltf_text
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, plain_colours, write_text
-from plant.models.builder.pictures import write_png
 from plant.models.builder.sdf import Model, model_sdf
+from plant.pictures import save_png
 from skills.robot import FloatArray
 
 HELD_OUT_EVERY = 4
-_QUICK: Final = 1
-"""What is kept in a cache need not be small; packing it as tightly as can be took a third of the time."""
 
 
 def held_out(number: int) -> bool:
@@ -96,9 +93,9 @@ def write_model(folder: Path, model: ObjectModel, made: Finished) -> None:
     write_text(folder / f"{model.category}.mtl", mtl_text(made.mesh, "palette.png"))
     write_text(folder / model.gltf_path.name, gltf_text(made.mesh))
     for name, picture in made.pictures.items():
-        write_png(folder / name, picture, compression=_QUICK)
+        save_png(folder / name, picture)
     if plain_colours(made.mesh.materials):
-        write_png(folder / "palette.png", palette_picture(made.mesh.materials), compression=_QUICK)
+        save_png(folder / "palette.png", palette_picture(made.mesh.materials))
     surface = surface_of(made.mesh)
     np.savez_compressed(
         folder / "surface.npz", points=surface.points.astype(np.float32), faces=surface.faces.astype(np.int32)

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
 from plant.dataset.objects.draft import Draft, Finished, turned
-from plant.dataset.objects.expressions import Number, evaluate
 from plant.dataset.objects.finishes import Colours, Finish, apply_finish, draw_colour
+from plant.models.builder.expressions import Number, evaluate
 from plant.models.builder.mesh import IDENTITY, Mesh
 from plant.models.builder.outlines import arc, curve
 from plant.models.builder.surfaces import (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from plant.dataset.objects.draft import Finished, pick, varied
-from plant.dataset.objects.finishes import COLOURS, GREYS
+from plant.dataset.objects.lettering import COLOURS, GREYS
 from plant.models.builder.mesh import Material, Mesh
 
 __all__ = ["in_one_colour", "plainly_painted"]

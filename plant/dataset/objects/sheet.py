@@ -22,8 +22,7 @@ from pydrake.math import RigidTransform
 
 from plant.dataset.objects import CLASSES, DISTRACTORS, instance
 from plant.dataset.objects.model import ObjectModel
-from plant.models.builder.pictures import write_png
-from plant.pictures import look_at, render_view
+from plant.pictures import look_at, render_view, save_png
 from plant.worlds.lights import lights
 from skills.robot import Picture
 
@@ -70,7 +69,7 @@ def main(arguments: Sequence[str]) -> None:
             models = [instance(name, k) for name in DISTRACTORS for k in range(2)]
         else:
             models = [instance(category, k) for k in range(48 if category in CLASSES else 8)]
-        write_png(folder / f"{category}.png", sheet(models, 8))
+        save_png(folder / f"{category}.png", sheet(models, 8))
 
 
 if __name__ == "__main__":

@@ -14,8 +14,8 @@ from plant.models.builder.appearance import (
 )
 from plant.models.builder.mesh import mtl_text, obj_text, palette_picture, plain_colours, write_text
 from plant.models.builder.person import person, person_appearance
-from plant.models.builder.pictures import write_png
 from plant.models.builder.sdf import Model, model_sdf
+from plant.pictures import save_png
 
 
 def build(folder: Path) -> None:
@@ -37,9 +37,9 @@ def write_model(folder: Path, model: Model, appearance: Appearance) -> None:
     write_text(folder / f"{model.name}.obj", obj_text(appearance.mesh, f"{model.name}.mtl"))
     write_text(folder / f"{model.name}.mtl", mtl_text(appearance.mesh, "palette.png"))
     for name, picture in appearance.pictures.items():
-        write_png(folder / name, picture)
+        save_png(folder / name, picture, 9)
     if plain_colours(appearance.mesh.materials):
-        write_png(folder / "palette.png", palette_picture(appearance.mesh.materials))
+        save_png(folder / "palette.png", palette_picture(appearance.mesh.materials), 9)
 
 
 if __name__ == "__main__":

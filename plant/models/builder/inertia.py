@@ -5,8 +5,6 @@ Both sum the second moments of tetrahedra or triangles exactly (Blow and Binstoc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from plant.models.builder.mesh import Mesh
@@ -26,17 +24,6 @@ def shell_mass(mesh: Mesh, density_kg_m2: float) -> MassProperties:
     a, b, c = _corners(mesh)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     return _gathered(a, b, c, area * density_kg_m2, apex=False)
-
-
-def together(bodies: Sequence[MassProperties]) -> MassProperties:
-    """The mass properties of bodies joined rigidly, all given in one frame."""
-    mass = sum(body.mass_kg for body in bodies)
-    com = np.asarray(sum(body.mass_kg * body.com for body in bodies)) / mass
-    inertia = np.zeros((3, 3))
-    for body in bodies:
-        offset = body.com - com
-        inertia += body.inertia + body.mass_kg * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    return MassProperties(float(mass), com, inertia)
 
 
 def scaled_to(body: MassProperties, mass_kg: float) -> MassProperties:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from plant.models.builder.sdf import Model
-from plant.models.builder.shapes import Box, Cylinder, Part, Shape, Sphere, mass_properties
+from plant.models.builder.shapes import Box, Cylinder, Shape, Sphere, together
 
 PROUD_M = 0.0003
 RIM_POINTS = 8
@@ -26,7 +26,7 @@ def coke() -> Model:
     """A 0.33 l can."""
     bodies = [Cylinder(radius=CAN_RADIUS_M, length=CAN_HEIGHT_M - 2 * PROUD_M)]
     rims = [*_rim(0.029, -CAN_HEIGHT_M / 2), *_rim(0.028, CAN_HEIGHT_M / 2)]
-    return Model("coke", "coke.obj", [*bodies, *rims], mass_properties([Part(bodies[0], 0.35)]), comment="a red can")
+    return Model("coke", "coke.obj", [*bodies, *rims], together([bodies[0].mass_properties(0.35)]), comment="a red can")
 
 
 def beer() -> Model:
@@ -36,7 +36,7 @@ def beer() -> Model:
     body = Cylinder(radius=BOTTLE_RADIUS_M, length=BOTTLE_BODY_M - PROUD_M, p=(0, 0, bottom + BOTTLE_BODY_M / 2))
     neck = Cylinder(radius=BOTTLE_NECK_RADIUS_M, length=top - neck_from, p=(0, 0, (top + neck_from) / 2))
     shoulder = Cylinder(radius=0.023, length=0.02, p=(0, 0, neck_from + 0.01))
-    mass = mass_properties([Part(body, 0.48), Part(neck, 0.05), Part(shoulder, 0.02)])
+    mass = together([body.mass_properties(0.48), neck.mass_properties(0.05), shoulder.mass_properties(0.02)])
     return Model("beer", "beer.obj", [body, shoulder, neck, *_rim(0.026, bottom)], mass, comment="a bottle")
 
 
@@ -44,7 +44,7 @@ def cube() -> Model:
     """A wooden cube, painted blue."""
     box = Box(size=(CUBE_M - 2 * PROUD_M,) * 3)
     corners = _corners((0, 0, 0), (CUBE_M, CUBE_M, CUBE_M))
-    return Model("cube", "cube.obj", [box, *corners], mass_properties([Part(box, 0.12)]), comment="a blue cube")
+    return Model("cube", "cube.obj", [box, *corners], together([box.mass_properties(0.12)]), comment="a blue cube")
 
 
 def hammer() -> Model:
@@ -58,7 +58,7 @@ def hammer() -> Model:
         *_corners(head.p, (HEAD_WIDTH_M, HEAD_LENGTH_M, HAMMER_THICKNESS_M)),
         *_corners((-half + 0.01, 0, 0), (0.02, HANDLE_WIDTH_M, HAMMER_THICKNESS_M)),
     ]
-    mass = mass_properties([Part(handle, 0.13), Part(head, 0.42)])
+    mass = together([handle.mass_properties(0.13), head.mass_properties(0.42)])
     return Model("hammer", "hammer.obj", [handle, head, *feet], mass, comment="a claw hammer")
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import cv2
 import numpy as np
 
 from skills.robot import FloatArray, Picture
@@ -56,13 +53,3 @@ def speckle(rng: np.random.Generator, shape: tuple[int, int], colour: Colour, co
     """Stone, plaster or concrete: values (H, W, 3)."""
     brightness = 1 + contrast * (0.5 * noise(rng, shape, (1, 1)) + 0.5 * noise(rng, shape, (25, 25)))
     return shaded(colour, brightness)
-
-
-def write_png(path: Path, picture: Picture, *, compression: int = 9) -> None:
-    """Write an RGB picture as PNG, making its folder. A compression of 1 takes a fifth of the time of 9."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
-    ok, data = cv2.imencode(".png", bgr, [cv2.IMWRITE_PNG_COMPRESSION, compression])
-    if not ok:
-        raise OSError(f"{path}: the picture could not be encoded")
-    path.write_bytes(data.tobytes())

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.math import RollPitchYaw, RotationMatrix
+from pydrake.multibody.tree import UnitInertia
 
 from skills.robot import FloatArray
 
@@ -31,12 +33,8 @@ class Shape(ABC):
         """The SDF `<geometry>` content."""
 
     @abstractmethod
-    def volume(self) -> float:
-        """Volume in cubic metres."""
-
-    @abstractmethod
-    def unit_inertia(self) -> Vector:
-        """Principal moments about the centre per kilogram (m^2), in the shape's own axes."""
+    def _own_inertia(self) -> UnitInertia:
+        """About the centre, in the shape's own axes."""
 
     def pose_text(self) -> str:
         """The SDF pose."""
@@ -44,12 +42,12 @@ class Shape(ABC):
 
     def rotation(self) -> FloatArray:
         """The (3, 3) rotation of the shape in the model's frame."""
-        roll, pitch, yaw = self.rpy
-        cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-        about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-        about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-        about_z = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
-        return np.asarray(about_z @ about_y @ about_x)
+        return np.asarray(RotationMatrix(RollPitchYaw(*self.rpy)).matrix())
+
+    def mass_properties(self, mass_kg: float) -> MassProperties:
+        """The shape filled evenly with a mass."""
+        own = self._own_inertia().CopyToFullMatrix3()
+        return MassProperties(mass_kg, np.array(self.p), mass_kg * self.rotation() @ own @ self.rotation().T)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,14 +60,8 @@ class Box(Shape):
         """The SDF `<geometry>` content."""
         return f"<box><size>{' '.join(number(v) for v in self.size)}</size></box>"
 
-    def volume(self) -> float:
-        """Volume in cubic metres."""
-        return float(np.prod(self.size))
-
-    def unit_inertia(self) -> Vector:
-        """Principal moments about the centre per kilogram (m^2), in the shape's own axes."""
-        x, y, z = (v * v / 12.0 for v in self.size)
-        return (y + z, x + z, x + y)
+    def _own_inertia(self) -> UnitInertia:
+        return UnitInertia.SolidBox(*self.size)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,14 +75,8 @@ class Cylinder(Shape):
         """The SDF `<geometry>` content."""
         return f"<cylinder><radius>{number(self.radius)}</radius><length>{number(self.length)}</length></cylinder>"
 
-    def volume(self) -> float:
-        """Volume in cubic metres."""
-        return float(np.pi * self.radius**2 * self.length)
-
-    def unit_inertia(self) -> Vector:
-        """Principal moments about the centre per kilogram (m^2), in the shape's own axes."""
-        across = (3 * self.radius**2 + self.length**2) / 12.0
-        return (across, across, self.radius**2 / 2.0)
+    def _own_inertia(self) -> UnitInertia:
+        return UnitInertia.SolidCylinder(self.radius, self.length, np.array([0.0, 0.0, 1.0]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,22 +89,8 @@ class Sphere(Shape):
         """The SDF `<geometry>` content."""
         return f"<sphere><radius>{number(self.radius)}</radius></sphere>"
 
-    def volume(self) -> float:
-        """Volume in cubic metres."""
-        return float(4.0 / 3.0 * np.pi * self.radius**3)
-
-    def unit_inertia(self) -> Vector:
-        """Principal moments about the centre per kilogram (m^2), in the shape's own axes."""
-        moment = 0.4 * self.radius**2
-        return (moment, moment, moment)
-
-
-@dataclass(frozen=True)
-class Part:
-    """A shape with a mass (kg), one summand of a body's inertia."""
-
-    shape: Shape
-    mass_kg: float
+    def _own_inertia(self) -> UnitInertia:
+        return UnitInertia.SolidSphere(self.radius)
 
 
 @dataclass(frozen=True)
@@ -130,15 +102,14 @@ class MassProperties:
     inertia: FloatArray
 
 
-def mass_properties(parts: Sequence[Part]) -> MassProperties:
-    """Mass properties of rigidly joined parts. Raises ValueError when there is no mass."""
-    mass = sum(part.mass_kg for part in parts)
+def together(bodies: Sequence[MassProperties]) -> MassProperties:
+    """The mass properties of bodies joined rigidly, all given in one frame. Raises ValueError without a mass."""
+    mass = sum(body.mass_kg for body in bodies)
     if mass <= 0:
-        raise ValueError("mass_properties: the parts have no mass")
-    com = np.asarray(sum(part.mass_kg * np.array(part.shape.p) for part in parts)) / mass
+        raise ValueError("together: the bodies have no mass")
+    com = np.asarray(sum(body.mass_kg * body.com for body in bodies)) / mass
     inertia = np.zeros((3, 3))
-    for part in parts:
-        R, offset = part.shape.rotation(), np.array(part.shape.p) - com
-        own = R @ np.diag(part.shape.unit_inertia()) @ R.T
-        inertia += part.mass_kg * (own + offset @ offset * np.eye(3) - np.outer(offset, offset))
-    return MassProperties(mass, com, inertia)
+    for body in bodies:
+        offset = body.com - com
+        inertia += body.inertia + body.mass_kg * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    return MassProperties(float(mass), com, inertia)

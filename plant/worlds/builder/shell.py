@@ -9,65 +9,61 @@ import numpy as np
 
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.shapes import Box, Shape
-from plant.worlds.builder.plan import (
-    DOOR_HEIGHT_M,
-    DOOR_WIDTH_M,
-    DOORS,
-    HANGINGS,
-    OUTLINE_M,
-    ROOMS,
-    WALL_HEIGHT_M,
-    WALLS,
-    Door,
-    Hanging,
-    Room,
-    Wall,
-    openings,
-    room,
-)
+from plant.worlds.builder.plan import Door, Hanging, Rectangle, Room, load_plan
 from skills.robot import FloatArray
 
 FRAME_M, FRAME_DEPTH_M, SKIRTING_M = 0.07, 0.012, 0.07
 UP = np.array([0.0, 0.0, 1.0])
 
+Span = tuple[float, float]
+
 
 def shell_collisions() -> list[Shape]:
     """The floor and the wall boxes, lintels included."""
-    x, y = OUTLINE_M
+    plan = load_plan()
+    x, y = plan.outline_m
     floor = Box(size=(x + 2, y + 2, 0.2), p=(x / 2, y / 2, -0.1))
-    return [floor, *(box for wall in WALLS for box in _wall_boxes(wall))]
+    return [floor, *(box for wall in plan.walls for box in _wall_boxes(wall))]
 
 
-def _wall_boxes(wall: Wall) -> Iterator[Box]:
-    r = wall.footprint
-    low, high = (r.x0, r.x1) if wall.along_x else (r.y0, r.y1)
-    gaps = openings(wall)
+def _wall_boxes(wall: Rectangle) -> Iterator[Box]:
+    """A wall beside its doors, then the lintels over them. It runs along its longer side."""
+    plan, (x0, y0, x1, y1) = load_plan(), wall
+    along_x = x1 - x0 > y1 - y0
+    low, high = (x0, x1) if along_x else (y0, y1)
+    doors = [d for d in plan.doors if x0 <= d.x <= x1 and y0 <= d.y <= y1 and d.along_x == along_x]
+    gaps, sides = _around(low, high, [d.x if along_x else d.y for d in doors])
+    spans = [(a, b, 0.0) for a, b in sides] + [(a, b, plan.door_height_m) for a, b in gaps]
+    for a, b, z0 in spans:
+        ends = (a, y0, b, y1) if along_x else (x0, a, x1, b)
+        yield Box(
+            size=(ends[2] - ends[0], ends[3] - ends[1], plan.wall_height_m - z0),
+            p=((ends[0] + ends[2]) / 2, (ends[1] + ends[3]) / 2, (z0 + plan.wall_height_m) / 2),
+        )
+
+
+def _around(low: float, high: float, doors: Sequence[float]) -> tuple[list[Span], list[Span]]:
+    """The door openings with these middles, in order, and what is left of a line from low to high."""
+    half = load_plan().door_width_m / 2
+    gaps = [(middle - half, middle + half) for middle in sorted(doors)]
     edges = [low, *(edge for gap in gaps for edge in gap), high]
-    for a, b in zip(edges[0::2], edges[1::2], strict=True):
-        yield _box(wall, a, b, 0.0, WALL_HEIGHT_M)
-    for a, b in gaps:
-        yield _box(wall, a, b, DOOR_HEIGHT_M, WALL_HEIGHT_M)
-
-
-def _box(wall: Wall, a: float, b: float, z0: float, z1: float) -> Box:
-    r = wall.footprint
-    x0, x1, y0, y1 = (a, b, r.y0, r.y1) if wall.along_x else (r.x0, r.x1, a, b)
-    return Box(size=(x1 - x0, y1 - y0, z1 - z0), p=((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2))
+    return gaps, list(zip(edges[0::2], edges[1::2], strict=True))
 
 
 def shell_mesh(materials: Mapping[str, Material]) -> Mesh:
     """The visual geometry of the shell."""
     mesh = Mesh(materials)
-    for one in ROOMS:
-        r = one.inside
-        mesh.add_rectangle(one.floor, (r.x0, r.y0, 0), (r.x1 - r.x0, 0, 0), (0, r.y1 - r.y0, 0))
-        for side in _sides(one):
+    plan = load_plan()
+    for one in plan.rooms:
+        x0, y0, x1, y1 = one.inside
+        mesh.add_rectangle(one.floor, (x0, y0, 0), (x1 - x0, 0, 0), (0, y1 - y0, 0))
+        for side in _sides(one).values():
             _add_panel(mesh, one, side)
-    for wall in WALLS:
-        _add_caps(mesh, wall)
-    for door in DOORS:
+    for x0, y0, x1, y1 in plan.walls:
+        mesh.add_rectangle("cap", (x0, y0, plan.wall_height_m), (x1 - x0, 0, 0), (0, y1 - y0, 0))
+    for door in plan.doors:
         _add_door(mesh, door)
-    for hanging in HANGINGS:
+    for hanging in plan.hangings:
         _add_hanging(mesh, hanging)
     _add_outside(mesh)
     return mesh
@@ -77,68 +73,62 @@ def shell_mesh(materials: Mapping[str, Material]) -> Mesh:
 class _Side:
     """One inner face of a room: from `corner` along `along` (unit) for `length`; `inward` is its normal."""
 
-    name: str
     corner: FloatArray
     along: FloatArray
     inward: FloatArray
     length: float
 
 
-def _sides(one: Room) -> list[_Side]:
-    r = one.inside
+def _sides(one: Room) -> dict[str, _Side]:
+    """The sides of a room by name."""
+    x0, y0, x1, y1 = one.inside
     x, y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
-    return [
-        _Side("n", np.array([r.x0, r.y1, 0.0]), x, -y, r.x1 - r.x0),
-        _Side("s", np.array([r.x1, r.y0, 0.0]), -x, y, r.x1 - r.x0),
-        _Side("e", np.array([r.x1, r.y1, 0.0]), -y, -x, r.y1 - r.y0),
-        _Side("w", np.array([r.x0, r.y0, 0.0]), y, x, r.y1 - r.y0),
-    ]
+    return {
+        "n": _Side(np.array([x0, y1, 0.0]), x, -y, x1 - x0),
+        "s": _Side(np.array([x1, y0, 0.0]), -x, y, x1 - x0),
+        "e": _Side(np.array([x1, y1, 0.0]), -y, -x, y1 - y0),
+        "w": _Side(np.array([x0, y0, 0.0]), y, x, y1 - y0),
+    }
 
 
-def _gaps(side: _Side) -> list[tuple[float, float]]:
-    """Door openings on a room's side, as intervals along it."""
-    found = []
-    for door in DOORS:
+def _doors_along(side: _Side) -> Iterator[float]:
+    """Middles of the doors on a room's side, as lengths along it."""
+    for door in load_plan().doors:
         offset = np.array([door.x, door.y, 0.0]) - side.corner
         if abs(offset @ side.inward) < 0.1 and 0 < offset @ side.along < side.length:
-            middle = float(offset @ side.along)
-            found.append((middle - DOOR_WIDTH_M / 2, middle + DOOR_WIDTH_M / 2))
-    return sorted(found)
+            yield float(offset @ side.along)
 
 
 def _add_panel(mesh: Mesh, one: Room, side: _Side) -> None:
-    gaps = _gaps(side)
-    edges = [0.0, *(edge for gap in gaps for edge in gap), side.length]
-    for a, b in zip(edges[0::2], edges[1::2], strict=True):
-        mesh.add_rectangle(one.wall, side.corner + a * side.along, (b - a) * side.along, WALL_HEIGHT_M * UP)
+    plan = load_plan()
+    gaps, spans = _around(0.0, side.length, list(_doors_along(side)))
+    for a, b in spans:
+        mesh.add_rectangle(one.wall, side.corner + a * side.along, (b - a) * side.along, plan.wall_height_m * UP)
         skirting = side.corner + a * side.along + FRAME_DEPTH_M * side.inward
         mesh.add_rectangle("skirting", skirting, (b - a) * side.along, SKIRTING_M * UP)
         mesh.add_rectangle("skirting", skirting + SKIRTING_M * UP, (b - a) * side.along, -FRAME_DEPTH_M * side.inward)
     for a, b in gaps:
-        lintel = side.corner + a * side.along + DOOR_HEIGHT_M * UP
-        mesh.add_rectangle(one.wall, lintel, (b - a) * side.along, (WALL_HEIGHT_M - DOOR_HEIGHT_M) * UP)
-
-
-def _add_caps(mesh: Mesh, wall: Wall) -> None:
-    r = wall.footprint
-    mesh.add_rectangle("cap", (r.x0, r.y0, WALL_HEIGHT_M), (r.x1 - r.x0, 0, 0), (0, r.y1 - r.y0, 0))
+        lintel = side.corner + a * side.along + plan.door_height_m * UP
+        mesh.add_rectangle(one.wall, lintel, (b - a) * side.along, (plan.wall_height_m - plan.door_height_m) * UP)
 
 
 def _add_door(mesh: Mesh, door: Door) -> None:
     """Jamb linings, casings on both faces and the sill."""
     turned = np.eye(3) if door.along_x else np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    frame, half, deep = Mesh(mesh.materials), DOOR_WIDTH_M / 2, 0.05 + FRAME_DEPTH_M
+    frame, half, deep = Mesh(mesh.materials), load_plan().door_width_m / 2, 0.05 + FRAME_DEPTH_M
+    top = load_plan().door_height_m
     for sign in (-1, 1):
         low, high = sorted((sign * half, sign * (half + FRAME_M)))
-        frame.add_box("skirting", (low, -deep, 0), (high, deep, DOOR_HEIGHT_M + FRAME_M), faces={"-z": None})
-    frame.add_box("skirting", (-half, -deep, DOOR_HEIGHT_M), (half, deep, DOOR_HEIGHT_M + FRAME_M))
-    frame.add_rectangle("sill", (-half, -0.05, 0.0), (DOOR_WIDTH_M, 0, 0), (0, 0.10, 0))
+        frame.add_box("skirting", (low, -deep, 0), (high, deep, top + FRAME_M), faces={"-z": None})
+    frame.add_box("skirting", (-half, -deep, top), (half, deep, top + FRAME_M))
+    frame.add_rectangle("sill", (-half, -0.05, 0.0), (2 * half, 0, 0), (0, 0.10, 0))
     mesh.add_mesh(frame, turned, (door.x, door.y, 0))
 
 
 def _add_hanging(mesh: Mesh, item: Hanging) -> None:
     """A picture, mirror, window or door on a room's wall, `along` being x or y in the world."""
-    side = {s.name: s for s in _sides(room(item.room))}[item.side]
+    (room,) = (each for each in load_plan().rooms if each.name == item.room)
+    side = _sides(room)[item.side]
     axis = np.abs(side.along)
     start = side.corner + (item.along - float(side.corner @ axis)) * axis + item.z * UP
     corner = start - item.width / 2 * side.along - item.height / 2 * UP + 0.02 * side.inward
@@ -150,13 +140,9 @@ def _add_hanging(mesh: Mesh, item: Hanging) -> None:
 
 
 def _add_outside(mesh: Mesh) -> None:
-    x, y = OUTLINE_M
-    around: Sequence[tuple[tuple[float, float], tuple[float, float]]] = [
-        ((0, 0), (x, 0)),
-        ((x, 0), (0, y)),
-        ((x, y), (-x, 0)),
-        ((0, y), (0, -y)),
-    ]
+    plan = load_plan()
+    x, y = plan.outline_m
+    around = (((0, 0), (x, 0)), ((x, 0), (0, y)), ((x, y), (-x, 0)), ((0, y), (0, -y)))
     for (px, py), (dx, dy) in around:
-        mesh.add_rectangle("wall_outside", (px, py, 0), (dx, dy, 0), WALL_HEIGHT_M * UP)
+        mesh.add_rectangle("wall_outside", (px, py, 0), (dx, dy, 0), plan.wall_height_m * UP)
     mesh.add_rectangle("ground", (-1, -1, -0.01), (x + 2, 0, 0), (0, y + 2, 0))

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from plant.models.builder.gltf import gltf_text
-from plant.models.builder.inertia import solid_mass, together
+from plant.models.builder.inertia import solid_mass
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.outlines import area, inset, triangles_of
+from plant.models.builder.shapes import together
 from plant.models.builder.surfaces import add_ellipsoid, add_extruded, add_ring, add_rounded_box, add_tube
 
 MATERIALS = {"red": Material((1.0, 0.0, 0.0)), "label": Material(texture="label.png")}

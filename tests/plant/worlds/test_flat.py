@@ -16,7 +16,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from plant.worlds.builder.__main__ import build
-from plant.worlds.builder.plan import DOORS
+from plant.worlds.builder.plan import load_plan
 from plant.worlds.placement import place_objects, place_people
 from plant.worlds.world import World, add_package, load_world
 
@@ -108,7 +108,7 @@ def test_every_room_has_a_free_circle_to_turn_in(knowledge: dict[str, Any], keep
         assert 2 * radius[window].max() * keepout.header["resolution"] >= 1.5, name
 
 
-@pytest.mark.parametrize("door", DOORS, ids=lambda door: door.name)
+@pytest.mark.parametrize("door", load_plan().doors, ids=lambda door: door.name)
 def test_every_door_is_ninety_centimetres_wide_and_free_on_both_sides(door: Any, keepout: Map) -> None:
     across = np.array([0.0, 1.0]) if door.along_x else np.array([1.0, 0.0])
     along = across[::-1]

@@ -29,6 +29,7 @@ _FUNCTIONS: Final[Mapping[str, Callable[..., float]]] = {
     "pick": lambda rng, *values: rng.choice(values),
     "min": lambda _, *values: min(values),
     "max": lambda _, *values: max(values),
+    "round": lambda _, value: round(value),
     "sin": lambda _, angle: np.sin(angle),
     "cos": lambda _, angle: np.cos(angle),
 }

@@ -17,10 +17,9 @@ from torch import Tensor, nn
 from skills.perception.detector.cascade_files import FORMAT
 from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX
 from skills.perception.detector.proposals import CROP_PX
-from skills.perception.training import onnx_files
 from skills.perception.training.crop_network import CropNetwork
 from skills.perception.training.network import DetectorNetwork
-from skills.perception.training.onnx_files import shorten_names, write_sealed
+from skills.perception.training.onnx_files import write_sealed
 
 __all__ = ["Exportable", "export", "export_crops", "fused", "normalised_layers", "write_onnx"]
 
@@ -131,26 +130,18 @@ def export_crops(
         "logits": torch.zeros((2, len(class_names))),
     }
     facts = {"format": form, "class_names": json.dumps(list(class_names)), **facts}
-    write_onnx(model, example, file, facts, compact=True)
+    write_onnx(model, example, file, facts)
 
 
-def write_onnx(
-    model: nn.Module, example: Mapping[str, Tensor], file: Path, facts: Mapping[str, str], *, compact: bool = False
-) -> None:
-    """Write the ONNX file of a model that makes boxes and scores, each of N rows, of inputs by name of N rows.
-
-    A `compact` one holds its weights in 16 bits each, which become 32 when it is loaded.
-    """
+def write_onnx(model: nn.Module, example: Mapping[str, Tensor], file: Path, facts: Mapping[str, str]) -> None:
+    """Write the ONNX file of a model that makes boxes and scores, each of N rows, of inputs by name of N rows."""
     with torch.no_grad():
         shapes = [tuple(output.shape) for output in model(*example.values())]
     with tempfile.TemporaryDirectory() as folder:
         raw = Path(folder) / "raw.onnx"
         _trace(model, example, raw)
         traced = onnx.load(raw)
-    if compact:
-        onnx_files.compact(traced.graph)
     _size_outputs(traced, shapes)
-    shorten_names(traced.graph)
     traced.producer_name, traced.producer_version = "errand", ""
     onnx.checker.check_model(traced)
     write_sealed(traced, file, facts)

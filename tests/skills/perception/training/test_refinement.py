@@ -203,6 +203,8 @@ def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
     first = write_model(tmp_path / "m.onnx")
     facts = {"first": load_model(first).proposal.digest}
     network = unsettled(len(CLASSES))
+    for head in network.detector.heads:  # no two cells are equally sure
+        torch.nn.init.normal_(head.scores.weight, 0.0, 1.0)
     export_crops(
         network,
         refinement_file(first),
@@ -244,13 +246,6 @@ def test_learning_begins_with_the_proposal_networks_weights_and_keeps_its_early_
     after, kept = learner.network.state_dict(), ("detector.backbone.stem.", "detector.backbone.stage8.")
     assert all(torch.equal(before[name], after[name]) for name in before if name.startswith(kept))
     assert not torch.equal(before["detector.neck.down8.mix.0.weight"], after["detector.neck.down8.mix.0.weight"])
-
-
-def test_the_refinement_networks_file_holds_its_weights_in_16_bits(tmp_path: Path) -> None:
-    network = unsettled(len(CLASSES))
-    export_crops(network, tmp_path / "r.onnx", form=REFINEMENT_FORMAT, class_names=CLASSES, facts={})
-    weights = sum(weight.numel() for weight in network.parameters())
-    assert 2 * weights < (tmp_path / "r.onnx").stat().st_size < 2.2 * weights
 
 
 def test_learning_goes_on_from_a_refinement_networks_file(tmp_path: Path, feed: CropFeed) -> None:

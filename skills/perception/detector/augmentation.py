@@ -21,9 +21,6 @@ from skills.perception.detector.onnx_detector import OnnxDetector
 from skills.perception.detector.suppression import Candidates, detections_of
 from skills.robot import Picture
 
-__all__ = ["VIEWS", "AugmentationOptions", "AugmentedDetector", "DetectsClass", "DetectsInViews", "View"]
-
-
 Box = tuple[float, float, float, float]
 _SAME_OBJECT = 0.55
 _LEAST_SCORE = 0.05

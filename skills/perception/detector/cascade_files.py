@@ -22,19 +22,6 @@ from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX
 from skills.perception.detector.network_file import Inputs, ModelFileError, Network, NetworkKind, Outputs, load_network
 from skills.perception.detector.proposals import CROP_PX
 
-__all__ = [
-    "CLASSIFIER_FORMAT",
-    "FORMAT",
-    "MODEL_FILE",
-    "REFINEMENT_FORMAT",
-    "DetectorModel",
-    "classifier_file",
-    "load_classifier",
-    "load_model",
-    "load_refinement",
-    "refinement_file",
-]
-
 MODEL_FILE: Final = Path(__file__).with_name("model") / "errand_detector.onnx"
 FORMAT: Final = "errand-detector-1"
 REFINEMENT_FORMAT: Final = "errand-regions-1"

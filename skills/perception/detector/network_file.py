@@ -20,8 +20,6 @@ from skills.perception.detector.processor import adds_byte_products_exactly
 if TYPE_CHECKING:
     import onnxruntime
 
-__all__ = ["Inputs", "ModelFileError", "Network", "NetworkKind", "Outputs", "load_network", "sealed"]
-
 QUIET: Final = 4
 _SEAL_KEY: Final = b"sha256"
 _SEAL_HEAD: Final = b"\x72\x4a\x0a\x06" + _SEAL_KEY + b"\x12\x40"

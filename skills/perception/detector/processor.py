@@ -6,8 +6,6 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-__all__ = ["adds_byte_products_exactly"]
-
 _CPU_INFO: Final = Path("/proc/cpuinfo")
 _ABLE: Final = frozenset({"avx512_vnni", "avx_vnni"})
 

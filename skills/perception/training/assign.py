@@ -13,8 +13,6 @@ from torch import Tensor
 
 from skills.perception.training.overlaps import overlap
 
-__all__ = ["AssignOptions", "Assigned", "assign"]
-
 _TINY = 1e-9
 
 

@@ -14,8 +14,6 @@ from skills.perception.training.losses import TruthBatch
 from skills.perception.training.placing import Targets
 from skills.perception.training.schedule import Phase, shuffled
 
-__all__ = ["Batch", "Feed", "batch_of", "truth_of"]
-
 
 @dataclass(frozen=True)
 class Batch:

@@ -15,8 +15,6 @@ from skills.perception.training.crop_network import MOST_LOGIT, CropNetwork, cov
 from skills.perception.training.lite_backbone import AT_8, AT_16, AT_32, LiteBackbone
 from skills.perception.training.network import ConvUnit
 
-__all__ = ["USED", "ClassifierNetwork"]
-
 _CELLS_16, _CELLS_32 = CROP_PX // 16, CROP_PX // 32
 _SQUEEZED_16, _SQUEEZED_32, _JOINED = 24, 96, 192
 _SIDES_SCALE = 0.1

@@ -20,8 +20,6 @@ from skills.perception.training.network import DetectorNetwork, EarlyLayers
 from skills.perception.training.onnx_weights import settle, take_over, take_over_classifier, take_over_refinement
 from skills.perception.training.refinement_network import RefinementNetwork
 
-__all__ = ["CropLearner"]
-
 
 @dataclass
 class CropLearner(Learner[CropNetwork]):

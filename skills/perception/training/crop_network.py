@@ -10,8 +10,6 @@ from torch import Tensor, nn
 from skills.perception.detector.proposals import CROP_PX
 from skills.perception.training.network import EarlyLayers
 
-__all__ = ["MOST_LOGIT", "CropNetwork", "covered", "moved"]
-
 MOST_LOGIT: Final = 8.0
 _MOST_GROWTH: Final = 1.5
 _CELLS_8: Final = CROP_PX // 8

@@ -21,8 +21,6 @@ from skills.perception.training.crop_network import CropNetwork
 from skills.perception.training.network import DetectorNetwork
 from skills.perception.training.onnx_files import write_sealed
 
-__all__ = ["Exportable", "export", "export_crops", "fused", "normalised_layers", "write_onnx"]
-
 _OPSET = 17
 Network = TypeVar("Network", bound=nn.Module)
 

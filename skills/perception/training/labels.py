@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from skills.perception.detector.letterbox import Letterbox
 from skills.perception.training.coco import CocoFile, CocoImage, CocoLabel, coco_file
 
-__all__ = ["Labels", "TrainingDataError", "TrainingPicture", "category_names", "digest_of", "read_split"]
-
 Floats = NDArray[np.float32]
 LEAST_SEEN: Final = 0.25
 _MOST_CORNERS: Final = 24

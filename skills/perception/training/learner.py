@@ -18,8 +18,6 @@ from skills.perception.training.losses import Losses, LossOptions, TruthBatch, l
 from skills.perception.training.network import DetectorNetwork, cells
 from skills.perception.training.onnx_weights import take_over
 
-__all__ = ["Learner", "Progress", "ProposalLearner", "read_checkpoint"]
-
 FORMAT = 2
 ONNX = ".onnx"
 _LONGEST_STEP = 10.0

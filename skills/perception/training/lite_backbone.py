@@ -21,8 +21,6 @@ from torch import Tensor, nn
 from skills.perception.training.labels import TrainingDataError
 from skills.perception.training.network import EarlyLayers
 
-__all__ = ["AT_8", "AT_16", "AT_32", "InvertedResidual", "LiteBackbone", "PaddedConv"]
-
 AT_8, AT_16, AT_32 = 40, 112, 320
 """Channels at strides 8, 16 and 32."""
 _STEM: Final = 32

@@ -11,8 +11,6 @@ from torch import Tensor
 from skills.perception.training.assign import Assigned, AssignOptions, assign
 from skills.perception.training.overlaps import overlap, sizes
 
-__all__ = ["LossOptions", "Losses", "TruthBatch", "complete_overlap", "crop_losses", "losses"]
-
 _TINY = 1e-7
 _CROP_BOX_WEIGHT = 2.0
 

@@ -21,8 +21,6 @@ from skills.perception.training.network import Backbone, DetectorNetwork
 from skills.perception.training.onnx_files import offsets_in, trained_weights
 from skills.perception.training.refinement_network import RefinementNetwork
 
-__all__ = ["settle", "take_over", "take_over_classifier", "take_over_refinement"]
-
 _BEFORE = "network."
 _BYTES = 255.0
 _HINT = "begin anew without it"

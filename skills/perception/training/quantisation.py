@@ -39,8 +39,6 @@ from skills.perception.training.proposal_table import proposed, refined_by
 from skills.perception.training.store import read_picture
 from skills.perception.training.validate import examination
 
-__all__ = ["main", "quantised", "quantised_detector", "write_quantised"]
-
 _MEASURED_BY: Final = 160
 _CROPS_AT_ONCE: Final = 8
 _AT_ONCE: Final = 8

@@ -30,8 +30,6 @@ from skills.perception.training.store import PictureStore, open_store
 from skills.perception.training.train import MODEL, PICTURES
 from skills.perception.training.validate import CALIBRATED_BY, examination, examine, offsets_by
 
-__all__ = ["refine"]
-
 TABLE: Final = "proposals.npz"
 _SETTLED_BY: Final = 24
 

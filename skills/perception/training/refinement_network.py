@@ -16,8 +16,6 @@ from skills.perception.training.crop_network import MOST_LOGIT, CropNetwork, cov
 from skills.perception.training.network import Backbone, ConvUnit, DetectorNetwork, Widths
 from skills.perception.training.overlaps import overlap
 
-__all__ = ["RefinementNetwork"]
-
 _WIDTHS = Widths(residuals=(3, 2))
 _CELLS_32 = CROP_PX // 32
 _SQUEEZED, _JOINED = 32, 128

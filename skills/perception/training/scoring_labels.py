@@ -9,8 +9,6 @@ from typing import Final
 from skills.perception.detector.upright import LEAST_ROLL_DEG
 from skills.perception.training.coco import CocoLabel, coco_file
 
-__all__ = ["LEAST_LONG_PX", "LEAST_SHORT_PX", "LEAST_VISIBILITY", "Label", "LabelledPicture", "pictures_of_coco"]
-
 LEAST_LONG_PX: Final = 24.0
 LEAST_SHORT_PX: Final = 8.0
 LEAST_VISIBILITY: Final = 0.4

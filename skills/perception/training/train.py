@@ -20,8 +20,6 @@ from skills.perception.training.schedule import Report, TrainOptions
 from skills.perception.training.store import open_store
 from skills.perception.training.validate import CALIBRATED_BY, examination, examine, offsets_by
 
-__all__ = ["MODEL", "PICTURES", "Report", "TrainOptions", "train"]
-
 MODEL: Final = "errand_detector.onnx"
 PICTURES: Final = "pictures"
 _SETTLED_BY: Final = 24

@@ -17,8 +17,6 @@ from skills.perception.training.scoring import Score, score
 from skills.perception.training.scoring_labels import LabelledPicture, pictures_of_coco
 from skills.perception.training.store import read_picture
 
-__all__ = ["CALIBRATED_BY", "Examination", "examination", "examine", "offsets_by"]
-
 LEAST_SCORE = 0.02
 CALIBRATED_BY: Final = 3600
 """By how many pictures the shifts of scores are found."""

@@ -22,6 +22,11 @@ class Batch:
     pictures: Tensor
     truth: TruthBatch
 
+    @property
+    def inputs(self) -> tuple[Tensor, ...]:
+        """What the network takes."""
+        return (self.pictures,)
+
 
 @dataclass(frozen=True)
 class Feed:

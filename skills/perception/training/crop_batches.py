@@ -41,6 +41,11 @@ class CropBatch:
     wanted: Tensor
     classes: Tensor
 
+    @property
+    def inputs(self) -> tuple[Tensor, ...]:
+        """What the network takes."""
+        return (self.crops, self.boxes, self.logits)
+
 
 @dataclass(frozen=True)
 class CropFeed:

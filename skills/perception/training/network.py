@@ -11,10 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import torch
 from torch import Tensor, nn
+
+from skills.perception.detector.cascade_files import PROPOSAL
+from skills.perception.detector.network_file import NetworkKind
 
 STRIDES: Final = (8, 16, 32)
 FIRST_SCORE: Final = 0.003
@@ -129,6 +132,30 @@ class EarlyLayers(nn.Module):
         """Pictures (N, 3, H, W) to features at stride 8: edges and textures."""
         raise NotImplementedError
 
+    def take_bytes(self) -> None:
+        """Take values from 0 to 255 from now on."""
+        raise NotImplementedError
+
+
+class CascadeNetwork(nn.Module):
+    """A network of the cascade, whose file is of some `kind`."""
+
+    kind: ClassVar[NetworkKind]
+    classes: int
+
+    @property
+    def early_layers(self) -> EarlyLayers:
+        """What makes the features at stride 8."""
+        raise NotImplementedError
+
+    @property
+    def score_biases(self) -> list[Tensor]:
+        """What is added last to the logits (K,)."""
+        raise NotImplementedError
+
+    def stop_learning(self) -> None:
+        """Change what is to be otherwise in use than in training: nothing, unless said."""
+
 
 class Backbone(EarlyLayers):
     """Picture to features at strides 8, 16 and 32."""
@@ -217,8 +244,10 @@ class Head(nn.Module):
         return self.scores(self.for_scores(x)), self.sides(self.for_boxes(x))
 
 
-class DetectorNetwork(nn.Module):
+class DetectorNetwork(CascadeNetwork):
     """Pictures (N, 3, H, W) from 0 to 1, H and W multiples of 32, to logits and boxes of every cell."""
+
+    kind = PROPOSAL
 
     def __init__(self, classes: int, widths: Widths | None = None) -> None:
         super().__init__()
@@ -227,6 +256,16 @@ class DetectorNetwork(nn.Module):
         self.backbone = Backbone(widths)
         self.neck = Neck(widths)
         self.heads = nn.ModuleList(Head(width, widths, classes) for width in widths.neck)
+
+    @property
+    def early_layers(self) -> Backbone:
+        """What makes the features at stride 8."""
+        return self.backbone
+
+    @property
+    def score_biases(self) -> list[Tensor]:
+        """What is added last to the logits (K,) of each level."""
+        return [head.scores.bias for head in self.heads]
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, A, classes) and boxes (N, A, 4) as x0 y0 x1 y1 in pixels."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from skills.perception.detector.cascade_files import REFINEMENT
 from skills.perception.detector.proposals import CROP_PX
 from skills.perception.training.crop_network import MOST_LOGIT, CropNetwork, covered, moved
 from skills.perception.training.network import Backbone, ConvUnit, DetectorNetwork, Widths
@@ -25,6 +26,8 @@ _SIDES_SCALE = 0.1
 class RefinementNetwork(CropNetwork):
     """A crop network that begins with the proposal network's weights."""
 
+    kind = REFINEMENT
+
     def __init__(self, classes: int, widths: Widths = _WIDTHS) -> None:
         known = _SQUEEZED * _CELLS_32 * _CELLS_32 + 2 * (classes + 4)
         super().__init__(classes, known, _JOINED, widths.levels[0])
@@ -38,10 +41,6 @@ class RefinementNetwork(CropNetwork):
     def early_layers(self) -> Backbone:
         """What makes the features at stride 8."""
         return self.detector.backbone
-
-    def take_bytes(self) -> None:
-        """Take crops of values from 0 to 255 from now on."""
-        self.detector.backbone.take_bytes()
 
     def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, K) and boxes (N, 4) of what the early layers make of crops."""

@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from skills.perception.training.assign import TruthBatch
 from skills.perception.training.canvases import Canvas, CanvasMaker
-from skills.perception.training.losses import TruthBatch
 from skills.perception.training.placing import Targets
 from skills.perception.training.schedule import Phase, shuffled
 

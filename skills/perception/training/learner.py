@@ -12,13 +12,14 @@ import torch
 from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel
 
+from skills.perception.training.assign import TruthBatch
 from skills.perception.training.batches import Batch
 from skills.perception.training.classifier_network import ClassifierNetwork
 from skills.perception.training.crop_batches import CropBatch
 from skills.perception.training.crop_network import CropNetwork
 from skills.perception.training.export import fused
 from skills.perception.training.labels import TrainingDataError
-from skills.perception.training.losses import Losses, LossOptions, TruthBatch, crop_losses, losses
+from skills.perception.training.losses import Losses, crop_losses, losses
 from skills.perception.training.network import CascadeNetwork, DetectorNetwork, EarlyLayers, cells
 from skills.perception.training.onnx_weights import settle, take_over
 from skills.perception.training.refinement_network import RefinementNetwork
@@ -141,8 +142,6 @@ def _take(network: nn.Module, weights: Mapping[str, Any], file: Path) -> None:
 class ProposalLearner(Learner[DetectorNetwork]):
     """All that changes while the proposal network is trained."""
 
-    loss: LossOptions = field(default_factory=LossOptions)
-
     @staticmethod
     def new(classes: int, seed: int, device: torch.device) -> ProposalLearner:
         """An untrained network."""
@@ -158,7 +157,7 @@ class ProposalLearner(Learner[DetectorNetwork]):
             logits, boxes = self.network(batch.pictures.to(self.device))
         middles = cells(batch.pictures.shape[2], batch.pictures.shape[3])[0].to(self.device)
         truth = TruthBatch(*self.moved(*vars(batch.truth).values()))
-        return losses(logits, boxes, middles, truth, self.loss)
+        return losses(logits, boxes, middles, truth)
 
 
 @dataclass

@@ -14,10 +14,10 @@ from torch import Tensor, nn
 from skills.perception.detector.cascade_files import REFINEMENT
 from skills.perception.detector.proposals import CROP_PX
 from skills.perception.training.crop_network import MOST_LOGIT, CropNetwork, covered, moved
-from skills.perception.training.network import Backbone, ConvUnit, DetectorNetwork, Widths
+from skills.perception.training.network import LEVELS, NECK, Backbone, ConvUnit, DetectorNetwork
 from skills.perception.training.overlaps import overlap
 
-_WIDTHS = Widths(residuals=(3, 2))
+_RESIDUALS = (3, 2)
 _CELLS_32 = CROP_PX // 32
 _SQUEEZED, _JOINED = 32, 128
 _SIDES_SCALE = 0.1
@@ -28,11 +28,11 @@ class RefinementNetwork(CropNetwork):
 
     kind = REFINEMENT
 
-    def __init__(self, classes: int, widths: Widths = _WIDTHS) -> None:
+    def __init__(self, classes: int) -> None:
         known = _SQUEEZED * _CELLS_32 * _CELLS_32 + 2 * (classes + 4)
-        super().__init__(classes, known, _JOINED, widths.levels[0])
-        self.detector = DetectorNetwork(classes, widths)
-        self.squeeze = ConvUnit(widths.neck[2], _SQUEEZED)
+        super().__init__(classes, known, _JOINED, LEVELS[0])
+        self.detector = DetectorNetwork(classes, _RESIDUALS)
+        self.squeeze = ConvUnit(NECK[2], _SQUEEZED)
         self.trust_first = nn.Parameter(torch.full((classes,), 0.5))
         self.trust_seen = nn.Parameter(torch.full((classes,), 0.5))
         self.nearer = nn.Parameter(torch.full((4,), 0.5))

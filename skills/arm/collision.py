@@ -55,7 +55,8 @@ class ArmScene:
         )
         self._checker.SetPaddingAllRobotEnvironmentPairs(padding_m)
         self._q = np.zeros(plant.num_positions())
-        starts = {name: self._start(name) for name in self._joint_names()}
+        joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
+        starts = {joint.name(): joint.position_start() for joint in joints if joint.num_positions() == 1}
         for name, start in starts.items():
             self._q[start] = joint_positions_rad.get(name, 0.0)
         self._arm = np.array([starts[name] for name in model.names])
@@ -116,16 +117,6 @@ class ArmScene:
 
         shape = BodyShapeDescription(BoxShape(*box.size_m), box.X_FG, instance, body)
         self._checker.AddCollisionShape(group, shape)
-
-    def _joint_names(self) -> list[str]:
-        plant = self._checker.plant()
-        return [plant.get_joint(index).name() for index in plant.GetJointIndices() if self._moves(index)]
-
-    def _moves(self, index: object) -> bool:
-        return bool(self._checker.plant().get_joint(index).num_positions() == 1)
-
-    def _start(self, name: str) -> int:
-        return int(self._checker.plant().GetJointByName(name).position_start())
 
     def _allow_stowed_contacts(self) -> None:
         """Links that touch when the arm is stowed may touch: resting there is what stowing means."""

@@ -15,7 +15,7 @@ from skills.api import LocalisationEstimate
 from skills.estimate.compiled import distances
 from skills.estimate.grid_map import GridMap
 from skills.estimate.scan_points import scan_points, sensor_pose
-from skills.estimate.seen_layer import Beams, clear_cells, mark_cells
+from skills.estimate.seen_layer import clear_cells, mark_cells
 from skills.estimate.self_filter import SelfFilter, in_body_axes
 from skills.geometry import compose
 from skills.robot import FloatArray, Pose2D, Robot, Scan
@@ -168,8 +168,7 @@ class LayeredCostmap:
             return False
         heights = self._height_m[active[:, 0], active[:, 1]]
         centres_F = in_body_axes(np.column_stack([self._layer.centres(active), heights]), X_WF)
-        beams = Beams(scan.ranges_m, scan.elevations_rad, scan.azimuths_rad)
-        gone = active[clear_cells(beams, centres_F, *sensor_pose(scan), self._layer.resolution_m)]
+        gone = active[clear_cells(scan, centres_F, self._layer.resolution_m)]
         self._until_s[gone[:, 0], gone[:, 1]] = -math.inf
         return len(gone) > 0
 

@@ -11,14 +11,12 @@ import cv2
 import numpy as np
 import yaml
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
 
 from skills.estimate.compiled import distances
 from skills.robot import FloatArray
 
 BoolGrid = NDArray[np.bool_]
-
-REQUIRED_KEYS = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
-KNOWN_KEYS = (*REQUIRED_KEYS, "negate", "mode", "height_band_m")
 
 
 class MapError(ValueError):
@@ -62,11 +60,6 @@ class GridMap:
         """World (x, y) of the centres of (row, column) rows."""
         return np.asarray((cells[:, ::-1] + 0.5) * self.resolution_m + self.origin_m)
 
-    def contains(self, points_W: FloatArray) -> BoolGrid:
-        """Whether each (x, y) row lies on the grid."""
-        cells = self.cells(points_W)
-        return np.asarray(np.all((cells >= 0) & (cells < self.occupied.shape), axis=1))
-
     def distance_m(self, points_W: FloatArray) -> FloatArray:
         """Signed distance (m) from each (x, y) row to the nearest occupied cell, bilinear between cell centres.
 
@@ -93,57 +86,44 @@ def signed_distance(occupied: BoolGrid, resolution_m: float) -> NDArray[np.float
     return np.ascontiguousarray(np.where(occupied, 0.5 - inside, outside - 0.5) * resolution_m, dtype=np.float32)
 
 
+class _MapFile(BaseModel):
+    """The keys of a map_server YAML file, and the band of heights."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    image: str
+    resolution: PositiveFloat
+    origin: tuple[float, float, float]
+    occupied_thresh: float = Field(le=1.0)
+    free_thresh: float = Field(ge=0.0)
+    negate: float = 0.0
+    mode: Any = None
+    height_band_m: tuple[float, float] | None = None
+
+
 def load_grid_map(path: Path) -> GridMap:
     """Read a map_server YAML file and the picture that it names. Raises MapError with file:line and the hint."""
     lines = _key_lines(path)
-    values = _Values(path, yaml.safe_load(path.read_text()), lines)
-    values.refuse_unknown()
-    resolution_m = values.positive("resolution")
-    x_m, y_m, yaw_rad = values.numbers("origin", 3)
-    if yaw_rad != 0.0:
-        raise values.error("origin", "the map is turned; give it again with yaw 0")
-    occupied, unknown = _classify(_read_picture(values), values)
-    band = values.numbers("height_band_m", 2) if "height_band_m" in lines else None
-    return GridMap(occupied, resolution_m, (x_m, y_m), unknown, (band[0], band[1]) if band else None)
 
+    def refused(key: str, why: str) -> MapError:
+        return MapError(f"{path}:{lines.get(key, 1)}: {key}: {why}")
 
-@dataclass(frozen=True)
-class _Values:
-    """The mapping of one file, with the line of each key, for errors that name the place."""
-
-    path: Path
-    values: dict[str, Any]
-    lines: dict[str, int]
-
-    def error(self, key: str, why: str) -> MapError:
-        return MapError(f"{self.path}:{self.lines.get(key, 1)}: {key}: {why}")
-
-    def refuse_unknown(self) -> None:
-        for key in self.values:
-            if key not in KNOWN_KEYS:
-                raise self.error(key, f"unknown key; known are {', '.join(KNOWN_KEYS)}")
-        for key in REQUIRED_KEYS:
-            if key not in self.values:
-                raise self.error(key, "missing; add it")
-
-    def numbers(self, key: str, count: int) -> tuple[float, ...]:
-        value = self.values[key]
-        plain = isinstance(value, list) and len(value) == count and all(isinstance(v, int | float) for v in value)
-        if not plain:
-            raise self.error(key, f"must be a list of {count} numbers, is {value!r}")
-        return tuple(float(v) for v in value)
-
-    def number(self, key: str, default: float | None = None) -> float:
-        value = self.values.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise self.error(key, f"must be a number, is {value!r}")
-        return float(value)
-
-    def positive(self, key: str) -> float:
-        value = self.number(key)
-        if value <= 0.0:
-            raise self.error(key, f"must be above 0, is {value}")
-        return value
+    try:
+        told = _MapFile.model_validate(yaml.safe_load(path.read_text()))
+    except ValidationError as error:
+        first = error.errors()[0]
+        why = f"{first['msg']}; known keys are {', '.join(_MapFile.model_fields)}"
+        raise refused(str(first["loc"][0]), why) from error
+    if told.origin[2] != 0.0:
+        raise refused("origin", "the map is turned; give it again with yaw 0")
+    if not told.free_thresh < told.occupied_thresh:
+        raise refused("free_thresh", "must lie below occupied_thresh, both in 0..1")
+    picture = path.parent / told.image
+    grey = cv2.imread(str(picture), cv2.IMREAD_GRAYSCALE) if picture.is_file() else None
+    if grey is None:
+        raise refused("image", f"no picture can be read from {picture}; put a PGM file there")
+    occupied, unknown = _classify(np.asarray(grey, dtype=np.uint8), told)
+    return GridMap(occupied, told.resolution, told.origin[:2], unknown, told.height_band_m)
 
 
 def _key_lines(path: Path) -> dict[str, int]:
@@ -156,28 +136,13 @@ def _key_lines(path: Path) -> dict[str, int]:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise MapError(f"{path}:{line}: {error.problem}; correct the YAML there") from error
     if not isinstance(node, yaml.MappingNode):
-        raise MapError(f"{path}:1: must be a mapping with the keys {', '.join(REQUIRED_KEYS)}")
+        raise MapError(f"{path}:1: must be a mapping with the keys {', '.join(_MapFile.model_fields)}")
     return {key.value: key.start_mark.line + 1 for key, _ in node.value}
 
 
-def _read_picture(values: _Values) -> NDArray[np.uint8]:
-    """The picture that the file names, as grey levels, row 0 at the top."""
-    name = values.values["image"]
-    if not isinstance(name, str):
-        raise values.error("image", f"must be a file name, is {name!r}")
-    picture = values.path.parent / name
-    grey = cv2.imread(str(picture), cv2.IMREAD_GRAYSCALE) if picture.is_file() else None
-    if grey is None:
-        raise values.error("image", f"no picture can be read from {picture}; put a PGM file there")
-    return np.asarray(grey, dtype=np.uint8)
-
-
-def _classify(grey: NDArray[np.uint8], values: _Values) -> tuple[BoolGrid, BoolGrid]:
+def _classify(grey: NDArray[np.uint8], told: _MapFile) -> tuple[BoolGrid, BoolGrid]:
     """Occupied and unknown cells, row 0 at the bottom, by the thresholds of the map_server's trinary mode."""
     share = grey.astype(np.float64) / 255.0
-    probability = np.flipud(share if values.number("negate", 0) else 1.0 - share)
-    high, low = values.number("occupied_thresh"), values.number("free_thresh")
-    if not 0.0 <= low < high <= 1.0:
-        raise values.error("free_thresh", f"must lie below occupied_thresh, both in 0..1; are {low} and {high}")
-    occupied = probability > high
-    return occupied, ~occupied & (probability >= low)
+    probability = np.flipud(share if told.negate else 1.0 - share)
+    occupied = probability > told.occupied_thresh
+    return occupied, ~occupied & (probability >= told.free_thresh)

@@ -105,19 +105,11 @@ class ScanMatchingLocaliser:
         if not self._localised and self._poor_scans > 0 and self._poor_scans % self._options.search_every_scans == 0:
             self._search(points_F, self._options.search_radius_m)
 
-    def relocalise(self, robot: Robot, radius_m: float | None = None) -> bool:
-        """Search for the pose within radius_m of the present belief, or everywhere (None); True when found.
-
-        Costs a few milliseconds for a small radius and some hundred for a whole flat: call it while standing.
-        """
-        scan = robot.scan()
-        found = None if scan is None else self.search(scan, self.estimate(), radius_m)
-        if found is not None:
-            self.accept(found)
-        return found is not None
-
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
-        """Where a scan fits the map, within radius_m of a belief or anywhere (None); changes nothing."""
+        """Where a scan fits the map, within radius_m of a belief or anywhere (None); changes nothing.
+
+        Costs a few milliseconds for a small radius and some hundred for a whole flat.
+        """
         X_OB = Pose2D.from_transform(scan.X_OB)
         found = self._best_match(self._points(scan), compose(Pose2D.from_transform(belief.X_WO), X_OB), radius_m)
         if found is None:

@@ -25,22 +25,17 @@ def scan_points(scan: Scan, *, azimuths: int, heights_m: tuple[float, float], ma
     stride = max(1, len(scan.azimuths_rad) // azimuths)
     ranges = np.ascontiguousarray(scan.ranges_m[:, ::stride])
     angles = np.ascontiguousarray(scan.azimuths_rad[::stride])
-    rotation, translation = _levelled(scan)
+    rotation, translation = sensor_pose(scan)
     limits = (heights_m[0], heights_m[1], max_range_m)
     return _select(ranges, scan.elevations_rad, angles, rotation, translation, limits, stride)
 
 
-def _levelled(scan: Scan) -> tuple[FloatArray, FloatArray]:
-    """Rotation and translation of X_FL."""
+def sensor_pose(scan: Scan) -> tuple[FloatArray, FloatArray]:
+    """Rotation (3, 3) and position (3,) of the LiDAR in frame F."""
     yaw = Pose2D.from_transform(scan.X_OB).yaw_rad
     R_FB = RotationMatrix.MakeZRotation(-yaw) @ scan.X_OB.rotation()
     p_FL = R_FB.multiply(scan.X_BL.translation()) + np.array([0.0, 0.0, scan.X_OB.translation()[2]])
     return np.ascontiguousarray((R_FB @ scan.X_BL.rotation()).matrix()), p_FL
-
-
-def sensor_pose(scan: Scan) -> tuple[FloatArray, FloatArray]:
-    """Rotation (3, 3) and position (3,) of the LiDAR in frame F."""
-    return _levelled(scan)
 
 
 @compiled

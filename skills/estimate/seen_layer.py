@@ -3,35 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
-from skills.robot import FloatArray
+from skills.estimate.scan_points import sensor_pose
+from skills.robot import FloatArray, Scan
 
 
-class Beams(NamedTuple):
-    """One whole revolution with evenly spaced azimuths: ranges_m[ring, azimuth] and the angles, as in `Scan`."""
-
-    ranges_m: NDArray[np.float32]
-    elevations_rad: FloatArray
-    azimuths_rad: FloatArray
-
-
-def clear_cells(
-    beams: Beams, centres_F: FloatArray, rotation: FloatArray, translation: FloatArray, cell_m: float
-) -> NDArray[np.bool_]:
-    """Whether the beams see past each place (N, 3) at its height.
+def clear_cells(scan: Scan, centres_F: FloatArray, cell_m: float) -> NDArray[np.bool_]:
+    """Whether the beams of a whole revolution see past each place (N, 3) at its height.
 
     A place counts as free when all beams that could have hit it go on for 0.3 m at least. A place that no beam can hit
-    (too low, too near) shares the fate of a free place beside it: both were seen on one thing. `rotation` and
-    `translation` are those of the LiDAR's pose in frame F.
+    (too low, too near) shares the fate of a free place beside it: both were seen on one thing. Frame F is the levelled
+    body frame of `scan_points`.
     """
+    rotation, translation = sensor_pose(scan)
     places_L = np.ascontiguousarray((centres_F - translation) @ rotation)
-    ranges = np.ascontiguousarray(beams.ranges_m)
-    return _clear(ranges, beams.elevations_rad, beams.azimuths_rad, places_L, cell_m)
+    return _clear(np.ascontiguousarray(scan.ranges_m), scan.elevations_rad, scan.azimuths_rad, places_L, cell_m)
 
 
 @compiled

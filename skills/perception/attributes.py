@@ -12,12 +12,13 @@ import cv2
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 from skills.perception.class_forms import class_forms
 from skills.perception.detection_3d import Detection3D
 
 Colours = NDArray[np.uint8]
+_LEAST_SHARE: Final = 0.3
 _BIGGER: Final[Mapping[str, bool]] = {
     "big": True,
     "large": True,
@@ -28,12 +29,10 @@ _BIGGER: Final[Mapping[str, bool]] = {
 }
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class ColourRange(_Model):
+class ColourRange(BaseModel):
     """A range of hue (degrees, may wrap past 360), saturation and value (0 to 1)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     hue_deg: tuple[float, float] = (0.0, 360.0)
     saturation: tuple[float, float] = (0.0, 1.0)
@@ -50,26 +49,16 @@ class ColourRange(_Model):
         return float(np.mean(in_hue & in_saturation & in_value))
 
 
-class Appearance(_Model):
-    """The colour words."""
-
-    attributes: dict[str, ColourRange]
-
-    def shows(self, colours: Colours, attribute: str) -> bool:
-        """Whether a colour word fits. Raises KeyError for an unknown word."""
-        return self.attributes[attribute].share(colours) > 0.3
-
-
 @lru_cache(maxsize=1)
-def load_appearance() -> Appearance:
-    """The appearance data beside this module. Raises pydantic.ValidationError when it is malformed."""
-    path = Path(__file__).with_name("colour_words.yaml")
-    return Appearance.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+def colour_words() -> Mapping[str, ColourRange]:
+    """The colour words. Raises pydantic.ValidationError when the file beside this module is malformed."""
+    text = Path(__file__).with_name("colour_words.yaml").read_text(encoding="utf-8")
+    return TypeAdapter(dict[str, ColourRange]).validate_python(yaml.safe_load(text)["attributes"])
 
 
 def known_attributes() -> frozenset[str]:
     """The attribute words that can be judged."""
-    return frozenset(load_appearance().attributes) | frozenset(_BIGGER)
+    return frozenset(colour_words()) | frozenset(_BIGGER)
 
 
 def shows(detected: Detection3D, attribute: str) -> bool:
@@ -77,7 +66,7 @@ def shows(detected: Detection3D, attribute: str) -> bool:
     word = attribute.lower()
     if word in _BIGGER:
         return _is_big(detected) == _BIGGER[word]
-    return len(detected.colours) > 0 and load_appearance().shows(detected.colours, word)
+    return len(detected.colours) > 0 and colour_words()[word].share(detected.colours) > _LEAST_SHARE
 
 
 def _is_big(detected: Detection3D) -> bool:

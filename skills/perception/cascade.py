@@ -7,8 +7,6 @@ from pathlib import Path
 
 from skills.detection import Detector
 
-__all__ = ["Cascade"]
-
 
 @dataclass(frozen=True)
 class Cascade:

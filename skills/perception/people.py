@@ -13,8 +13,6 @@ from pydrake.math import RigidTransform
 from skills.perception.point_cloud import grid_labels
 from skills.robot import FloatArray, Pose2D, Scan
 
-__all__ = ["SeenPerson", "merged", "people_in_scan"]
-
 _CELL_M = 0.05
 _LOWEST_M = 0.8
 _HIGHEST_M = 1.8

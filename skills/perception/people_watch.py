@@ -17,8 +17,6 @@ from skills.perception.people import SeenPerson, merged
 from skills.perception.position import position_of
 from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
 
-__all__ = ["PEOPLE_TOPIC", "PeopleOptions", "PeopleWatch", "cameras_towards"]
-
 PEOPLE_TOPIC: Final = "people"
 PERSON: Final = "person"
 _HEIGHTS_M: Final = (0.2, 0.6, 1.0)

@@ -8,8 +8,6 @@ import numpy as np
 
 from skills.robot import FloatArray
 
-__all__ = ["LevelPlane"]
-
 _FEWEST_POINTS = 40
 _STEEPEST = 0.035
 _LEAST_NOISE_M = 0.001

@@ -1,9 +1,8 @@
-"""Test-time augmentation: several views of one picture, also mirrored, smaller and parts of it, fused into one answer.
+"""Test-time augmentation: several views of one picture, also mirrored and smaller, fused into one answer.
 
-Boxes of one object in several views are fused after Solovyev et al., "Weighted boxes fusion" (2021); parts that are
-shown larger serve small objects, after Akyon et al., "Slicing aided hyper inference" (2022). An object is judged by the
-views that show all of it, neither small nor very large; a person by those of the whole picture. Where the first view
-leaves no doubt, the others are not taken.
+Boxes of one object in several views are fused after Solovyev et al., "Weighted boxes fusion" (2021). An object is
+judged by the views that show it neither small nor very large. Where the first view leaves no doubt, the others are not
+taken.
 """
 
 from __future__ import annotations
@@ -22,84 +21,45 @@ from skills.perception.detector.onnx_detector import OnnxDetector
 from skills.perception.detector.suppression import Candidates, detections_of
 from skills.robot import Picture
 
-__all__ = ["VIEWS", "AugmentationOptions", "AugmentedDetector", "DetectsClass", "DetectsInViews", "View"]
-
-
 Box = tuple[float, float, float, float]
 _SAME_OBJECT = 0.55
 _LEAST_SCORE = 0.05
 _LEAST_SIDE_PX, _MOST_SIDE_PX = 64.0, 240.0
 _LARGE_CLASSES: Final = frozenset({"person"})
 _LEAST_LARGE_SIDE_PX: Final = 140.0
-_MARGIN = 0.003
-_WHOLE: Final = (0.0, 0.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class View:
-    """A picture as it is, or mirrored from left to right, or smaller by `scale` (up to 1) in the same frame, or a part.
-
-    A `part` is (left, top, right, bottom) in shares of the picture's width and height. The detector's letterbox shows
-    it as large as it would show the whole.
-    """
+    """A picture as it is, or mirrored from left to right, or smaller by `scale` (up to 1) in the same frame."""
 
     mirrored: bool = False
     scale: float = 1.0
-    part: tuple[float, float, float, float] = _WHOLE
 
     def of(self, picture: Picture) -> Picture:
-        """The view of a picture (H, W) or (H, W, 3); of the same size, if it is not a part."""
-        u0, v0, u1, v1 = self._edges_px(picture.shape)
-        shown = picture[v0:v1, u0:u1]
-        turned = shown[:, ::-1] if self.mirrored else shown
+        """The view of a picture (H, W) or (H, W, 3), of the same size."""
+        turned = picture[:, ::-1] if self.mirrored else picture
         if self.scale == 1.0:
             return np.ascontiguousarray(turned)
         small = cv2.resize(turned, None, fx=self.scale, fy=self.scale, interpolation=cv2.INTER_AREA)
-        framed = np.full_like(shown, PADDING)
+        framed = np.full_like(picture, PADDING)
         framed[: small.shape[0], : small.shape[1]] = small
         return framed
 
-    def back(self, box: Box, shape: Sequence[int]) -> Box:
-        """A box of the view in the picture of some shape (H, W, ...)."""
-        left, top, right, _ = self._edges_px(shape)
+    def back(self, box: Box, width_px: int) -> Box:
+        """A box of the view in the picture, which is so wide."""
         u0, v0, u1, v1 = (value / self.scale for value in box)
-        if self.mirrored:
-            u0, u1 = right - left - u1, right - left - u0
-        return (left + u0, top + v0, left + u1, top + v1)
+        return (width_px - u1, v0, width_px - u0, v1) if self.mirrored else (u0, v0, u1, v1)
 
-    def suits(self, box: Box, shape: Sequence[int]) -> bool:
-        """Whether an object with a box in the picture has a size in the view at which it is judged best, and is whole.
+    def suits(self, box: Box, shape: Sequence[int], *, large: bool) -> bool:
+        """Whether an object with a box in a picture (H, W, ...) has a size in the view at which it is judged best.
 
-        Sizes are those in the letterbox, which the network sees.
+        Sizes are those in the letterbox, which the network sees. Objects of a `large` class have sizes of their own.
         """
-        side_px = self._side_px(box, shape)
-        large_enough = self.scale == 1.0 or side_px >= _LEAST_SIDE_PX
-        return large_enough and side_px <= _MOST_SIDE_PX and self.shows_all(box, shape)
-
-    def suits_large(self, box: Box, shape: Sequence[int]) -> bool:
-        """Whether it is of the whole picture, and does not make an object of a large class with a box in it small."""
-        return self.part == _WHOLE and (self.scale == 1.0 or self._side_px(box, shape) >= _LEAST_LARGE_SIDE_PX)
-
-    def _side_px(self, box: Box, shape: Sequence[int]) -> float:
-        """The longer side, in the letterbox, of what has a box in the picture."""
-        u0, v0, u1, v1 = self._edges_px(shape)
-        larger = Letterbox(width_px=u1 - u0, height_px=v1 - v0).scale_xy[0]
-        return max(box[2] - box[0], box[3] - box[1]) * self.scale * larger
-
-    def shows_all(self, box: Box, shape: Sequence[int]) -> bool:
-        """Whether the part does not cut off what has a box in the picture."""
-        height, width = shape[:2]
-        u0, v0, u1, v1 = self._edges_px(shape)
-        margin = _MARGIN * width
-        beyond_left, beyond_top = u0 > 0 and box[0] < u0 + margin, v0 > 0 and box[1] < v0 + margin
-        beyond_right, beyond_bottom = u1 < width and box[2] > u1 - margin, v1 < height and box[3] > v1 - margin
-        return not (beyond_left or beyond_top or beyond_right or beyond_bottom)
-
-    def _edges_px(self, shape: Sequence[int]) -> tuple[int, int, int, int]:
-        """Left, top, right and bottom edge of the part, which has one pixel at least."""
-        height, width = shape[:2]
-        left, top = min(width - 1, round(self.part[0] * width)), min(height - 1, round(self.part[1] * height))
-        return left, top, max(left + 1, round(self.part[2] * width)), max(top + 1, round(self.part[3] * height))
+        letterbox = Letterbox(width_px=shape[1], height_px=shape[0])
+        side_px = max(box[2] - box[0], box[3] - box[1]) * self.scale * letterbox.scale_xy[0]
+        least_px, most_px = (_LEAST_LARGE_SIDE_PX, np.inf) if large else (_LEAST_SIDE_PX, _MOST_SIDE_PX)
+        return (self.scale == 1.0 or side_px >= least_px) and side_px <= most_px
 
 
 VIEWS: Final = (View(), View(mirrored=True), View(scale=0.7), View(True, 0.5), View(scale=0.35))
@@ -191,9 +151,7 @@ def _fused(
     """One candidate for each object and class."""
     groups: list[_Group] = []
     for one, number in sorted(_numbered(found), key=lambda pair: -pair[0].score):
-        box = views[number].back(one.box, shape)
-        if not views[number].shows_all(box, shape):
-            continue
+        box = views[number].back(one.box, shape[1])
         same = [group for group in groups if group.is_of(one.class_name, box)]
         if not same:
             groups.append(_Group(one.class_name, box, {number: (one.score, box)}))
@@ -221,8 +179,8 @@ class _Group:
 
     def row(self, views: Sequence[View], shape: Sequence[int]) -> tuple[NDArray[np.float64], float, str]:
         """Mean box, weighted by the scores, mean score, and class; by the views that suit it, or by all."""
-        suits = View.suits_large if self.class_name in _LARGE_CLASSES else View.suits
-        suiting = [k for k, view in enumerate(views) if suits(view, self.box, shape)] or range(len(views))
+        large = self.class_name in _LARGE_CLASSES
+        suiting = [k for k, view in enumerate(views) if view.suits(self.box, shape, large=large)] or range(len(views))
         own = [self.seen[number] for number in suiting if number in self.seen]
         judging = own or list(self.seen.values())
         box = np.average([box for _, box in judging], axis=0, weights=[score for score, _ in judging])

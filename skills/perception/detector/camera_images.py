@@ -17,8 +17,6 @@ from skills.perception.detector.augmentation import DetectsClass, DetectsInViews
 from skills.perception.detector.upright import LEAST_ROLL_DEG, turned, turned_back
 from skills.robot import Image, Picture
 
-__all__ = ["DETECTION_LATENCY_S", "brightened", "detections_in", "found_in_grey", "is_dark", "on_its_head"]
-
 DETECTION_LATENCY_S: Final = 0.3
 """Up to five views of a picture, and where the objects are, on two processor cores."""
 _DARK_MEAN, _DARK_SPREAD = 6.0, 4.0

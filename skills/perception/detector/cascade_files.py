@@ -22,23 +22,7 @@ from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX
 from skills.perception.detector.network_file import Inputs, ModelFileError, Network, NetworkKind, Outputs, load_network
 from skills.perception.detector.proposals import CROP_PX
 
-__all__ = [
-    "CLASSIFIER_FORMAT",
-    "FORMAT",
-    "MODEL_FILE",
-    "REFINEMENT_FORMAT",
-    "DetectorModel",
-    "classifier_file",
-    "load_classifier",
-    "load_model",
-    "load_refinement",
-    "refinement_file",
-]
-
 MODEL_FILE: Final = Path(__file__).with_name("model") / "errand_detector.onnx"
-FORMAT: Final = "errand-detector-1"
-REFINEMENT_FORMAT: Final = "errand-regions-1"
-CLASSIFIER_FORMAT: Final = "errand-third-1"
 
 
 def _one_box(classes: int) -> Outputs:
@@ -53,17 +37,17 @@ def _crops(classes: int) -> Inputs:
     }
 
 
-_PROPOSAL: Final = NetworkKind(
-    FORMAT,
+PROPOSAL: Final = NetworkKind(
+    "errand-detector-1",
     "make a new one: errand dataset train --data DIR --out DIR",
     lambda _classes: {"images": ("uint8", (HEIGHT_PX, WIDTH_PX, 3))},
     _one_box,
 )
-_REFINEMENT: Final = NetworkKind(
-    REFINEMENT_FORMAT, "remove it, or make a new one: errand dataset refine --data DIR --out DIR", _crops, _one_box
+REFINEMENT: Final = NetworkKind(
+    "errand-regions-1", "remove it, or make a new one: errand dataset refine --data DIR --out DIR", _crops, _one_box
 )
-_CLASSIFIER: Final = NetworkKind(
-    CLASSIFIER_FORMAT,
+CLASSIFIER: Final = NetworkKind(
+    "errand-third-1",
     "remove it, or make a new one: errand dataset refine --classifier --data DIR --out DIR",
     _crops,
     _one_box,
@@ -94,28 +78,18 @@ def classifier_file(file: Path) -> Path:
     return file.with_name(f"{file.stem}_classifier{file.suffix}")
 
 
-def load_refinement(file: Path) -> Network:
-    """The refinement network of a file, whichever proposal network it belongs to. Raises ModelFileError."""
-    return load_network(file, _REFINEMENT)
-
-
-def load_classifier(file: Path) -> Network:
-    """The classifier network of a file, whichever refinement network it belongs to. Raises ModelFileError."""
-    return load_network(file, _CLASSIFIER)
-
-
 def load_model(file: Path = MODEL_FILE, *, networks: int = 3) -> DetectorModel:
     """The network of a file, and those that stand beside it, up to so many `networks`. Raises ModelFileError."""
-    proposal = load_network(file, _PROPOSAL)
+    proposal = load_network(file, PROPOSAL)
     beside, last = refinement_file(file), classifier_file(file)
     if networks < 2 or not beside.exists():
         return DetectorModel(proposal)
-    refinement = load_refinement(beside)
-    _check_belongs(refinement, beside, "first", proposal, file, _REFINEMENT)
+    refinement = load_network(beside, REFINEMENT)
+    _check_belongs(refinement, beside, "first", proposal, file, REFINEMENT)
     if networks < 3 or not last.exists():
         return DetectorModel(proposal, refinement)
-    classifier = load_classifier(last)
-    _check_belongs(classifier, last, "second", refinement, beside, _CLASSIFIER)
+    classifier = load_network(last, CLASSIFIER)
+    _check_belongs(classifier, last, "second", refinement, beside, CLASSIFIER)
     return DetectorModel(proposal, refinement, classifier)
 
 

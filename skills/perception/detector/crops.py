@@ -22,8 +22,6 @@ from skills.perception.detector.scales import Scales
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
 
-__all__ = ["classified", "crops_about", "refined"]
-
 Floats = NDArray[np.float32]
 
 

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from skills.robot import Picture
 
-__all__ = ["HEIGHT_PX", "PADDING", "WIDTH_PX", "Letterbox", "check_picture", "fill_letterbox", "letterbox"]
-
 WIDTH_PX: Final = 640
 HEIGHT_PX: Final = 480
 PADDING: Final = 114

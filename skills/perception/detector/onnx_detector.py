@@ -22,8 +22,6 @@ from skills.perception.detector.scales import Scales, halved
 from skills.perception.detector.suppression import SuppressionOptions, candidates_of, detections_of
 from skills.robot import Picture
 
-__all__ = ["DetectorOptions", "OnnxDetector", "load_detector"]
-
 THREADS: Final = 2
 """So many pictures are looked at side by side."""
 

@@ -15,18 +15,6 @@ from numpy.typing import NDArray
 
 from skills.perception.detector.suppression import apart
 
-__all__ = [
-    "CLASSIFIED",
-    "CROP_PX",
-    "ProposalOptions",
-    "Proposals",
-    "crop_map",
-    "logits_of",
-    "mapped",
-    "proposals_of",
-    "rows_of",
-]
-
 CROP_PX: Final = 128
 OBJECT_PX: Final = 84.0
 LEAST_SIDE_PX: Final = 20.0

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from skills.perception.detector.letterbox import PADDING
 from skills.robot import Picture
 
-__all__ = ["Scales", "cut_out", "halved"]
-
 _HALF_BELOW: Final = 0.7
 
 

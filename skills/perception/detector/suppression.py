@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from skills.detection import Detection
 
-__all__ = ["Candidates", "SuppressionOptions", "alternatives_of", "apart", "candidates_of", "detections_of", "suppress"]
-
 Floats = NDArray[np.float32]
 
 

@@ -11,8 +11,6 @@ import numpy as np
 from skills.detection import Detection
 from skills.robot import Picture
 
-__all__ = ["LEAST_ROLL_DEG", "turned", "turned_back"]
-
 LEAST_ROLL_DEG: Final = 120.0
 """A picture that is turned by more than this from upright, either way, stands on its head."""
 

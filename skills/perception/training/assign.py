@@ -13,20 +13,21 @@ from torch import Tensor
 
 from skills.perception.training.overlaps import overlap
 
-__all__ = ["AssignOptions", "Assigned", "assign"]
-
 _TINY = 1e-9
+_MOST_CELLS = 10
+_SCORE_POWER, _OVERLAP_POWER = 0.5, 6.0
+_LEAST_SIDE_PX = 16.0
+"""How small a box is at least taken to be when asking which cells lie in it."""
 
 
 @dataclass(frozen=True)
-class AssignOptions:
-    """How many cells answer for an object at most, the weights of score and overlap, and how small a box is at least
-    taken to be (in pixels) when asking which cells lie in it."""
+class TruthBatch:
+    """The objects of N pictures, filled up to G rows: boxes (N, G, 4), classes, ignored and present (N, G)."""
 
-    most_cells: int = 10
-    score_power: float = 0.5
-    overlap_power: float = 6.0
-    least_side_px: float = 16.0
+    boxes: Tensor
+    classes: Tensor
+    ignored: Tensor
+    present: Tensor
 
 
 @dataclass(frozen=True)
@@ -41,40 +42,31 @@ class Assigned:
 
 @torch.no_grad()
 def assign(
-    scores: Tensor,
-    boxes: Tensor,
-    middles: Tensor,
-    *,
-    truth: Tensor,
-    classes: Tensor,
-    ignored: Tensor,
-    present: Tensor,
-    options: AssignOptions,
+    scores: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch, most_cells: int = _MOST_CELLS
 ) -> Assigned:
-    """Assign the cells of N pictures to at most G objects each.
+    """Assign the cells of N pictures to at most G objects each, `most_cells` to each object.
 
-    scores (N, A, K) from 0 to 1, boxes (N, A, 4), middles (A, 2); truth (N, G, 4), classes (N, G), ignored (N, G) and
-    present (N, G), which is false for rows that only fill up.
+    scores (N, A, K) from 0 to 1, boxes (N, A, 4), middles (A, 2).
     """
-    inside = _inside(middles, truth, options.least_side_px) & present[..., None]
-    overlaps = overlap(truth[:, :, None], boxes[:, None])
-    asked = scores.gather(2, classes[:, None, :].expand(-1, scores.shape[1], -1)).transpose(1, 2)
-    metric = asked.pow(options.score_power) * (overlaps + 1e-4).pow(options.overlap_power)
-    metric = metric * (inside & ~ignored[..., None])
-    chosen = _best(metric, options.most_cells) & (metric > 0)
+    inside = _inside(middles, truth.boxes) & truth.present[..., None]
+    overlaps = overlap(truth.boxes[:, :, None], boxes[:, None])
+    asked = scores.gather(2, truth.classes[:, None, :].expand(-1, scores.shape[1], -1)).transpose(1, 2)
+    metric = asked.pow(_SCORE_POWER) * (overlaps + 1e-4).pow(_OVERLAP_POWER)
+    metric = metric * (inside & ~truth.ignored[..., None])
+    chosen = _best(metric, most_cells) & (metric > 0)
     rival = torch.where(chosen, overlaps + _TINY, overlaps.new_tensor(-1.0))
     best, objects = rival.max(dim=1)
-    mine = chosen & (objects[:, None, :] == torch.arange(truth.shape[1])[None, :, None].to(objects.device))
+    mine = chosen & (objects[:, None, :] == torch.arange(truth.boxes.shape[1])[None, :, None].to(objects.device))
     quality = _quality(metric * mine, overlaps * mine)
     taken = best >= 0
-    left_out = (inside & ignored[..., None]).any(dim=1) & ~taken
+    left_out = (inside & truth.ignored[..., None]).any(dim=1) & ~taken
     return Assigned(torch.where(taken, objects, objects.new_tensor(-1)), quality * taken, left_out)
 
 
-def _inside(middles: Tensor, truth: Tensor, least_side_px: float) -> Tensor:
+def _inside(middles: Tensor, truth: Tensor) -> Tensor:
     """Whether cells' middles lie in boxes (N, G, A), of which the sides are taken to be at least so long."""
     centre, half = (truth[..., :2] + truth[..., 2:]) / 2, (truth[..., 2:] - truth[..., :2]) / 2
-    half = half.clamp(min=least_side_px / 2)
+    half = half.clamp(min=_LEAST_SIDE_PX / 2)
     away = (middles[None, None] - centre[:, :, None]).abs()
     return (away < half[:, :, None]).all(dim=-1)
 

@@ -9,12 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from skills.perception.training.assign import TruthBatch
 from skills.perception.training.canvases import Canvas, CanvasMaker
-from skills.perception.training.losses import TruthBatch
 from skills.perception.training.placing import Targets
 from skills.perception.training.schedule import Phase, shuffled
-
-__all__ = ["Batch", "Feed", "batch_of", "truth_of"]
 
 
 @dataclass(frozen=True)
@@ -23,6 +21,11 @@ class Batch:
 
     pictures: Tensor
     truth: TruthBatch
+
+    @property
+    def inputs(self) -> tuple[Tensor, ...]:
+        """What the network takes."""
+        return (self.pictures,)
 
 
 @dataclass(frozen=True)

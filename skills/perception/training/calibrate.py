@@ -12,8 +12,6 @@ from skills.detection import Detection
 from skills.perception.training.matching import Evaluation, evaluated
 from skills.perception.training.scoring_labels import LabelledPicture
 
-__all__ = ["best_threshold", "score_offsets"]
-
 Floats = NDArray[np.float64]
 FEWEST_LABELS: Final = 20
 _LIMITS: Final = (0.05, 0.95)

@@ -20,8 +20,6 @@ from skills.perception.training.photometry import as_seen_otherwise
 from skills.perception.training.placing import Cell, Targets, joined, placed, turning
 from skills.perception.training.store import PictureStore
 
-__all__ = ["Canvas", "CanvasMaker", "CanvasOptions"]
-
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
 _FITS: Final = 0.9

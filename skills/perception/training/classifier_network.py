@@ -10,12 +10,11 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from skills.perception.detector.cascade_files import CLASSIFIER
 from skills.perception.detector.proposals import CROP_PX
 from skills.perception.training.crop_network import MOST_LOGIT, CropNetwork, covered, moved
 from skills.perception.training.lite_backbone import AT_8, AT_16, AT_32, LiteBackbone
 from skills.perception.training.network import ConvUnit
-
-__all__ = ["USED", "ClassifierNetwork"]
 
 _CELLS_16, _CELLS_32 = CROP_PX // 16, CROP_PX // 32
 _SQUEEZED_16, _SQUEEZED_32, _JOINED = 24, 96, 192
@@ -26,6 +25,8 @@ USED = 0.75
 
 class ClassifierNetwork(CropNetwork):
     """A crop network that says at first what stands before it says."""
+
+    kind = CLASSIFIER
 
     def __init__(self, classes: int) -> None:
         known = _SQUEEZED_16 * _CELLS_16 * _CELLS_16 + _SQUEEZED_32 * _CELLS_32 * _CELLS_32 + classes + 4
@@ -59,7 +60,3 @@ class ClassifierNetwork(CropNetwork):
         for layer in (self.scores, self.sides):
             layer.weight.mul_(share)
             layer.bias.mul_(share)
-
-    def take_bytes(self) -> None:
-        """Take crops of values from 0 to 255 from now on."""
-        self.backbone.take_bytes()

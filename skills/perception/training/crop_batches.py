@@ -17,8 +17,6 @@ from skills.perception.training.proposal_table import ProposalTable
 from skills.perception.training.schedule import shuffled
 from skills.perception.training.store import PictureStore
 
-__all__ = ["CropBatch", "CropFeed", "changed_map"]
-
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
 _ON_THINGS: Final = 0.5
@@ -42,6 +40,11 @@ class CropBatch:
     logits: Tensor
     wanted: Tensor
     classes: Tensor
+
+    @property
+    def inputs(self) -> tuple[Tensor, ...]:
+        """What the network takes."""
+        return (self.crops, self.boxes, self.logits)
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,14 @@ import torch
 from torch import Tensor, nn
 
 from skills.perception.detector.proposals import CROP_PX
-from skills.perception.training.network import EarlyLayers
-
-__all__ = ["MOST_LOGIT", "CropNetwork", "covered", "moved"]
+from skills.perception.training.network import CascadeNetwork
 
 MOST_LOGIT: Final = 8.0
 _MOST_GROWTH: Final = 1.5
 _CELLS_8: Final = CROP_PX // 8
 
 
-class CropNetwork(nn.Module):
+class CropNetwork(CascadeNetwork):
     """Crops (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them and logits before (N, K) to logits and better boxes."""
 
     def __init__(self, classes: int, known: int, joined: int, at8: int) -> None:
@@ -39,20 +37,13 @@ class CropNetwork(nn.Module):
         nn.init.zeros_(self.place.weight)
 
     @property
-    def early_layers(self) -> EarlyLayers:
-        """What makes the features at stride 8."""
-        raise NotImplementedError
+    def score_biases(self) -> list[Tensor]:
+        """What is added last to the logits (K,)."""
+        return [self.scores.bias]
 
     def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, K) and boxes (N, 4) of what the early layers make of crops."""
         raise NotImplementedError
-
-    def take_bytes(self) -> None:
-        """Take crops of values from 0 to 255 from now on."""
-        raise NotImplementedError
-
-    def stop_learning(self) -> None:
-        """Change what is to be otherwise in use than in training: nothing, unless said."""
 
     def forward(self, crops: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, K) and boxes (N, 4) as x0 y0 x1 y1 in pixels of the crop."""

@@ -14,40 +14,33 @@ import onnx
 import torch
 from torch import Tensor, nn
 
-from skills.perception.detector.cascade_files import FORMAT
-from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX
-from skills.perception.detector.proposals import CROP_PX
-from skills.perception.training import onnx_files
-from skills.perception.training.crop_network import CropNetwork
-from skills.perception.training.network import DetectorNetwork
-from skills.perception.training.onnx_files import shorten_names, write_sealed
-
-__all__ = ["Exportable", "export", "export_crops", "fused", "normalised_layers", "write_onnx"]
+from skills.perception.training.network import CascadeNetwork
+from skills.perception.training.onnx_files import write_sealed
 
 _OPSET = 17
+_KINDS = {"uint8": torch.uint8, "float": torch.float32}
 Network = TypeVar("Network", bound=nn.Module)
 
 
 class Exportable(nn.Module):
-    """Pictures (N, 480, 640, 3) of bytes to boxes (N, A, 4) and scores (N, A, K)."""
+    """A network that takes pictures or crops (N, H, W, 3) of bytes, and what else it takes, to boxes and scores.
 
-    def __init__(self, network: DetectorNetwork, score_offsets: Sequence[float] | None = None) -> None:
+    `score_offsets` are added to the logits of each class.
+    """
+
+    def __init__(self, network: CascadeNetwork, score_offsets: Sequence[float] | None = None) -> None:
         super().__init__()
         self.network = fused(network)
-        if score_offsets is not None:
-            _shift(self.network, score_offsets)
-        self.network.backbone.take_bytes()
+        self.network.stop_learning()
+        self.network.early_layers.take_bytes()
+        with torch.no_grad():
+            for bias in self.network.score_biases if score_offsets is not None else ():
+                bias.add_(torch.tensor(score_offsets))
 
-    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
-        """Boxes and scores. The first convolution takes values from 0 to 255, its weights being so much smaller."""
-        logits, boxes = self.network(images.permute(0, 3, 1, 2).float())
+    def forward(self, images: Tensor, *known: Tensor) -> tuple[Tensor, Tensor]:
+        """Boxes and scores."""
+        logits, boxes = self.network(images.permute(0, 3, 1, 2).float(), *known)
         return boxes, logits.sigmoid()
-
-
-@torch.no_grad()
-def _shift(network: DetectorNetwork, offsets: Sequence[float]) -> None:
-    for head in network.heads:
-        head.scores.bias.add_(torch.tensor(offsets))
 
 
 def fused(network: Network) -> Network:
@@ -76,7 +69,7 @@ def normalised_layers(network: nn.Module) -> list[tuple[str, nn.Sequential]]:
 
 
 def export(
-    network: DetectorNetwork,
+    network: CascadeNetwork,
     file: Path,
     *,
     class_names: Sequence[str],
@@ -85,75 +78,24 @@ def export(
 ) -> None:
     """Write the ONNX file with its format, class names and other facts; whole or not at all.
 
-    `score_offsets` are added to the logits of each class.
+    `facts` of a crop network must hold the digest of the file of the network before it: as `first` that of the proposal
+    network, as `second` that of the refinement network. `score_offsets` are added to the logits of each class.
     """
     model = Exportable(network, score_offsets).eval()
-    example = {"images": torch.zeros((1, HEIGHT_PX, WIDTH_PX, 3), dtype=torch.uint8)}
-    write_onnx(model, example, file, {"format": FORMAT, "class_names": json.dumps(list(class_names)), **facts})
-
-
-class ExportableCrops(nn.Module):
-    """Crops (N, 128, 128, 3) of bytes, regions (N, 4) in them and logits (N, K) to boxes (N, 4) and scores."""
-
-    def __init__(self, network: CropNetwork, score_offsets: Sequence[float] | None = None) -> None:
-        super().__init__()
-        self.network = fused(network)
-        self.network.stop_learning()
-        self.network.take_bytes()
-        if score_offsets is not None:
-            with torch.no_grad():
-                self.network.scores.bias.add_(torch.tensor(score_offsets))
-
-    def forward(self, crops: Tensor, regions: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
-        """Boxes and scores."""
-        found, boxes = self.network(crops.permute(0, 3, 1, 2).float(), regions, logits)
-        return boxes, found.sigmoid()
-
-
-def export_crops(
-    network: CropNetwork,
-    file: Path,
-    *,
-    form: str,
-    class_names: Sequence[str],
-    facts: Mapping[str, str],
-    score_offsets: Sequence[float] | None = None,
-) -> None:
-    """Write the ONNX file of a crop network in a format; whole or not at all.
-
-    `score_offsets` are added to the logits of each class. `facts` must hold the digest of the file of the network
-    before it: as `first` that of the proposal network, as `second` that of the refinement network.
-    """
-    model = ExportableCrops(network, score_offsets).eval()
-    example = {
-        "chips": torch.zeros((2, CROP_PX, CROP_PX, 3), dtype=torch.uint8),
-        "regions": torch.full((2, 4), float(CROP_PX)) * torch.tensor([0.2, 0.2, 0.8, 0.8]),
-        "logits": torch.zeros((2, len(class_names))),
-    }
-    facts = {"format": form, "class_names": json.dumps(list(class_names)), **facts}
-    write_onnx(model, example, file, facts, compact=True)
-
-
-def write_onnx(
-    model: nn.Module, example: Mapping[str, Tensor], file: Path, facts: Mapping[str, str], *, compact: bool = False
-) -> None:
-    """Write the ONNX file of a model that makes boxes and scores, each of N rows, of inputs by name of N rows.
-
-    A `compact` one holds its weights in 16 bits each, which become 32 when it is loaded.
-    """
+    inputs = network.kind.inputs(len(class_names)).items()
+    example = {name: torch.zeros((2, *shape), dtype=_KINDS[of]) for name, (of, shape) in inputs}
     with torch.no_grad():
         shapes = [tuple(output.shape) for output in model(*example.values())]
     with tempfile.TemporaryDirectory() as folder:
         raw = Path(folder) / "raw.onnx"
         _trace(model, example, raw)
         traced = onnx.load(raw)
-    if compact:
-        onnx_files.compact(traced.graph)
-    _size_outputs(traced, shapes)
-    shorten_names(traced.graph)
+    for port, sizes in zip(traced.graph.output, shapes, strict=True):
+        for axis, size in enumerate(sizes[1:], start=1):
+            port.type.tensor_type.shape.dim[axis].dim_value = size
     traced.producer_name, traced.producer_version = "errand", ""
     onnx.checker.check_model(traced)
-    write_sealed(traced, file, facts)
+    write_sealed(traced, file, {"format": network.kind.format, "class_names": json.dumps(list(class_names)), **facts})
 
 
 def _trace(model: nn.Module, example: Mapping[str, Tensor], file: Path) -> None:
@@ -169,10 +111,3 @@ def _trace(model: nn.Module, example: Mapping[str, Tensor], file: Path) -> None:
             output_names=["boxes", "scores"],
             dynamic_axes={name: {0: "N"} for name in (*example, "boxes", "scores")},
         )
-
-
-def _size_outputs(model: onnx.ModelProto, shapes: Sequence[Sequence[int]]) -> None:
-    """Let a model tell the sizes of its outputs."""
-    for port, sizes in zip(model.graph.output, shapes, strict=True):
-        for axis, size in enumerate(sizes[1:], start=1):
-            port.type.tensor_type.shape.dim[axis].dim_value = size

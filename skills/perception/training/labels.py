@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.perception.detector.letterbox import Letterbox
-
-__all__ = ["Labels", "TrainingDataError", "TrainingPicture", "category_names", "digest_of", "read_split"]
+from skills.perception.training.coco import CocoFile, CocoImage, CocoLabel, coco_file
 
 Floats = NDArray[np.float32]
 LEAST_SEEN: Final = 0.25
@@ -57,13 +56,12 @@ class TrainingPicture:
 
 def category_names(folder: Path) -> tuple[str, ...]:
     """Names of the classes in the order of their ids. Raises TrainingDataError."""
-    document = _document(folder / "train.json")
-    return tuple(str(entry["name"]) for entry in sorted(document["categories"], key=lambda entry: int(entry["id"])))
+    return tuple(one.name for one in sorted(_file(folder, "train").categories, key=lambda one: int(one.id)))
 
 
 def read_split(folder: Path, split: str) -> tuple[TrainingPicture, ...]:
     """All pictures of `train` or `val`. Raises TrainingDataError."""
-    return tuple(_read(folder, entry, labels) for entry, labels in _entries(folder, split))
+    return tuple(_picture(folder, image, labels) for image, labels in _file(folder, split).by_picture())
 
 
 def digest_of(folder: Path) -> str:
@@ -75,54 +73,35 @@ def digest_of(folder: Path) -> str:
     return made.hexdigest()[:16]
 
 
-def _entries(folder: Path, split: str) -> Iterable[tuple[Mapping[str, Any], Sequence[Mapping[str, Any]]]]:
-    document = _document(folder / f"{split}.json")
-    grouped: dict[int, list[Mapping[str, Any]]] = {image["id"]: [] for image in document["images"]}
-    for label in document["annotations"]:
-        grouped[label["image_id"]].append(label)
-    return [(image, grouped[image["id"]]) for image in document["images"]]
-
-
-def _document(path: Path) -> Mapping[str, Any]:
-    hint = "make one: errand dataset render --out DIR --images 8000"
+def _file(folder: Path, split: str) -> CocoFile:
+    path, hint = folder / f"{split}.json", "make one: errand dataset render --out DIR --images 8000"
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        return coco_file(json.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
         raise TrainingDataError(f"{path}: there is no such data set ({error.strerror})", hint=hint) from error
     except ValueError as error:
         raise TrainingDataError(f"{path}: is damaged ({error})", hint=hint) from error
-    if not isinstance(found, dict) or not {"images", "annotations", "categories"} <= found.keys():
-        raise TrainingDataError(f"{path}: is no COCO file", hint=hint)
-    return found
 
 
-def _read(folder: Path, image: Mapping[str, Any], labels: Sequence[Mapping[str, Any]]) -> TrainingPicture:
-    try:
-        scale = np.array(Letterbox(int(image["width"]), int(image["height"])).scale_xy, dtype=np.float32)
-        return TrainingPicture(folder / str(image["file_name"]), _labels(labels, scale))
-    except (KeyError, TypeError, ValueError) as error:
-        place = f"{folder}: picture {image.get('file_name')}"
-        raise TrainingDataError(f"{place}: its labels are damaged ({error!r})", hint="render it anew") from error
-
-
-def _labels(labels: Sequence[Mapping[str, Any]], scale: Floats) -> Labels:
-    return Labels(
+def _picture(folder: Path, image: CocoImage, labels: Sequence[CocoLabel]) -> TrainingPicture:
+    file = folder / image.file_name
+    if image.size_px is None:
+        raise TrainingDataError(f"{file}: the data set does not tell its size", hint="render it anew")
+    scale = np.array(Letterbox(*image.size_px).scale_xy, dtype=np.float32)
+    found = Labels(
         outlines=tuple(outline_of(label) * scale for label in labels),
-        classes=np.array([int(label["category_id"]) - 1 for label in labels], dtype=np.int64),
-        seen=np.array([_seen(label) for label in labels], dtype=np.float32),
-        ignored=np.array([bool(label.get("ignore", 0)) for label in labels], dtype=bool),
+        classes=np.array([int(label.category_id) - 1 for label in labels], dtype=np.int64),
+        seen=np.array([1.0 if label.seen is None else label.seen for label in labels], dtype=np.float32),
+        ignored=np.array([label.ignore for label in labels], dtype=bool),
     )
+    return TrainingPicture(file, found)
 
 
-def _seen(label: Mapping[str, Any]) -> float:
-    return float(label.get("visibility", 1.0)) * (1.0 - float(label.get("truncation", 0.0)))
-
-
-def outline_of(label: Mapping[str, Any]) -> Floats:
+def outline_of(label: CocoLabel) -> Floats:
     """The convex outline (K, 2) of a label's mask, or of its box where it has no mask of run lengths."""
-    x, y, width, height = (float(value) for value in label["bbox"])
+    x, y, width, height = label.bbox
     corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]], dtype=np.float32)
-    lengths = label.get("segmentation")
+    lengths = label.segmentation
     if not isinstance(lengths, Mapping) or not isinstance(lengths.get("counts"), list):
         return corners
     points = _run_ends(lengths)

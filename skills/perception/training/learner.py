@@ -1,9 +1,9 @@
-"""The state of training: network, its weight average, optimiser and progress; and one step of it."""
+"""The state of training: network, its weight average, optimiser and progress; and one step of it, for each kind."""
 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -12,20 +12,24 @@ import torch
 from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel
 
+from skills.perception.training.assign import TruthBatch
 from skills.perception.training.batches import Batch
+from skills.perception.training.classifier_network import ClassifierNetwork
+from skills.perception.training.crop_batches import CropBatch
+from skills.perception.training.crop_network import CropNetwork
+from skills.perception.training.export import fused
 from skills.perception.training.labels import TrainingDataError
-from skills.perception.training.losses import Losses, LossOptions, TruthBatch, losses
-from skills.perception.training.network import DetectorNetwork, cells
-from skills.perception.training.onnx_weights import take_over
-
-__all__ = ["Learner", "Progress", "ProposalLearner", "read_checkpoint"]
+from skills.perception.training.losses import Losses, crop_losses, losses
+from skills.perception.training.network import CascadeNetwork, DetectorNetwork, EarlyLayers, cells
+from skills.perception.training.onnx_weights import settle, take_over
+from skills.perception.training.refinement_network import RefinementNetwork
 
 FORMAT = 2
 ONNX = ".onnx"
 _LONGEST_STEP = 10.0
 _AVERAGED_OVER, _SETTLES_IN = 0.998, 10
 _WITHOUT = "begin anew without it"
-Network = TypeVar("Network", bound=nn.Module)
+Network = TypeVar("Network", bound=CascadeNetwork)
 
 
 @dataclass
@@ -73,6 +77,10 @@ class Learner(Generic[Network]):
         """Within it the network computes in bfloat16, where that saves time."""
         return torch.autocast(self.device.type, torch.bfloat16, enabled=quick_in_bfloat16(self.device))
 
+    def moved(self, *parts: Tensor) -> tuple[Tensor, ...]:
+        """The parts of a batch where the network is."""
+        return tuple(part.to(self.device) for part in parts)
+
     def begin_average(self) -> None:
         """Let the average be the network as it is now."""
         self.average.load_state_dict(self.network.state_dict())
@@ -98,6 +106,18 @@ class Learner(Generic[Network]):
         self._optimiser.load_state_dict(state["optimiser"])
         self.progress = Progress(**state["progress"])
 
+    def start_from(self, file: Path, batches: Iterable[Batch | CropBatch]) -> None:
+        """Take over the weights of an ONNX file, with statistics of batches, or the averaged ones of a checkpoint.
+
+        All else begins anew. Raises TrainingDataError.
+        """
+        if file.suffix == ONNX:
+            take_over(self.network, file)
+            settle(self.network, (self.moved(*batch.inputs) for batch in batches))
+            self.begin_average()
+        else:
+            self.start_from_checkpoint(file)
+
     def start_from_checkpoint(self, file: Path) -> None:
         """Take over a checkpoint's averaged weights; all else begins anew. Raises TrainingDataError."""
         _take(self._average, read_checkpoint(file)["average"], file)
@@ -122,8 +142,6 @@ def _take(network: nn.Module, weights: Mapping[str, Any], file: Path) -> None:
 class ProposalLearner(Learner[DetectorNetwork]):
     """All that changes while the proposal network is trained."""
 
-    loss: LossOptions = field(default_factory=LossOptions)
-
     @staticmethod
     def new(classes: int, seed: int, device: torch.device) -> ProposalLearner:
         """An untrained network."""
@@ -138,19 +156,62 @@ class ProposalLearner(Learner[DetectorNetwork]):
         with self.quick():
             logits, boxes = self.network(batch.pictures.to(self.device))
         middles = cells(batch.pictures.shape[2], batch.pictures.shape[3])[0].to(self.device)
-        truth = TruthBatch(*(part.to(self.device) for part in vars(batch.truth).values()))
-        return losses(logits, boxes, middles, truth, self.loss)
+        truth = TruthBatch(*self.moved(*vars(batch.truth).values()))
+        return losses(logits, boxes, middles, truth)
 
-    def start_from(self, file: Path) -> None:
-        """Take over the weights of an ONNX file, or a checkpoint's averaged ones; all else begins anew.
 
-        Those of an ONNX file are still to be settled. Raises TrainingDataError.
+@dataclass
+class CropLearner(Learner[CropNetwork]):
+    """All that changes while a network is trained on crops.
+
+    `early` makes the features at stride 8 when they are no longer trained. It needs no normalisation.
+    """
+
+    early: EarlyLayers | None = None
+
+    @staticmethod
+    def new(classes: int, seed: int, device: torch.device, *, classifier: bool) -> CropLearner:
+        """An untrained refinement or classifier network."""
+        torch.manual_seed(seed)
+        return CropLearner(ClassifierNetwork(classes) if classifier else RefinementNetwork(classes), device)
+
+    def begin(self, first: Path, batches: Iterable[CropBatch]) -> None:
+        """Take over the weights to begin with; what has none there stays as it is. Raises TrainingDataError.
+
+        The refinement network begins with the proposal network's ONNX file and statistics of batches, the classifier
+        with ImageNet's weights.
         """
-        if file.suffix == ONNX:
-            take_over(self.network, file)
-            self.begin_average()
-        else:
-            self.start_from_checkpoint(file)
+        if isinstance(self.network, ClassifierNetwork):
+            self.network.backbone.begin_with_imagenet()
+        elif isinstance(self.network, RefinementNetwork):
+            detector = DetectorNetwork(self.network.classes)
+            take_over(detector, first)
+            settle(detector, ((batch.crops,) for batch in batches))
+            self.network.detector.load_state_dict(detector.state_dict(), strict=False)
+        self.begin_average()
+
+    def keep_early(self) -> None:
+        """Train no longer what makes the features at stride 8: two fifths of the time of each step."""
+        early = self.network.early_layers
+        for part in (early.stem, early.stage8):
+            part.requires_grad_(False)
+        made = fused(self.average.early_layers).requires_grad_(False)
+        self.early = made.to(self.device, memory_format=torch.channels_last)
+
+    def step(self, batch: CropBatch, rate: float) -> tuple[float, float]:
+        """Train on one batch; returns score loss and box loss."""
+        return self.take_step(lambda: self._losses(batch), rate)
+
+    def _losses(self, batch: CropBatch) -> Losses:
+        crops, regions, before, wanted, classes = self.moved(*vars(batch).values())
+        with self.quick():
+            if self.early is None:
+                logits, boxes = self.network(crops, regions, before)
+            else:
+                with torch.no_grad():
+                    at8 = self.early.early(crops)
+                logits, boxes = self.network.from_early(at8, regions, before)
+        return crop_losses(logits, boxes, wanted, classes)
 
 
 def quick_in_bfloat16(device: torch.device) -> bool:

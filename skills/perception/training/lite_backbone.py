@@ -18,11 +18,8 @@ from typing import Any, Final
 import torch
 from torch import Tensor, nn
 
-from skills.perception.training.depthwise import before_first, filtered, padded
 from skills.perception.training.labels import TrainingDataError
 from skills.perception.training.network import EarlyLayers
-
-__all__ = ["AT_8", "AT_16", "AT_32", "InvertedResidual", "LiteBackbone", "PaddedConv", "PaddedDepthwise"]
 
 AT_8, AT_16, AT_32 = 40, 112, 320
 """Channels at strides 8, 16 and 32."""
@@ -61,12 +58,12 @@ class _Halving(torch.autograd.Function):
 
     @staticmethod
     def forward(context: Any, x: Tensor, weight: Tensor, bias: Tensor | None, kernel: int, groups: int) -> Tensor:
-        return nn.functional.conv2d(padded(x, kernel, 2), weight, bias, 2, 0, 1, groups)
+        return nn.functional.conv2d(_padded(x, kernel), weight, bias, 2, 0, 1, groups)
 
     @staticmethod
     def symbolic(graph: Any, x: Any, weight: Any, bias: Any, kernel: int, groups: int) -> Any:
         """The node in an ONNX file, in which normalisation has become a bias."""
-        before = before_first(kernel, 2)
+        before = (kernel - 2) // 2
         return graph.op(
             "Conv",
             *(x, weight, bias),
@@ -95,20 +92,13 @@ class PaddedConv(nn.Conv2d):
         if torch.onnx.is_in_onnx_export():
             halved: Tensor = _Halving.apply(x, self.weight, self.bias, kernel, self.groups)
             return halved
-        return super().forward(padded(x, kernel, 2))
+        return super().forward(_padded(x, kernel))
 
 
-class PaddedDepthwise(PaddedConv):
-    """The same of each channel by itself, without the library's gradients where those of `depthwise` are quicker."""
-
-    def __init__(self, channels: int, kernel: int, stride: int) -> None:
-        super().__init__(channels, channels, kernel, stride, groups=channels)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """(N, channels, H, W) to (N, channels, H or H / 2, W or W / 2)."""
-        if self.training and torch.is_grad_enabled() and self.bias is None:
-            return filtered(x, self.weight, self.stride[0])
-        return super().forward(x)
+def _padded(x: Tensor, kernel: int) -> Tensor:
+    """Rows and columns of zeros around (N, C, H, W): one more below, and at the right, than above and at the left."""
+    before = (kernel - 2) // 2
+    return nn.functional.pad(x, (before, before + 1, before, before + 1))
 
 
 def _unit(layer: nn.Conv2d, *then: nn.Module) -> nn.Sequential:
@@ -122,7 +112,7 @@ class InvertedResidual(nn.Module):
         super().__init__()
         within = inputs * wider
         self.widen = _unit(nn.Conv2d(inputs, within, 1, bias=False), nn.ReLU6(inplace=True)) if wider > 1 else None
-        self.filter = _unit(PaddedDepthwise(within, kernel, stride), nn.ReLU6(inplace=True))
+        self.filter = _unit(PaddedConv(within, within, kernel, stride, groups=within), nn.ReLU6(inplace=True))
         self.narrow = _unit(nn.Conv2d(within, outputs, 1, bias=False))
         self.adds = stride == 1 and inputs == outputs
 

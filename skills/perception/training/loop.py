@@ -13,8 +13,6 @@ from skills.perception.training.learner import Learner
 from skills.perception.training.schedule import Budget, Report
 from skills.perception.training.scoring import Score
 
-__all__ = ["CHECKPOINT", "Loop", "Stepped", "figures_of"]
-
 CHECKPOINT: Final = "checkpoint.pt"
 JOURNAL: Final = "training.jsonl"
 _NOTED_EVERY_STEPS: Final = 20

@@ -3,36 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from skills.perception.training.assign import Assigned, AssignOptions, assign
+from skills.perception.training.assign import Assigned, TruthBatch, assign
 from skills.perception.training.overlaps import overlap, sizes
 
-__all__ = ["LossOptions", "Losses", "TruthBatch", "complete_overlap", "crop_losses", "losses"]
-
 _TINY = 1e-7
-_CROP_BOX_WEIGHT = 2.0
-
-
-@dataclass(frozen=True)
-class LossOptions:
-    """Weight of the boxes beside the scores, and how cells are assigned."""
-
-    box_weight: float = 3.0
-    assignment: AssignOptions = field(default_factory=AssignOptions)
-
-
-@dataclass(frozen=True)
-class TruthBatch:
-    """The objects of N pictures, filled up to G rows: boxes (N, G, 4), classes, ignored and present (N, G)."""
-
-    boxes: Tensor
-    classes: Tensor
-    ignored: Tensor
-    present: Tensor
+_BOX_WEIGHT, _CROP_BOX_WEIGHT = 3.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -48,19 +28,10 @@ class Losses:
         return self.scores + self.boxes
 
 
-def losses(logits: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch, options: LossOptions) -> Losses:
+def losses(logits: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch) -> Losses:
     """The losses of logits (N, A, K) and boxes (N, A, 4), per answering cell, weighted by how well it does."""
     logits, boxes = logits.float(), boxes.float()
-    assigned = assign(
-        logits.detach().sigmoid(),
-        boxes.detach(),
-        middles,
-        truth=truth.boxes,
-        classes=truth.classes,
-        ignored=truth.ignored,
-        present=truth.present,
-        options=options.assignment,
-    )
+    assigned = assign(logits.detach().sigmoid(), boxes.detach(), middles, truth)
     total = assigned.quality.sum().clamp(min=1.0)
     wanted = _wanted_scores(logits, truth, assigned)
     each = torch.nn.functional.binary_cross_entropy_with_logits(logits, wanted, reduction="none").sum(dim=2)
@@ -68,7 +39,7 @@ def losses(logits: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch, op
     answering = assigned.objects >= 0
     targets = truth.boxes.gather(1, assigned.objects.clamp(min=0)[..., None].expand(-1, -1, 4))[answering]
     box_each = (1.0 - complete_overlap(boxes[answering], targets)) * assigned.quality[answering]
-    return Losses(score_loss, options.box_weight * box_each.sum() / total)
+    return Losses(score_loss, _BOX_WEIGHT * box_each.sum() / total)
 
 
 def crop_losses(logits: Tensor, boxes: Tensor, wanted: Tensor, classes: Tensor) -> Losses:

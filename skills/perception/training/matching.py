@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from skills.detection import Detection
 from skills.perception.training.scoring_labels import Label, LabelledPicture, large_enough
 
-__all__ = ["MOST_DETECTIONS", "Evaluation", "Match", "evaluated"]
-
 MOST_DETECTIONS: Final = 100
 _COUNTING: Final = (0.5, 1.5)
 

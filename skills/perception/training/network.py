@@ -10,31 +10,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import torch
 from torch import Tensor, nn
+
+from skills.perception.detector.cascade_files import PROPOSAL
+from skills.perception.detector.network_file import NetworkKind
 
 STRIDES: Final = (8, 16, 32)
 FIRST_SCORE: Final = 0.003
 
 
-@dataclass(frozen=True)
-class Widths:
-    """Channels after each halving of the picture, of the neck's levels and of the heads; depth of each block.
-
-    `residuals` are how many residual blocks of the full width follow at strides 16 and 32.
-    """
-
-    stem: tuple[int, int] = (16, 32)
-    levels: tuple[int, int, int] = (48, 96, 192)
-    depths: tuple[int, int, int] = (2, 2, 2)
-    residuals: tuple[int, int] = (0, 0)
-    neck: tuple[int, int, int] = (48, 64, 96)
-    neck_depth: int = 1
-    head_scores: int = 48
-    head_boxes: int = 32
+STEM: Final = (16, 32)
+LEVELS: Final = (48, 96, 192)
+NECK: Final = (48, 64, 96)
+"""Channels after each of the first halvings of the picture, at strides 8, 16 and 32, and of the neck's levels."""
+_DEPTH: Final = 2
+_HEAD_SCORES, _HEAD_BOXES = 48, 32
 
 
 class ConvUnit(nn.Sequential):
@@ -129,24 +122,47 @@ class EarlyLayers(nn.Module):
         """Pictures (N, 3, H, W) to features at stride 8: edges and textures."""
         raise NotImplementedError
 
+    def take_bytes(self) -> None:
+        """Take values from 0 to 255 from now on."""
+        raise NotImplementedError
+
+
+class CascadeNetwork(nn.Module):
+    """A network of the cascade, whose file is of some `kind`."""
+
+    kind: ClassVar[NetworkKind]
+    classes: int
+
+    @property
+    def early_layers(self) -> EarlyLayers:
+        """What makes the features at stride 8."""
+        raise NotImplementedError
+
+    @property
+    def score_biases(self) -> list[Tensor]:
+        """What is added last to the logits (K,)."""
+        raise NotImplementedError
+
+    def stop_learning(self) -> None:
+        """Change what is to be otherwise in use than in training: nothing, unless said."""
+
 
 class Backbone(EarlyLayers):
-    """Picture to features at strides 8, 16 and 32."""
+    """Picture to features at strides 8, 16 and 32; `residuals` are how many blocks follow at strides 16 and 32."""
 
-    def __init__(self, widths: Widths) -> None:
+    def __init__(self, residuals: tuple[int, int]) -> None:
         super().__init__()
-        first, second = widths.stem
-        one, two, three = widths.levels
-        depths = widths.depths
+        first, second = STEM
+        one, two, three = LEVELS
         self.stem = nn.Sequential(ConvUnit(3, first, 3, 2), ConvUnit(first, second, 3, 2))
-        self.stage8 = nn.Sequential(ConvUnit(second, one, 3, 2), CrossStage(one, one, depths[0]))
-        more16, more32 = widths.residuals
+        self.stage8 = nn.Sequential(ConvUnit(second, one, 3, 2), CrossStage(one, one, _DEPTH))
+        more16, more32 = residuals
         self.stage16 = nn.Sequential(
-            ConvUnit(one, two, 3, 2), CrossStage(two, two, depths[1]), *(Residual(two) for _ in range(more16))
+            ConvUnit(one, two, 3, 2), CrossStage(two, two, _DEPTH), *(Residual(two) for _ in range(more16))
         )
         self.stage32 = nn.Sequential(
             ConvUnit(two, three, 3, 2),
-            CrossStage(three, three, depths[2]),
+            CrossStage(three, three, _DEPTH),
             PooledContext(three),
             *(Residual(three) for _ in range(more32)),
         )
@@ -174,20 +190,19 @@ class Backbone(EarlyLayers):
 class Neck(nn.Module):
     """Levels exchange what they know: downwards from the coarse one, then upwards again."""
 
-    def __init__(self, widths: Widths) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        one, two, three = widths.levels
-        low, middle, high = widths.neck
-        depth = widths.neck_depth
+        one, two, three = LEVELS
+        low, middle, high = NECK
         self.enlarge = nn.Upsample(scale_factor=2, mode="nearest")
         self.narrow32 = ConvUnit(three, middle)
-        self.down16 = CrossStage(two + middle, middle, depth, shortcut=False)
+        self.down16 = CrossStage(two + middle, middle, 1, shortcut=False)
         self.narrow16 = ConvUnit(middle, low)
-        self.down8 = CrossStage(one + low, low, depth, shortcut=False)
+        self.down8 = CrossStage(one + low, low, 1, shortcut=False)
         self.halve8 = ConvUnit(low, low, 3, 2)
-        self.up16 = CrossStage(low + low, middle, depth, shortcut=False)
+        self.up16 = CrossStage(low + low, middle, 1, shortcut=False)
         self.halve16 = ConvUnit(middle, middle, 3, 2)
-        self.up32 = CrossStage(middle + middle, high, depth, shortcut=False)
+        self.up32 = CrossStage(middle + middle, high, 1, shortcut=False)
 
     def forward(self, levels: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Tensor, Tensor]:
         """Three levels to three levels of the neck's widths."""
@@ -203,12 +218,12 @@ class Neck(nn.Module):
 class Head(nn.Module):
     """Scores and box sides of one level."""
 
-    def __init__(self, inputs: int, widths: Widths, classes: int) -> None:
+    def __init__(self, inputs: int, classes: int) -> None:
         super().__init__()
-        self.for_scores = ConvUnit(inputs, widths.head_scores, 3)
-        self.for_boxes = ConvUnit(inputs, widths.head_boxes, 3)
-        self.scores = nn.Conv2d(widths.head_scores, classes, 1)
-        self.sides = nn.Conv2d(widths.head_boxes, 4, 1)
+        self.for_scores = ConvUnit(inputs, _HEAD_SCORES, 3)
+        self.for_boxes = ConvUnit(inputs, _HEAD_BOXES, 3)
+        self.scores = nn.Conv2d(_HEAD_SCORES, classes, 1)
+        self.sides = nn.Conv2d(_HEAD_BOXES, 4, 1)
         nn.init.constant_(self.scores.bias, -math.log((1.0 - FIRST_SCORE) / FIRST_SCORE))
         nn.init.constant_(self.sides.bias, 1.0)
 
@@ -217,16 +232,27 @@ class Head(nn.Module):
         return self.scores(self.for_scores(x)), self.sides(self.for_boxes(x))
 
 
-class DetectorNetwork(nn.Module):
+class DetectorNetwork(CascadeNetwork):
     """Pictures (N, 3, H, W) from 0 to 1, H and W multiples of 32, to logits and boxes of every cell."""
 
-    def __init__(self, classes: int, widths: Widths | None = None) -> None:
+    kind = PROPOSAL
+
+    def __init__(self, classes: int, residuals: tuple[int, int] = (0, 0)) -> None:
         super().__init__()
-        widths = widths or Widths()
         self.classes = classes
-        self.backbone = Backbone(widths)
-        self.neck = Neck(widths)
-        self.heads = nn.ModuleList(Head(width, widths, classes) for width in widths.neck)
+        self.backbone = Backbone(residuals)
+        self.neck = Neck()
+        self.heads = nn.ModuleList(Head(width, classes) for width in NECK)
+
+    @property
+    def early_layers(self) -> Backbone:
+        """What makes the features at stride 8."""
+        return self.backbone
+
+    @property
+    def score_biases(self) -> list[Tensor]:
+        """What is added last to the logits (K,) of each level."""
+        return [head.scores.bias for head in self.heads]
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, A, classes) and boxes (N, A, 4) as x0 y0 x1 y1 in pixels."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,64 +11,29 @@ import onnx
 import torch
 from torch import Tensor, nn
 
-from skills.perception.detector.cascade_files import load_classifier, load_model, load_refinement
-from skills.perception.detector.network_file import ModelFileError, Network
+from skills.perception.detector.network_file import ModelFileError, load_network
 from skills.perception.training.classifier_network import USED, ClassifierNetwork
-from skills.perception.training.crop_network import CropNetwork
 from skills.perception.training.export import normalised_layers
 from skills.perception.training.labels import TrainingDataError
-from skills.perception.training.network import Backbone, DetectorNetwork
+from skills.perception.training.network import Backbone, CascadeNetwork
 from skills.perception.training.onnx_files import offsets_in, trained_weights
-from skills.perception.training.refinement_network import RefinementNetwork
-
-__all__ = ["settle", "take_over", "take_over_classifier", "take_over_refinement"]
 
 _BEFORE = "network."
 _BYTES = 255.0
 _HINT = "begin anew without it"
 
 
-def take_over(network: DetectorNetwork, file: Path) -> None:
-    """Give the proposal network the weights of an ONNX file; it says the same then, but for the shift of the scores.
+@torch.no_grad()
+def take_over(network: CascadeNetwork, file: Path) -> None:
+    """Give a network the weights of an ONNX file; it says the same then, but for the shift of the scores.
 
-    Every normalisation passes on what it gets and adds the file's bias, until `settle`. Raises TrainingDataError.
+    Every normalisation passes on what it gets and adds the file's bias, until `settle`. A crop network's file may
+    belong to any network before it. Raises TrainingDataError.
     """
     try:
-        source = load_model(file, networks=1).proposal
+        source = load_network(file, network.kind)
     except ModelFileError as error:
         raise TrainingDataError(f"{file}: {error.message}", hint=_HINT) from error
-    _take(network, file, source, [head.scores.bias for head in network.heads])
-    _take_shares(network.backbone)
-
-
-def take_over_refinement(network: RefinementNetwork, file: Path) -> None:
-    """The same for the refinement network and its file, whichever proposal network that belongs to."""
-    _take_crop_network(network, file, load_refinement)
-    _take_shares(network.detector.backbone)
-
-
-def take_over_classifier(network: ClassifierNetwork, file: Path) -> None:
-    """The same for the classifier network and its file, whichever refinement network that belongs to."""
-    _take_crop_network(network, file, load_classifier)
-    network.add(1.0 / USED)
-
-
-def _take_crop_network(network: CropNetwork, file: Path, load: Callable[[Path], Network]) -> None:
-    try:
-        source = load(file)
-    except ModelFileError as error:
-        raise TrainingDataError(f"{file}: {error.message}", hint=_HINT) from error
-    _take(network, file, source, [network.scores.bias])
-
-
-@torch.no_grad()
-def _take_shares(backbone: Backbone) -> None:
-    """Take values from 0 to 1 again, instead of bytes."""
-    backbone.stem[0][0].weight.mul_(_BYTES)
-
-
-@torch.no_grad()
-def _take(network: nn.Module, file: Path, source: Network, score_biases: Sequence[Tensor]) -> None:
     kept, left = _content(file), dict(network.named_parameters())
     offsets = offsets_in(source.metadata, len(source.class_names))
     try:
@@ -79,10 +44,14 @@ def _take(network: nn.Module, file: Path, source: Network, score_biases: Sequenc
                 del left[f"{name}.{part}"]
         for name, weight in left.items():
             _fill(weight, kept[name])
-        for bias in score_biases:
+        for bias in network.score_biases:
             bias.sub_(torch.tensor(offsets))
     except (KeyError, ValueError) as error:
         raise TrainingDataError(f"{file}: holds another network ({error})", hint=_HINT) from error
+    if isinstance(network.early_layers, Backbone):  # it takes values from 0 to 1 again, instead of bytes
+        network.early_layers.stem[0][0].weight.mul_(_BYTES)
+    if isinstance(network, ClassifierNetwork):
+        network.add(1.0 / USED)
 
 
 def _content(file: Path) -> dict[str, Tensor]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-__all__ = ["overlap", "sizes"]
-
 _TINY = 1e-9
 _LEAST_SIDE = 1e-7
 

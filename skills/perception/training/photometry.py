@@ -8,8 +8,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["as_seen_otherwise"]
-
 Picture = NDArray[np.uint8]
 _GREY_SHARE: Final = 0.2
 _DARK: Final = 60.0

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from skills.perception.training.labels import LEAST_SEEN, Labels
 
-__all__ = ["Cell", "Targets", "joined", "placed", "turning"]
-
 Floats = NDArray[np.float32]
 LEAST_LONG_PX: Final = 10.0
 LEAST_SHORT_PX: Final = 4.0

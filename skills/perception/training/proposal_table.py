@@ -17,8 +17,6 @@ from skills.perception.detector.proposals import ProposalOptions, Proposals, pro
 from skills.perception.detector.scales import Scales
 from skills.perception.training.labels import Labels
 
-__all__ = ["NEAR", "ProposalTable", "proposals_in", "proposed", "refined_by", "refined_in", "table_of"]
-
 NEAR: Final = 0.3
 _WITHIN_IGNORED: Final = 0.6
 _LOOKED_AT: Final = ProposalOptions(least_score=0.01, most=20)

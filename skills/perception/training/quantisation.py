@@ -18,7 +18,6 @@ import io
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,26 +27,17 @@ from numpy.typing import NDArray
 from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, QuantFormat, QuantType, quantize_static
 from onnxruntime.quantization.shape_inference import quant_pre_process
 
-from skills.perception.detector.cascade_files import DetectorModel, classifier_file, load_model, refinement_file
+from skills.perception.detector.cascade_files import classifier_file, load_model, refinement_file
 from skills.perception.detector.crops import crops_about
 from skills.perception.detector.letterbox import letterbox
 from skills.perception.detector.network_file import ModelFileError, Network
 from skills.perception.detector.proposals import CLASSIFIED, ProposalOptions, Proposals, proposals_of
 from skills.perception.detector.scales import Scales, halved
 from skills.perception.training.labels import TrainingDataError
-from skills.perception.training.onnx_files import (
-    QUANTISED,
-    compact,
-    facts_of,
-    shorten_names,
-    with_float32_weights,
-    write_sealed,
-)
+from skills.perception.training.onnx_files import QUANTISED, facts_of, write_sealed
 from skills.perception.training.proposal_table import proposed, refined_by
 from skills.perception.training.store import read_picture
 from skills.perception.training.validate import examination
-
-__all__ = ["main", "quantised", "quantised_detector", "write_quantised"]
 
 _MEASURED_BY: Final = 160
 _CROPS_AT_ONCE: Final = 8
@@ -80,8 +70,16 @@ def quantised_detector(file: Path, data: Path, out: Path) -> Path:
     scales = [Scales(picture, halved(picture)) for picture in pictures]
     networks: tuple[tuple[Path, Network | None, Callable[[], Sequence[Given]]], ...] = (
         (file, model.proposal, lambda: [{"images": picture[None]} for picture in pictures]),
-        (refinement_file(file), model.refinement, lambda: _crops(partial(_places, model), scales)),
-        (classifier_file(file), model.classifier, lambda: _crops(partial(_seen_places, model), scales)),
+        (
+            refinement_file(file),
+            model.refinement,
+            lambda: _crops(lambda one: proposals_of(*proposed(model, one), ProposalOptions()), scales),
+        ),
+        (
+            classifier_file(file),
+            model.classifier,
+            lambda: _crops(lambda one: proposals_of(*refined_by(model, one), CLASSIFIED), scales),
+        ),
     )
     belongs: dict[str, str] = {}
     for name, (source, network, given) in zip(("first", "second", "third"), networks, strict=True):
@@ -98,8 +96,7 @@ def quantised_detector(file: Path, data: Path, out: Path) -> Path:
 
 def quantised(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelProto:
     """A network that is quantised, with ranges measured on what is `given` to it, always of as many rows."""
-    plain = onnx.ModelProto.FromString(model.SerializeToString())
-    with_float32_weights(plain.graph)
+    plain, count = onnx.ModelProto.FromString(model.SerializeToString()), len(given)
     for number, node in enumerate(plain.graph.node):
         node.name = f"n{number}"
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
@@ -108,7 +105,7 @@ def quantised(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelProto
         quantize_static(
             shaped,
             made,
-            _Given(given[: _whole_strides(len(given))]),
+            _Given(given if count < _AT_ONCE else given[: count - count % _AT_ONCE]),
             quant_format=QuantFormat.QDQ,
             op_types_to_quantize=list(_KINDS),
             per_channel=True,
@@ -116,15 +113,10 @@ def quantised(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelProto
             weight_type=QuantType.QInt8,
             nodes_to_quantize=_between_convolutions(plain.graph),
             calibrate_method=CalibrationMethod.Entropy,
-            extra_options={
-                "QuantizeBias": False,
-                "CalibStridedMinMax": min(_AT_ONCE, len(given)),
-            },
+            extra_options={"QuantizeBias": False, "CalibStridedMinMax": min(_AT_ONCE, count)},
         )
         found = onnx.load(made)
     del found.graph.value_info[:]
-    compact(found.graph)
-    shorten_names(found.graph)
     found.producer_name, found.producer_version = "errand", ""
     return found
 
@@ -149,11 +141,6 @@ class _Given(CalibrationDataReader):
         return None if following is None else dict(following)
 
 
-def _whole_strides(count: int) -> int:
-    """How many of so many make whole stretches."""
-    return count if count < _AT_ONCE else count - count % _AT_ONCE
-
-
 def _between_convolutions(graph: onnx.GraphProto) -> list[str]:
     """Names of the nodes that have a convolution both somewhere before them and somewhere after them.
 
@@ -162,20 +149,10 @@ def _between_convolutions(graph: onnx.GraphProto) -> list[str]:
     others.
     """
     convolutions = [node for node in graph.node if node.op_type == "Conv"]
+    separate = len(convolutions) > 2 and any(one.name == "group" and one.i > 1 for one in convolutions[1].attribute)
     before = _reached(graph, convolutions, upstream=True)
-    after = _reached(graph, convolutions[_last_opening(convolutions) :], upstream=False)
+    after = _reached(graph, convolutions[2 if separate else 0 :], upstream=False)
     return [node.name for node in graph.node if node.op_type in _KINDS and node.name in before & after]
-
-
-def _last_opening(convolutions: Sequence[onnx.NodeProto]) -> int:
-    """The number of the last convolution of the opening: the first, or the one that joins the channels again."""
-    separate = len(convolutions) > 2 and _groups(convolutions[1]) > 1
-    return 2 if separate else 0
-
-
-def _groups(convolution: onnx.NodeProto) -> int:
-    """In how many groups a convolution takes its channels."""
-    return next((int(one.i) for one in convolution.attribute if one.name == "group"), 1)
 
 
 def _reached(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto], *, upstream: bool) -> set[str]:
@@ -202,16 +179,6 @@ def _crops(look: Callable[[Scales], Proposals], pictures: Sequence[Scales]) -> l
         {name: values[first : first + size] for name, values in together.items()}
         for first in range(0, count - size + 1, size)
     ]
-
-
-def _places(model: DetectorModel, scales: Scales) -> Proposals:
-    """Where the refinement network looks."""
-    return proposals_of(*proposed(model, scales), ProposalOptions())
-
-
-def _seen_places(model: DetectorModel, scales: Scales) -> Proposals:
-    """Where the classifier network looks."""
-    return proposals_of(*refined_by(model, scales), CLASSIFIED)
 
 
 def write_quantised(

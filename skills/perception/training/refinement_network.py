@@ -11,14 +11,13 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from skills.perception.detector.cascade_files import REFINEMENT
 from skills.perception.detector.proposals import CROP_PX
 from skills.perception.training.crop_network import MOST_LOGIT, CropNetwork, covered, moved
-from skills.perception.training.network import Backbone, ConvUnit, DetectorNetwork, Widths
+from skills.perception.training.network import LEVELS, NECK, Backbone, ConvUnit, DetectorNetwork
 from skills.perception.training.overlaps import overlap
 
-__all__ = ["RefinementNetwork"]
-
-_WIDTHS = Widths(residuals=(3, 2))
+_RESIDUALS = (3, 2)
 _CELLS_32 = CROP_PX // 32
 _SQUEEZED, _JOINED = 32, 128
 _SIDES_SCALE = 0.1
@@ -27,11 +26,13 @@ _SIDES_SCALE = 0.1
 class RefinementNetwork(CropNetwork):
     """A crop network that begins with the proposal network's weights."""
 
-    def __init__(self, classes: int, widths: Widths = _WIDTHS) -> None:
+    kind = REFINEMENT
+
+    def __init__(self, classes: int) -> None:
         known = _SQUEEZED * _CELLS_32 * _CELLS_32 + 2 * (classes + 4)
-        super().__init__(classes, known, _JOINED, widths.levels[0])
-        self.detector = DetectorNetwork(classes, widths)
-        self.squeeze = ConvUnit(widths.neck[2], _SQUEEZED)
+        super().__init__(classes, known, _JOINED, LEVELS[0])
+        self.detector = DetectorNetwork(classes, _RESIDUALS)
+        self.squeeze = ConvUnit(NECK[2], _SQUEEZED)
         self.trust_first = nn.Parameter(torch.full((classes,), 0.5))
         self.trust_seen = nn.Parameter(torch.full((classes,), 0.5))
         self.nearer = nn.Parameter(torch.full((4,), 0.5))
@@ -40,10 +41,6 @@ class RefinementNetwork(CropNetwork):
     def early_layers(self) -> Backbone:
         """What makes the features at stride 8."""
         return self.detector.backbone
-
-    def take_bytes(self) -> None:
-        """Take crops of values from 0 to 255 from now on."""
-        self.detector.backbone.take_bytes()
 
     def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
         """Logits (N, K) and boxes (N, 4) of what the early layers make of crops."""

@@ -13,19 +13,6 @@ from numpy.typing import NDArray
 
 from skills.perception.training.canvases import CanvasOptions
 
-__all__ = [
-    "HIGHEST_RATE",
-    "REFINEMENT_RATE",
-    "REFINING_RATE",
-    "Budget",
-    "Phase",
-    "RefineOptions",
-    "Report",
-    "Schedule",
-    "TrainOptions",
-    "shuffled",
-]
-
 HIGHEST_RATE: Final = 3e-3
 REFINING_RATE: Final = 8e-4
 REFINEMENT_RATE: Final = 1e-3

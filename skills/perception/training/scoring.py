@@ -17,8 +17,6 @@ from skills.detection import Detection
 from skills.perception.training.matching import Evaluation, evaluated
 from skills.perception.training.scoring_labels import Label, LabelledPicture, long_side_px
 
-__all__ = ["SURE_SCORE", "Bin", "ClassScore", "Judged", "Score", "by_camera", "judged", "picture_errors", "score"]
-
 SURE_SCORE: Final = 0.5
 HAND: Final = "hand"
 BODY: Final = "body"

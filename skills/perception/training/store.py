@@ -16,8 +16,6 @@ from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX, fill_lette
 from skills.perception.detector.scales import Scales, halved
 from skills.perception.training.labels import TrainingDataError, TrainingPicture
 
-__all__ = ["PictureStore", "open_store", "read_picture", "read_scales"]
-
 Picture = NDArray[np.uint8]
 _FULL: Final = "full.u8"
 _HALF: Final = "half.u8"

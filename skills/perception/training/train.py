@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import torch
 
@@ -12,19 +12,16 @@ from skills.perception.training.batches import Feed
 from skills.perception.training.canvases import CanvasMaker
 from skills.perception.training.export import export
 from skills.perception.training.labels import category_names, digest_of, read_split
-from skills.perception.training.learner import ONNX, ProposalLearner
+from skills.perception.training.learner import Learner, ProposalLearner
 from skills.perception.training.loop import CHECKPOINT, Loop, Stepped, figures_of
 from skills.perception.training.onnx_files import offsets_fact
-from skills.perception.training.onnx_weights import settle
 from skills.perception.training.schedule import Report, TrainOptions
 from skills.perception.training.store import open_store
-from skills.perception.training.validate import CALIBRATED_BY, examination, examine, offsets_by
-
-__all__ = ["MODEL", "PICTURES", "Report", "TrainOptions", "train"]
+from skills.perception.training.validate import CALIBRATED_BY, Examination, examination, examine, offsets_by
 
 MODEL: Final = "errand_detector.onnx"
 PICTURES: Final = "pictures"
-_SETTLED_BY: Final = 24
+SETTLED_BY: Final = 24
 
 
 def train(options: TrainOptions, report: Callable[[Report], None]) -> Path:
@@ -32,44 +29,52 @@ def train(options: TrainOptions, report: Callable[[Report], None]) -> Path:
     options.out.mkdir(parents=True, exist_ok=True)
     pictures, names = read_split(options.data, "train"), category_names(options.data)
     exam = examination(options.data, "val", names, options.examined)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    learner = ProposalLearner.new(len(names), options.seed, device)
-    resumed = options.resume and (options.out / CHECKPOINT).is_file()
-    if resumed:
+    learner = ProposalLearner.new(len(names), options.seed, device())
+    feed = Feed(CanvasMaker(pictures, open_store(options.out / PICTURES, pictures)), options.seed)
+    begun = options.schedule.phase(0.0)
+    if options.resume and (options.out / CHECKPOINT).is_file():
         learner.restore(options.out / CHECKPOINT)
     elif options.start is not None:
-        learner.start_from(options.start)
-    feed = Feed(CanvasMaker(pictures, open_store(options.out / PICTURES, pictures)), options.seed)
-    if not resumed and options.start is not None and options.start.suffix == ONNX:
-        _settle(learner, options, feed)
+        learner.start_from(options.start, (feed.batch(k * begun.batch, begun) for k in range(SETTLED_BY)))
 
     def step(done: float) -> Stepped:
         progress, phase = learner.progress, options.schedule.phase(done)
         rate = options.schedule.rate(progress.steps, done)
         return Stepped(phase.batch, learner.step(feed.batch(progress.taken, phase), rate), rate)
 
+    return run_loop(learner, step, options, exam, options.out / MODEL, report)
+
+
+def device() -> torch.device:
+    """What to train on."""
+    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def run_loop(
+    learner: Learner[Any],
+    step: Callable[[float], Stepped],
+    options: TrainOptions,
+    exam: Examination,
+    file: Path,
+    report: Callable[[Report], None],
+    *,
+    belongs: Mapping[str, str] | None = None,
+    networks: int = 1,
+) -> Path:
+    """Train until the time is over; return the ONNX `file` of the averaged network, the last of so many `networks`.
+
+    `belongs` tells of the network before it. At the end scores are calibrated by pictures of the training split.
+    """
+    first, names = options.out / MODEL, exam.class_names
+    facts = {"seed": str(options.seed), "data": digest_of(options.data), **(belongs or {})}
+
     def written(last: bool) -> dict[str, float]:
-        export_model(learner, options, calibrated=last)
-        return figures_of(examine(options.out / MODEL, exam, networks=1))
+        export(learner.average, file, class_names=names, facts=facts)
+        if last:
+            offsets = offsets_by(first, examination(options.data, "train", names, CALIBRATED_BY), networks=networks)
+            calibrated = {**facts, **offsets_fact(offsets)}
+            export(learner.average, file, class_names=names, facts=calibrated, score_offsets=offsets)
+        return figures_of(examine(first, exam, networks=networks))
 
     Loop(learner, step, written, options.budget, options.out, report).run()
-    return options.out / MODEL
-
-
-def _settle(learner: ProposalLearner, options: TrainOptions, feed: Feed) -> None:
-    """Find statistics for the weights of an ONNX file."""
-    phase = options.schedule.phase(0.0)
-    batches = (feed.batch(k * phase.batch, phase).pictures.to(learner.device) for k in range(_SETTLED_BY))
-    settle(learner.network, ((pictures,) for pictures in batches))
-    learner.begin_average()
-
-
-def export_model(learner: ProposalLearner, options: TrainOptions, *, calibrated: bool) -> None:
-    """Write the averaged network's ONNX file; calibrated by pictures of the training split."""
-    file, names = options.out / MODEL, category_names(options.data)
-    facts = {"seed": str(options.seed), "data": digest_of(options.data)}
-    export(learner.average, file, class_names=names, facts=facts)
-    if calibrated:
-        offsets = offsets_by(file, examination(options.data, "train", names, CALIBRATED_BY), networks=1)
-        facts |= offsets_fact(offsets)
-        export(learner.average, file, class_names=names, facts=facts, score_offsets=offsets)
+    return file

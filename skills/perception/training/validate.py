@@ -17,8 +17,6 @@ from skills.perception.training.scoring import Score, score
 from skills.perception.training.scoring_labels import LabelledPicture, pictures_of_coco
 from skills.perception.training.store import read_picture
 
-__all__ = ["CALIBRATED_BY", "Examination", "examination", "examine", "offsets_by"]
-
 LEAST_SCORE = 0.02
 CALIBRATED_BY: Final = 3600
 """By how many pictures the shifts of scores are found."""
@@ -40,11 +38,10 @@ def examination(folder: Path, split: str, class_names: Sequence[str], most: int 
     """
     file = folder / f"{split}.json"
     try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-        crowded = {str(image["file_name"]) for image in document["images"] if image.get("crowded")}
-        pictures = [one for one in pictures_of_coco(document, class_names) if one.file not in crowded]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        found = pictures_of_coco(json.loads(file.read_text(encoding="utf-8")), class_names)
+    except (OSError, ValueError) as error:
         raise TrainingDataError(f"{file}: cannot be used ({error})", hint="render the data set anew") from error
+    pictures = [one for one in found if not one.crowded]
     step = 1 if most is None else max(1, len(pictures) // most)
     return Examination(folder, pictures[::step], class_names)
 

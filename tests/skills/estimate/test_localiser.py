@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
+from skills.api import LocalisationEstimate
 from skills.geometry import compose, inverse
 from skills.robot import Pose2D
 
@@ -21,6 +22,12 @@ def drive_along_the_corridor(bench: Bench, way_m: float = 9.0) -> list[tuple[flo
         if bench.clock.now() > 1.0:
             errors.append(bench.pose_error())
     return errors
+
+
+def searched(bench: Bench, radius_m: float | None) -> LocalisationEstimate | None:
+    scan = bench.robot.scan()
+    assert scan is not None
+    return bench.localiser.search(scan, bench.localiser.estimate(), radius_m)
 
 
 def odometry_error_m(bench: Bench, start: Pose2D) -> float:
@@ -94,15 +101,17 @@ def test_lost_when_carried_off_and_found_again_nearby():
     assert bench.pose_error()[0] < 0.03
 
 
-def test_relocalise_finds_the_robot_anywhere_on_the_map():
+def test_a_search_finds_the_robot_anywhere_on_the_map():
     bench = Bench(START)
     bench.tick()
     bench.robot.carry_off(Pose2D(8.0, 2.3, 2.0))
-    assert bench.localiser.relocalise(bench.robot)
+    found = searched(bench, None)
+    assert found is not None
+    bench.localiser.accept(found)
     assert bench.pose_error()[0] < 0.04
 
 
-def test_relocalise_says_no_where_nothing_fits():
+def test_a_search_finds_nothing_where_nothing_fits():
     rng = np.random.default_rng(5)
     pillars = [
         Box(x, y, x + 0.15, y + 0.15) for x, y in rng.uniform(20.0, 26.0, (60, 2)) if math.hypot(x - 23, y - 23) > 1
@@ -110,7 +119,7 @@ def test_relocalise_says_no_where_nothing_fits():
     bench = Bench(Pose2D(23.0, 23.0, 0.3), surveyed=TWO_ROOMS, unmapped=pillars, believed_start=START)
     bench.tick()
     bench.tick()
-    assert not bench.localiser.relocalise(bench.robot, radius_m=1.5)
+    assert searched(bench, 1.5) is None
 
 
 def test_equal_seeds_give_equal_estimates():

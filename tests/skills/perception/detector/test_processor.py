@@ -7,7 +7,7 @@ import pytest
 from onnxruntime import InferenceSession, SessionOptions
 
 from skills.perception.detector.cascade_files import MODEL_FILE, load_model
-from skills.perception.detector.processor import adds_byte_products_exactly
+from skills.perception.detector.network_file import adds_byte_products_exactly
 
 
 @pytest.mark.parametrize(

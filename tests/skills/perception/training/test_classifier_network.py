@@ -10,14 +10,15 @@ from tiny_detector import CLASSES, picture_of, write_pair
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
-from skills.perception.detector.cascade_files import CLASSIFIER_FORMAT, load_classifier, load_model  # noqa: E402
+from skills.perception.detector.cascade_files import CLASSIFIER, load_model  # noqa: E402
+from skills.perception.detector.network_file import load_network  # noqa: E402
 from skills.perception.detector.proposals import CROP_PX  # noqa: E402
 from skills.perception.detector.scales import Scales, halved  # noqa: E402
 from skills.perception.training.classifier_network import USED, ClassifierNetwork  # noqa: E402
 from skills.perception.training.crop_batches import CropBatch  # noqa: E402
-from skills.perception.training.crop_learner import CropLearner  # noqa: E402
-from skills.perception.training.export import export_crops, fused  # noqa: E402
+from skills.perception.training.export import export, fused  # noqa: E402
 from skills.perception.training.labels import TrainingDataError  # noqa: E402
+from skills.perception.training.learner import CropLearner  # noqa: E402
 from skills.perception.training.proposal_table import refined_in  # noqa: E402
 from skills.perception.training.quantisation import quantised  # noqa: E402
 
@@ -93,10 +94,9 @@ def test_crops_are_learnt_by_heart() -> None:
 def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_it(tmp_path: Path) -> None:
     network, file, (crops, boxes, logits) = trained(), tmp_path / "t.onnx", given(3)
     shift = (0.5, 0.0, -0.5)
-    export_crops(
+    export(
         network,
         file,
-        form=CLASSIFIER_FORMAT,
         class_names=NAMES,
         facts={"score_offsets": str(list(shift))},
         score_offsets=shift,
@@ -107,7 +107,7 @@ def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_
         "regions": boxes.numpy(),
         "logits": logits.numpy(),
     }
-    found, scores = load_classifier(file).session.run(["boxes", "scores"], told)
+    found, scores = load_network(file, CLASSIFIER).session.run(["boxes", "scores"], told)
     in_use = fused(network)
     in_use.stop_learning()
     with torch.no_grad():
@@ -136,7 +136,7 @@ def test_in_use_it_adds_a_part_of_what_it_adds_while_learning() -> None:
 
 def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_path: Path) -> None:
     file = tmp_path / "t.onnx"
-    export_crops(trained(), file, form=CLASSIFIER_FORMAT, class_names=NAMES, facts={})
+    export(trained(), file, class_names=NAMES, facts={})
     model = onnx.load(file)
     assert "Pad" not in {node.op_type for node in model.graph.node}
     crops, boxes, logits = given(8)

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from skills.perception.training.coco import CocoLabel
 from skills.perception.training.labels import TrainingDataError, category_names, outline_of, read_split
 
 CATEGORIES = [{"id": 2, "name": "coke"}, {"id": 1, "name": "beer"}]
@@ -14,6 +15,10 @@ def run_lengths(mask: np.ndarray) -> dict[str, object]:
     edges = np.concatenate([[0], np.flatnonzero(np.diff(flat.astype(int))) + 1, [flat.size]])
     counts = np.diff(edges).tolist()
     return {"size": list(mask.shape), "counts": [0, *counts] if flat[0] else counts}
+
+
+def label(bbox: list[float], segmentation: object) -> CocoLabel:
+    return CocoLabel(image_id=1, category_id=1, bbox=bbox, segmentation=segmentation)
 
 
 def disc(height: int, width: int) -> np.ndarray:
@@ -50,7 +55,7 @@ def test_what_is_seen_is_the_share_not_hidden_and_within_the_picture(tmp_path: P
 
 def test_the_outline_of_a_mask_is_its_hull() -> None:
     mask = disc(48, 64)
-    outline = outline_of({"bbox": [0, 0, 1, 1], "segmentation": run_lengths(mask)})
+    outline = outline_of(label([0, 0, 1, 1], run_lengths(mask)))
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     assert outline.min(axis=0).tolist() == [columns[0], rows[0]]
     assert outline.max(axis=0).tolist() == [columns[-1] + 1, rows[-1] + 1]
@@ -60,13 +65,13 @@ def test_the_outline_of_a_mask_is_its_hull() -> None:
 def test_a_run_over_the_end_of_a_column_fills_both() -> None:
     mask = np.zeros((10, 12), dtype=bool)
     mask[6:, 3] = mask[:4, 4] = True
-    outline = outline_of({"bbox": [0, 0, 1, 1], "segmentation": run_lengths(mask)})
+    outline = outline_of(label([0, 0, 1, 1], run_lengths(mask)))
     assert outline.min(axis=0).tolist() == [3, 0]
     assert outline.max(axis=0).tolist() == [5, 10]
 
 
 def test_without_a_mask_the_box_is_the_outline() -> None:
-    outline = outline_of({"bbox": [1, 2, 3, 4], "segmentation": [[1, 2, 3, 4, 5, 6]]})
+    outline = outline_of(label([1, 2, 3, 4], [[1, 2, 3, 4, 5, 6]]))
     assert sorted(map(tuple, outline.tolist())) == [(1, 2), (1, 6), (4, 2), (4, 6)]
 
 
@@ -78,6 +83,6 @@ def test_a_folder_without_labels_is_named_with_the_mend(tmp_path: Path, content:
         read_split(tmp_path, "train")
 
 
-def test_a_damaged_label_is_named_by_its_picture(tmp_path: Path) -> None:
-    with pytest.raises(TrainingDataError, match=r"000000/0\.jpg"):
+def test_a_damaged_label_is_named_by_its_place(tmp_path: Path) -> None:
+    with pytest.raises(TrainingDataError, match=r"train\.json.*annotations\[0\]\.bbox"):
         read_split(write(tmp_path, bbox=[1, 2]), "train")

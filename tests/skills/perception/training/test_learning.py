@@ -9,13 +9,13 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
 from skills.perception.detector.cascade_files import load_model  # noqa: E402
-from skills.perception.training.assign import AssignOptions, assign  # noqa: E402
+from skills.perception.training.assign import assign  # noqa: E402
 from skills.perception.training.batches import batch_of, truth_of  # noqa: E402
 from skills.perception.training.canvases import Canvas  # noqa: E402
 from skills.perception.training.export import export, fused  # noqa: E402
 from skills.perception.training.labels import TrainingDataError  # noqa: E402
 from skills.perception.training.learner import Learner, ProposalLearner  # noqa: E402
-from skills.perception.training.losses import Losses, LossOptions, complete_overlap, losses  # noqa: E402
+from skills.perception.training.losses import Losses, complete_overlap, losses  # noqa: E402
 from skills.perception.training.network import DetectorNetwork, cells  # noqa: E402
 from skills.perception.training.overlaps import overlap  # noqa: E402
 from skills.perception.training.placing import Targets  # noqa: E402
@@ -41,17 +41,7 @@ def targets(*boxes: tuple[float, ...], classes: tuple[int, ...] = (), ignored: b
 
 
 def assigned(scores, boxes, middles, one: Targets):
-    truth = truth_of([one])
-    return assign(
-        scores,
-        boxes,
-        middles,
-        truth=truth.boxes,
-        classes=truth.classes,
-        ignored=truth.ignored,
-        present=truth.present,
-        options=AssignOptions(most_cells=4),
-    )
+    return assign(scores, boxes, middles, truth_of([one]), most_cells=4)
 
 
 def at_every_cell(side: float):
@@ -106,9 +96,9 @@ def test_cells_in_what_is_ignored_are_left_out_of_the_loss() -> None:
     found = assigned(logits.sigmoid(), boxes, middles, targets((0, 0, 64, 64), ignored=True))
     assert found.left_out.all()
     assert (found.objects < 0).all()
-    lost = losses(logits, boxes, middles, truth_of([targets((0, 0, 64, 64), ignored=True)]), LossOptions())
+    lost = losses(logits, boxes, middles, truth_of([targets((0, 0, 64, 64), ignored=True)]))
     assert float(lost.total) == 0.0
-    assert float(losses(logits, boxes, middles, truth_of([targets()]), LossOptions()).total) > 1.0
+    assert float(losses(logits, boxes, middles, truth_of([targets()])).total) > 1.0
 
 
 # first, second -> overlap less penalties

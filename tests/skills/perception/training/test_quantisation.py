@@ -122,8 +122,7 @@ def test_it_says_nearly_what_the_one_with_floats_said(plain: "onnx.ModelProto", 
 def test_the_convolutions_at_both_ends_stay_as_they_are(made: "onnx.ModelProto") -> None:
     nodes = {output: node.op_type for node in made.graph.node for output in node.output}
     given = [nodes.get(node.input[1]) for node in made.graph.node if node.op_type == "Conv"]
-    # the first, whose weights are many: made whole from 16 bits; the second; the last, whose weights are few
-    assert given == ["Cast", "DequantizeLinear", None]
+    assert given == [None, "DequantizeLinear", None]
 
 
 def test_a_separable_convolution_right_after_the_first_stays_as_it_is_too() -> None:
@@ -145,7 +144,7 @@ def test_weights_are_told_as_they_were_but_for_half_a_step_of_8_bits(
 def test_weights_between_convolutions_have_8_bits(made: "onnx.ModelProto") -> None:
     kinds = {one.name: one.data_type for one in made.graph.initializer}
     assert kinds["network.second.weight_quantized"] == TensorProto.INT8
-    assert kinds["network.first.weight.short"] == TensorProto.FLOAT16
+    assert kinds["network.first.weight"] == TensorProto.FLOAT
 
 
 def test_the_others_come_too_and_belong_together(tmp_path: Path, data: Path, plain: "onnx.ModelProto") -> None:

@@ -5,6 +5,7 @@ import pytest
 from skills.perception.training.scoring_labels import Label, pictures_of_coco
 
 CLASSES = ("hammer", "person")
+BOX = [1, 2, 3, 4]
 
 
 def coco(**changes):
@@ -65,35 +66,30 @@ def test_what_lies_beyond_the_edge_is_not_seen(told, share):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "place"),
     [
-        ({"images": None}, "no list 'images'"),
-        ({"annotations": [1]}, "no list 'annotations'"),
-        ({"categories": [{"id": 1, "name": "cat"}]}, "none of cat is a class that is known"),
-        ({"categories": []}, "none of them is a class"),
-        ({"images": [{"file_name": "a.jpg"}]}, r"images\[0\]: it has no 'id'"),
-        ({"images": [{"id": [7], "file_name": "a.jpg"}]}, r"images\[0\]: 'id' is a number, not \[7\]"),
-        (
-            {"annotations": [{"image_id": None, "category_id": 90}]},
-            r"annotations\[0\]: 'image_id' is a number, not None",
-        ),
-        (
-            {"images": [{"id": 7, "file_name": "a.jpg", "roll_deg": "over"}], "annotations": []},
-            r"images\[0\]: 'roll_deg' is a number of degrees, not 'over'",
-        ),
-        ({"images": [{"id": 7}], "annotations": []}, r"images\[0\]: it has no 'file_name'"),
-        ({"annotations": [{"image_id": 8, "category_id": 90}]}, r"annotations\[0\]: it names image 8"),
-        ({"annotations": [{"image_id": 7, "category_id": 90}]}, r"annotations\[0\]: it has no 'bbox'"),
-        ({"annotations": [{"image_id": 7, "category_id": 90, "bbox": [1, 2]}]}, r"annotations\[0\]: bbox is four"),
-        ({"annotations": [{"image_id": 7, "category_id": 90, "bbox": "abcd"}]}, r"annotations\[0\]: bbox is four"),
+        ({"images": None}, "images"),
+        ({"annotations": [1]}, r"annotations\[0\]"),
+        ({"categories": [{"id": 1, "name": "cat"}]}, "categories: none of 'cat'"),
+        ({"categories": []}, "categories: none"),
+        ({"images": [{"file_name": "a.jpg"}]}, r"images\[0\]\.id"),
+        ({"images": [{"id": [7], "file_name": "a.jpg"}]}, r"images\[0\]\.id"),
+        ({"annotations": [{"image_id": None, "category_id": 90}]}, r"annotations\[0\]\.image_id"),
+        ({"images": [{"id": 7, "file_name": "a.jpg", "roll_deg": "over"}]}, r"images\[0\]\.roll_deg"),
+        ({"images": [{"id": 7}], "annotations": []}, r"images\[0\]\.file_name"),
+        ({"annotations": [{"image_id": 8, "category_id": 90, "bbox": BOX}]}, r"annotations\[0\]\.image_id"),
+        ({"annotations": [{"image_id": 7, "category_id": 5, "bbox": BOX}]}, r"annotations\[0\]\.category_id"),
+        ({"annotations": [{"image_id": 7, "category_id": 90}]}, r"annotations\[0\]\.bbox"),
+        ({"annotations": [{"image_id": 7, "category_id": 90, "bbox": [1, 2]}]}, r"annotations\[0\]\.bbox"),
+        ({"annotations": [{"image_id": 7, "category_id": 90, "bbox": "abcd"}]}, r"annotations\[0\]\.bbox"),
     ],
 )
-def test_what_is_no_coco_file_is_refused_with_the_place(changes, told):
-    with pytest.raises(ValueError, match=told):
+def test_what_is_no_coco_file_is_refused_with_the_place(changes, place):
+    with pytest.raises(ValueError, match=f"^{place}"):
         pictures_of_coco(coco(**changes), CLASSES)
 
 
 @pytest.mark.parametrize("document", [[], "coco", None, 3])
 def test_what_is_no_object_is_refused(document):
-    with pytest.raises(ValueError, match="no list"):
+    with pytest.raises(ValueError, match="the file"):
         pictures_of_coco(document, CLASSES)

@@ -1,0 +1,89 @@
+"""COCO files: pictures, their labels, and the categories, with what the project's own data sets tell beyond COCO."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+
+class CocoImage(_Entry):
+    """A picture; `crowded` ones are of scenes with more objects than usual."""
+
+    id: int | str
+    file_name: str
+    width: int | None = None
+    height: int | None = None
+    roll_deg: float = 0.0
+    camera: str | None = None
+    crowded: bool = False
+
+    @property
+    def size_px(self) -> tuple[int, int] | None:
+        """Width and height, where the file tells."""
+        return None if self.width is None or self.height is None else (self.width, self.height)
+
+
+class CocoLabel(_Entry):
+    """An object in a picture, its box (x, y, width, height) in pixels, and its mask.
+
+    `visibility` is the share of what is in the picture before which nothing stands, `truncation` the share of the
+    object that is beyond the picture's edge.
+    """
+
+    image_id: int | str
+    category_id: int | str
+    bbox: tuple[float, float, float, float]
+    segmentation: Any = None
+    iscrowd: bool = False
+    ignore: bool = False
+    visibility: float | None = None
+    truncation: float | None = None
+    distance_m: float | None = None
+
+    @property
+    def seen(self) -> float | None:
+        """The share of the whole object that is seen, where the file tells."""
+        if self.visibility is None and self.truncation is None:
+            return None
+        return (1.0 if self.visibility is None else self.visibility) * (1.0 - (self.truncation or 0.0))
+
+
+class CocoCategory(_Entry):
+    """A class."""
+
+    id: int | str
+    name: str
+
+
+class CocoFile(_Entry):
+    """All of a file. Every label is of one of its pictures."""
+
+    images: tuple[CocoImage, ...]
+    annotations: tuple[CocoLabel, ...]
+    categories: tuple[CocoCategory, ...]
+
+    def by_picture(self) -> list[tuple[CocoImage, list[CocoLabel]]]:
+        """Each picture with its labels. Raises ValueError for a label of none of them."""
+        labels: dict[int | str, list[CocoLabel]] = {image.id: [] for image in self.images}
+        for k, label in enumerate(self.annotations):
+            if label.image_id not in labels:
+                raise ValueError(f"annotations[{k}].image_id: there is no image {label.image_id!r}")
+            labels[label.image_id].append(label)
+        return [(image, labels[image.id]) for image in self.images]
+
+
+def coco_file(document: object) -> CocoFile:
+    """The COCO file of a JSON value. Raises ValueError that names the first entry that is wrong."""
+    try:
+        return CocoFile.model_validate(document)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"])
+        raise ValueError(
+            f"{place.removeprefix('.') or 'the file'}: {first['msg']}, not {first['input']!r:.60}"
+        ) from error

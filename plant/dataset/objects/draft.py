@@ -86,7 +86,7 @@ class Draft:
         points = np.concatenate([p for _, p, _, _ in part.groups()])
         low, high = points.min(axis=0), points.max(axis=0)
         size, middle = np.maximum(high - low, 1e-3), (low + high) / 2
-        if _is_round(points - middle, size):
+        if size[2] > 2 * SHORTEST_M and _is_round(points - middle, size):
             self._collisions += _cylinders(points, middle, low[2], high[2])
             return
         small = min(0.004, float(size.min()) / 4)

@@ -12,17 +12,21 @@ from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 from executive.language.reference import ResolvedAction
 from executive.language.roles import HERE, Location
+from executive.mission.errors import listing
 from executive.mission.knowledge import Knowledge
 
 __all__ = ["check_feasible", "not_understood"]
 
 
 def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | None) -> None:
-    """Refuse to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
+    """Refuse odd numbers, to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
 
     Raises:
         RefusalError: any action is out of reach; it names all that is.
     """
+    odd = [number for d in actions if d.target is not None and (number := d.target.odd_number)]
+    if odd:
+        raise RefusalError(f"{listing(map(repr, odd))} is no number of things; say how many in one whole number", odd)
     shared = [
         d.goal.phrase.spoken for d in actions if d.goal is not None and d.goal.phrase is not None and _serves_all(d)
     ]

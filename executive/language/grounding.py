@@ -113,10 +113,13 @@ class _Grounder:
         """
         if location.phrase is None:
             raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
+        if location.phrase.said_count not in (None, 1):
+            raise RefusalError(f"I go to one place at a time, not to {location.phrase.spoken!r}", [location.phrase.spoken])
         known = _spellings(self.knowledge, self.knowledge.place_names())
         room = self._room(location)
-        candidates = self._places(location.phrase, room, known)
-        inside = [name for name in candidates if room in (None, name, self.knowledge.room(name))]
+        candidates = self._any_place(location.phrase) or self._places(location.phrase, room, known)
+        fitting = (name for name in candidates if room in (None, name, self.knowledge.room(name)))
+        inside = [name for name in fitting if not self._left_over(location.phrase, name)]
         if not inside:
             raise self._unknown(Slot.PLACE, (location.phrase.text, location.phrase.singular), known)
         return self._only(inside, Slot.PLACE, Phrase(location.phrase.tokens).text)
@@ -148,6 +151,19 @@ class _Grounder:
         other = [name for spelling, name in known.items() if _last(spelling) in nouns]
         called = [name for spelling, name in known.items() if any(_last(word) in nouns for word in words_for(spelling))]
         return list(dict.fromkeys([*own, *other, *called] if room is not None else own or other))
+
+    def _any_place(self, phrase: Phrase) -> Sequence[str]:
+        """What a word for any place may mean ("the room", "a surface"); nothing for the name of a certain one."""
+        group = {"room": self.knowledge.places, "surface": self.knowledge.surfaces}.get(phrase.head.lemma, {})
+        return () if len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None else tuple(group)
+
+    def _left_over(self, phrase: Phrase, name: str) -> bool:
+        """Whether something was said of a place that neither its names nor its room's account for ("kitchen 3")."""
+        extra = () if phrase.extra[:1] == ("of",) else phrase.extra
+        said = {word.lower() for word in (*(t.text for t in phrase.content[:-1]), *extra)}
+        spellings = self.knowledge.spellings([name, self.knowledge.room(name)])
+        known = (other for spelling in spellings for other in (spelling, *words_for(spelling)))
+        return not said <= {word.lower() for other in known for word in other.split()}
 
     def _person(self, phrase: Phrase) -> str | None:
         """The known person; None when the words mean nobody."""

@@ -93,6 +93,8 @@ class Lexicon:
     titles: frozenset[str]
     units: frozenset[str]
     vague_numbers: frozenset[str]
+    no_numbers: frozenset[str]
+    loose_numbers: frozenset[str]
     definite: frozenset[str]
     numbers: Mapping[str, int]
 

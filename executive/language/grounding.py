@@ -20,7 +20,7 @@ from executive.mission.command import Command, Task, Thing
 from executive.mission.errors import listing
 from executive.mission.knowledge import Knowledge
 
-__all__ = ["Grounded", "ground", "ground_noted", "known_line"]
+__all__ = ["Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,19 @@ def ground_noted(frames: Sequence[CommandFrame], knowledge: Knowledge, facts: Wo
     grounder = _Grounder(knowledge, facts)
     commands = tuple(grounder.command(frame) for frame in frames)
     return Grounded(commands, tuple(dict.fromkeys(grounder.notes)))
+
+
+def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> None:
+    """Refuse to leave out one kind among several that a command takes: "a drink, but not a beer".
+
+    Raises RefusalError.
+    """
+    for phrase in unwanted:
+        names = filter(None, (knowledge.thing(form) for _, form in _readings(phrase)))
+        kinds = {kind for name in names for kind in knowledge.classes(name)}
+        things = (thing for command in commands for thing in (command.object, command.item) if thing is not None)
+        if any(not thing.attributes and kinds & {*knowledge.classes(thing.name)} for thing in things):
+            raise RefusalError(f"I cannot keep to 'not {phrase.spoken}'; name what I am to take", [phrase.spoken])
 
 
 @dataclass
@@ -160,7 +173,7 @@ class _Grounder:
     def _left_over(self, phrase: Phrase, name: str) -> bool:
         """Whether something was said of a place that neither its names nor its room's account for ("kitchen 3")."""
         extra = () if phrase.extra[:1] == ("of",) else phrase.extra
-        said = {word.lower() for word in (*(t.text for t in phrase.content[:-1]), *extra)}
+        said = {word for part in (*(t.word for t in phrase.content[:-1]), *extra) for word in part.lower().split()}
         spellings = self.knowledge.spellings([name, self.knowledge.room(name)])
         known = (other for spelling in spellings for other in (spelling, *words_for(spelling)))
         return not said <= {word.lower() for other in known for word in other.split()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -43,6 +44,8 @@ _SIDES: Final = frozenset({"left", "right"})
 _SHOWN: Final = frozenset({"that", "this", "those", "these"})
 _WHO: Final = frozenset({"who", "that", "which"})
 _IS: Final = frozenset({"is", "'s", "are", "'re"})
+_OF_ALL: Final = re.compile(r"all|none|(?:any|every|no)(?:where|one|body|thing)")
+"""Behind these "but" means "except"."""
 
 
 class _Reader(Row):
@@ -278,6 +281,8 @@ class _Reader(Row):
         if token.word in ("if", "whether"):
             self.at += 1
             return Whether()
+        if token.word == "but" and self.at > 0 and _OF_ALL.fullmatch(self.tokens[self.at - 1].word):
+            return None
         filler = self._particle(items) or self.match(self.words.fillers)
         if filler is None:
             return None

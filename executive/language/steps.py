@@ -9,9 +9,9 @@ from typing import Final
 from executive.language.actions import Action, read_actions
 from executive.language.clauses import Clause, split_clauses, without_name
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
-from executive.language.disfluency import repair_disfluencies
+from executive.language.disfluency import repair_disfluencies, unwanted_things
 from executive.language.feasibility import check_feasible, not_understood
-from executive.language.grounding import ground_noted, known_line
+from executive.language.grounding import check_unwanted, ground_noted, known_line
 from executive.language.items import Item
 from executive.language.lexicon import lexicon
 from executive.language.names import name_table, parse_with_names
@@ -35,7 +35,7 @@ __all__ = ["Trace", "trace_sentence"]
 class Trace:
     """What each step made of a sentence, in the order of the fields; steps behind a refusal are empty.
 
-    `meanings` are pronouns with what each stood for, `notes` say which name was taken for which. `refused_at` names
+    `unwanted` is what stands behind "not", `meanings` are pronouns with what each stood for, `notes` say which name was taken for which. `refused_at` names
     the step that refused. `memory` is what was spoken of before, and afterwards what was spoken of last.
     """
 
@@ -43,6 +43,7 @@ class Trace:
     opened: str = ""
     tokens: tuple[Token, ...] = ()
     items: tuple[Item, ...] = ()
+    unwanted: tuple[Phrase, ...] = ()
     clauses: tuple[Clause, ...] = ()
     actions: tuple[Action, ...] = ()
     resolved: tuple[ResolvedAction, ...] = ()
@@ -92,7 +93,8 @@ def _parse(trace: Trace, context: _Context) -> Trace:
 
 
 def _read(trace: Trace, _: _Context) -> Trace:
-    return replace(trace, items=repair_disfluencies(split_items(trace.tokens, noun_phrases(trace.tokens), lexicon())))
+    items = split_items(trace.tokens, noun_phrases(trace.tokens), lexicon())
+    return replace(trace, items=repair_disfluencies(items), unwanted=unwanted_things(items))
 
 
 def _split(trace: Trace, context: _Context) -> Trace:
@@ -159,6 +161,7 @@ def _command(trace: Trace, context: _Context) -> Trace:
         return replace(trace, commands=tuple(map(spoken_command, trace.frames)))
     facts = context.parser if isinstance(context.parser, WordFacts) else None
     grounded = ground_noted(trace.frames, context.knowledge, facts)
+    check_unwanted(trace.unwanted, grounded.commands, context.knowledge)
     return replace(trace, commands=grounded.commands, notes=(*trace.notes, *grounded.notes))
 
 

@@ -35,7 +35,7 @@ class Action:
 
     `kind` is None for a statement, which only tells where something is. `said` is all that was said of it, `unknown`
     the words that do not fit, `choices` phrases of which only one can be meant, `teller` who told by what they did.
-    `departs` says that a place is only left.
+    `departs` says that a place is only left, `ways` are where the way was said to lead past.
     """
 
     kind: VerbKind | None
@@ -48,6 +48,7 @@ class Action:
     choices: tuple[tuple[Phrase, ...], ...] = ()
     teller: Phrase | None = None
     departs: bool = False
+    ways: tuple[Location, ...] = ()
 
 
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
@@ -275,11 +276,12 @@ def _kind(verb: Verb, roles: Roles) -> VerbKind:
 def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     """One action for each place to go to."""
     bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
-    ats = [place for place in roles.ats if not (roles.goals and place.preposition in _AROUND)]
-    roles = replace(roles, ats=ats)
+    passed = [place for place in roles.ats if roles.goals and place.preposition in _AROUND]
+    roles = replace(roles, ats=[place for place in roles.ats if place not in passed])
     if len(bare) == 1 and bare[0] is not HERE and len(roles.ats) == 1 and not roles.goals:
         bare = [replace(bare[0], within=roles.ats.pop())]
     if bare and blank.verb.endswith((" down", " up", " along")):
+        passed += [replace(place, preposition=blank.verb.split()[-1]) for place in bare if roles.goals]
         bare = [] if roles.goals else bare
     elif bare and (blank.verb not in words.bare_goal or (blank.verb in words.enters and _things(roles.objects))):
         blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
@@ -289,6 +291,7 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
         return
     headed = roles.searched if roles.searched is not None and roles.searched.kind is NounKind.PLACE else None
     places = [*roles.goals, *roles.ats, *bare, *([] if headed is None else [Location(headed)]), *roles.joined_goals]
+    passed += roles.paths if places else []
     places = places or roles.paths
     if not places and blank.verb in words.goes_back:
         places = [HERE]
@@ -296,7 +299,7 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     unfit = (recipient, None if headed is not None else roles.searched)
     extra = [part.text for part in unfit if part is not None]
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
-    blank = replace(blank, unknown=(*blank.unknown, *extra))
+    blank = replace(blank, unknown=(*blank.unknown, *extra), ways=tuple(passed))
     yield from (replace(blank, goal=place) for place in places) if places else (blank,)
 
 
@@ -324,6 +327,7 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
     elsewhere = [] if roles.searched is None else places[1 : len(roles.objects)]
     unfit = [place for place in roles.goals if place != THERE]
     extra = [place.text for place in (*places[1 + len(elsewhere) :], *_others([HERE, *unfit]), *roles.paths)]
+    extra += ["here"] if HERE in unfit else []
     found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
     yield found
     yield from (replace(found, source=place) for place in (*elsewhere, *roles.joined_goals))

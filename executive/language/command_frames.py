@@ -101,11 +101,12 @@ def _join_going(actions: Sequence[ResolvedAction]) -> tuple[ResolvedAction, ...]
         there = before and action.kind in _GOES_FOR and action.source is not None and action.source.within is None
         same = before and there and before.goal and action.source and before.goal.name == action.source.name
         back = before and before.goal is HERE and action.kind is VerbKind.ROUND_TRIP
-        if same or back:
+        to_them = before and before.goal and before.goal.living and action.goal and action.goal.name == before.goal.name
+        if same or back or to_them:
             joined.pop()
-            takes_source = takes_source and not back
+            takes_source = takes_source and not (back or to_them)
         if before and (takes_source or takes_goal):
-            joined = joined if back else joined[:-1]
+            joined = joined if back or to_them else joined[:-1]
             action = replace(action, source=before.goal) if takes_source else replace(action, goal=before.goal)
         joined.append(action)
     return tuple(joined)

@@ -14,6 +14,7 @@ from executive.language.command_frames import CommandFrame
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.questions import ClarifyingQuestion, RefusalError, Slot, perhaps, which
+from executive.language.relations import check_relation
 from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.mission.command import Command, Task, Thing
@@ -81,7 +82,7 @@ class _Grounder:
     def command(self, frame: CommandFrame) -> Command:
         """One frame as a command."""
         item, target = (None if phrase is None else self.thing(phrase) for phrase in (frame.item, frame.object))
-        goal, goal_at = (None, None) if frame.goal is None else self.goal(frame.goal)
+        goal, goal_at = (None, None) if frame.goal is None else self._kept_goal(frame, frame.goal)
         if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
             goal = self.knowledge.default_place(frame.task, target.name)
         return Command(
@@ -94,6 +95,18 @@ class _Grounder:
             object_count=1 if frame.object is None else frame.object.count,
             verb=frame.verb,
         )
+
+    def _kept_goal(self, frame: CommandFrame, location: Location) -> tuple[str, str | None]:
+        """The frame's goal, whose relation the command keeps."""
+        looks = frame.task in (Task.GRASP, Task.FIND)
+        if looks and location == HERE:
+            raise RefusalError("I take and find things on surfaces: name a place", [HERE.name])
+        act = "look" if looks else "go" if frame.item is None else "bring"
+        check_relation(act, _KINDS, location)
+        goal, goal_at = self.goal(location)
+        own = (goal in self.knowledge.places, goal in self.knowledge.surfaces, True)
+        check_relation(act, [kind for kind, fits in zip(_KINDS, own, strict=True) if fits][:1], location)
+        return goal, goal_at
 
     def thing(self, phrase: Phrase) -> Thing:
         """The known thing or category, with the adjectives before it."""
@@ -253,4 +266,5 @@ def _around(location: Location) -> str | None:
     return " ".join(extra[1:]) if extra[:1] == ("of",) else None
 
 
+_KINDS: Final = ("room", "surface", "person")
 _PLURALS: Final = {Slot.THING: "things", Slot.PLACE: "places", Slot.PERSON: "people", Slot.GOAL: "places"}

@@ -199,8 +199,8 @@ def _place(place: Location | None, memory: Memory) -> Location | None:
         return place
     meant = memory.person if phrase is not None and phrase.stands_for_somebody and memory.person else memory.place
     if phrase is not None and phrase.person:
-        return memory.person or place
+        return place if memory.person is None else replace(memory.person, preposition=place.preposition)
     if meant is None:
         word = THERE.preposition if phrase is None else phrase.text
         raise RefusalError(f"which place is {word!r}?", [word], question=True)
-    return meant
+    return meant if phrase is None or meant.phrase is None else replace(meant, preposition=place.preposition)

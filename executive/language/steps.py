@@ -12,6 +12,7 @@ from executive.language.command_frames import CommandFrame, command_frames, spok
 from executive.language.disfluency import repair_disfluencies, unwanted_things
 from executive.language.feasibility import check_feasible, not_understood
 from executive.language.grounding import check_unwanted, ground_noted, known_line
+from executive.language.harm import refuse_harm
 from executive.language.items import Item
 from executive.language.lexicon import lexicon
 from executive.language.names import name_table, parse_with_names
@@ -22,6 +23,7 @@ from executive.language.phrases import Phrase, noun_phrases
 from executive.language.questions import RefusalError, Slot, which
 from executive.language.reading import split_items
 from executive.language.reference import Memory, ResolvedAction, resolve
+from executive.language.relations import check_ways_and_speaker
 from executive.language.rephrasing import rephrased
 from executive.language.similar import WordFacts
 from executive.mission.command import Command, is_attribute
@@ -101,6 +103,7 @@ def _split(trace: Trace, context: _Context) -> Trace:
     clauses = split_clauses(trace.items)
     if not clauses:
         raise RefusalError(f"nothing was said; {known_line(context.knowledge)}")
+    refuse_harm(clauses)
     return replace(trace, clauses=clauses if context.knowledge else without_name(clauses))
 
 
@@ -119,6 +122,8 @@ def _check(trace: Trace, context: _Context) -> Trace:
             raise _choosing(choice, trace.tokens)
     notes = [f"of {listing((p.spoken for p in choice), last='or')} I take the first" for choice in choices]
     trace = replace(trace, notes=(*trace.notes, *notes))
+    if context.knowledge is not None:
+        check_ways_and_speaker(trace.clauses, trace.actions)
     if not any(action.kind for action in trace.actions):
         told = [phrase.text for action in trace.actions for phrase in action.objects]
         of = f" of {listing(told)}" if told else ""

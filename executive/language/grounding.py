@@ -19,7 +19,7 @@ from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.mission.command import Command, Task, Thing
 from executive.mission.errors import listing
-from executive.mission.knowledge import Knowledge
+from executive.mission.knowledge import ANYTHING, Knowledge
 
 __all__ = ["Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
 
@@ -82,6 +82,8 @@ class _Grounder:
     def command(self, frame: CommandFrame) -> Command:
         """One frame as a command."""
         item, target = (None if phrase is None else self.thing(phrase) for phrase in (frame.item, frame.object))
+        if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
+            raise RefusalError(f"which object? Known are {listing(self.knowledge.thing_names())}", [target.name])
         goal, goal_at = (None, None) if frame.goal is None else self._kept_goal(frame, frame.goal)
         if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
             goal = self.knowledge.default_place(frame.task, target.name)

@@ -25,7 +25,7 @@ from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
 from executive.language.nouns import NounKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
-from executive.language.question_parsing import how_many, where_is
+from executive.language.question_parsing import do_we_have, how_many, what_is, where_is
 from executive.language.row import LONGEST, Row, command_position
 from executive.language.statements import belongs, goes_on, narrated, needed, told
 
@@ -55,7 +55,7 @@ class _Reader(Row):
         """The items of the row in order; the first way of reading that fits takes its words."""
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
-            *(partial(step, self) for step in (where_is, how_many, told, narrated, needed, belongs, goes_on)),
+            *(partial(step, self) for step in (where_is, how_many, what_is, do_we_have, told, narrated, needed, belongs, goes_on)),
             self._verb,
             self._being,
             self._chunk,

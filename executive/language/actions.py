@@ -25,6 +25,7 @@ from executive.language.nouns import NounKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, THERE, Location, Roles, read_roles
+from executive.mission.command import TIME_UNITS_S
 
 __all__ = ["Action", "read_actions"]
 
@@ -35,7 +36,8 @@ class Action:
 
     `kind` is None for a statement, which only tells where something is. `said` is all that was said of it, `unknown`
     the words that do not fit, `choices` phrases of which only one can be meant, `teller` who told by what they did.
-    `departs` says that a place is only left, `ways` are where the way was said to lead past.
+    `departs` says that a place is only left, `ways` are where the way was said to lead past, `time` is how long it is
+    to be waited.
     """
 
     kind: VerbKind | None
@@ -49,6 +51,7 @@ class Action:
     teller: Phrase | None = None
     departs: bool = False
     ways: tuple[Location, ...] = ()
+    time: Phrase | None = None
 
 
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
@@ -258,6 +261,10 @@ def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
         yield from _going(blank, roles, words)
     elif kind is VerbKind.FIND or (kind is VerbKind.CHECK and roles.searched is not None):
         yield from _finding(replace(blank, kind=VerbKind.FIND), roles)
+    elif kind is VerbKind.WAIT:
+        yield _waiting(blank, roles)
+    elif kind is VerbKind.CHARGE:
+        yield _charging(blank, roles, words)
     elif kind is VerbKind.CHECK:
         bare = all(isinstance(item, Separator) for item in clause.items)
         looks = VerbKind.FIND if bare else blank.kind
@@ -331,6 +338,32 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
     found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
     yield found
     yield from (replace(found, source=place) for place in (*elsewhere, *roles.joined_goals))
+
+
+def _waiting(blank: Action, roles: Roles) -> Action:
+    """Waiting for a time, here or in a place."""
+    times = [phrase for phrase in (roles.searched, *roles.objects) if phrase is not None]
+    places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
+    fits = len(times) == 1 and times[0].head.word in TIME_UNITS_S and times[0].count > 0
+    extra = [phrase.spoken for phrase in (times[1:] if fits else times)] + ([] if fits else [blank.verb])
+    extra += [place.text for place in (*places[1:], *_beyond(roles))]
+    goal, time = next(iter(places), None), times[0] if fits else None
+    return replace(blank, goal=goal, time=time, unknown=(*blank.unknown, *extra))
+
+
+def _charging(blank: Action, roles: Roles, words: Lexicon) -> Action:
+    """Charging the robot's own battery at its dock; it charges nothing else and nowhere else."""
+    things = [phrase.spoken for phrase in roles.objects if not phrase.addressed]
+    places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
+    docks = [place.text for place in places if place.phrase is None or place.phrase.head.lemma not in words.docks]
+    searched = [] if roles.searched is None else [roles.searched.spoken]
+    return replace(blank, unknown=(*blank.unknown, *things, *docks, *searched, *(p.text for p in _beyond(roles))))
+
+
+def _beyond(roles: Roles) -> Iterator[Location]:
+    """Where a verb that moves nothing cannot go: sources, paths, somebody, more places."""
+    recipient = () if roles.recipient in (None, HERE) else (roles.recipient,)
+    yield from (place for place in (*roles.sources, *roles.paths, *recipient, *roles.joined_goals) if place)
 
 
 def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:

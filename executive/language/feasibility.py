@@ -24,7 +24,8 @@ def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | Non
     Raises:
         RefusalError: any action is out of reach; it names all that is.
     """
-    odd = [number for d in actions if d.target is not None and (number := d.target.odd_number)]
+    counted = (phrase for d in actions for phrase in (d.target, d.time) if phrase is not None)
+    odd = [number for phrase in counted if (number := phrase.odd_number)]
     if odd:
         raise RefusalError(f"{listing(map(repr, odd))} is no number of things; say how many in one whole number", odd)
     shared = [
@@ -61,7 +62,7 @@ def _serves_all(action: ResolvedAction) -> bool:
 
 
 def _carries(action: ResolvedAction) -> bool:
-    return action.kind not in (VerbKind.GO, VerbKind.FIND)
+    return action.kind not in (VerbKind.GO, VerbKind.FIND, VerbKind.WAIT, VerbKind.CHARGE)
 
 
 _BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "bring over", "carry over", "hand"})

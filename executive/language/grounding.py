@@ -34,7 +34,7 @@ class Grounded:
 
 def known_line(knowledge: Knowledge | None) -> str:
     """What can be asked for and where one can be sent, in one line."""
-    able = "I can fetch, take, put and find things, and go to places"
+    able = "I can fetch, take, put and find things, go to places, wait and charge"
     if knowledge is None:
         return able
     return f"{able}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
@@ -81,7 +81,8 @@ class _Grounder:
 
     def command(self, frame: CommandFrame) -> Command:
         """One frame as a command."""
-        item, target = (None if phrase is None else self.thing(phrase) for phrase in (frame.item, frame.object))
+        item = None if frame.item is None else self.thing(frame.item)
+        target = None if frame.object is None else self.target(frame.object, frame.task)
         if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
             raise RefusalError(f"which object? Known are {listing(self.knowledge.thing_names())}", [target.name])
         goal, goal_at = (None, None) if frame.goal is None else self._kept_goal(frame, frame.goal)
@@ -97,6 +98,10 @@ class _Grounder:
             object_count=1 if frame.object is None else frame.object.count,
             verb=frame.verb,
         )
+
+    def target(self, phrase: Phrase, task: Task | None) -> Thing:
+        """What a task is done to: a known thing, or a time."""
+        return Thing(phrase.head.lemma) if task is Task.WAIT else self.thing(phrase)
 
     def _kept_goal(self, frame: CommandFrame, location: Location) -> tuple[str, str | None]:
         """The frame's goal, whose relation the command keeps."""

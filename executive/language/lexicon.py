@@ -26,6 +26,8 @@ class VerbKind(enum.Enum):
     FIND = "find"  # look for a thing
     GO = "go"  # go somewhere
     CHECK = "check"  # see whether something is so
+    WAIT = "wait"  # stay for a time
+    CHARGE = "charge"  # charge the battery at the dock
 
 
 class PrepositionRole(enum.Enum):
@@ -92,6 +94,7 @@ class Lexicon:
     calls: frozenset[str]
     titles: frozenset[str]
     units: frozenset[str]
+    docks: frozenset[str]
     vague_numbers: frozenset[str]
     no_numbers: frozenset[str]
     loose_numbers: frozenset[str]

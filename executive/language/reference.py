@@ -21,7 +21,10 @@ _SEVERAL: Final = frozenset({"them", "they", "these", "those"})
 
 @dataclass(frozen=True)
 class ResolvedAction:
-    """An action on one thing at most, without pronouns; `again` says that the thing was spoken of before."""
+    """An action on one thing at most, without pronouns; `again` says that the thing was spoken of before.
+
+    `time` is how long it is to be waited.
+    """
 
     kind: VerbKind
     verb: str
@@ -29,6 +32,7 @@ class ResolvedAction:
     source: Location | None = None
     goal: Location | None = None
     again: bool = False
+    time: Phrase | None = None
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,13 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
     looks = kind is not VerbKind.GO
     actions = (
         ResolvedAction(
-            kind, action.verb, thing, source or (memory.where_is(thing) if thing and looks else None), goal, same
+            kind=kind,
+            verb=action.verb,
+            target=thing,
+            source=source or (memory.where_is(thing) if thing and looks else None),
+            goal=goal,
+            again=same,
+            time=action.time,
         )
         for thing in things or (None,)
         for same in [again or (thing is not None and thing not in meant)]

@@ -7,7 +7,18 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
-from executive.language.items import Adverb, Being, Chunk, Correction, Item, Negation, Separator, Unknown, Verb, spoken_words
+from executive.language.items import (
+    Adverb,
+    Being,
+    Chunk,
+    Correction,
+    Item,
+    Negation,
+    Separator,
+    Unknown,
+    Verb,
+    spoken_words,
+)
 from executive.language.lexicon import PrepositionRole, VerbKind
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase

@@ -36,6 +36,10 @@ def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | Non
     people = [f"{d.verb} {d.target.text}" for d in actions if _carries(d) and d.target is not None and d.target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
+    finds = (d.target for d in actions if d.kind is VerbKind.FIND and d.target is not None)
+    sought = [phrase.spoken for phrase in finds if _anyone(phrase)]
+    if sought and knowledge is not None:
+        raise RefusalError(f"I can look for things, not for people like {listing(map(repr, sought))}", sought)
     moved = [action.target for action in actions if _moved(action)]
     outside = [(part, part) for action in actions for part in _outside(action, action.target in moved)]
     if outside:
@@ -118,6 +122,11 @@ def _holdable(phrase: Phrase, action: ResolvedAction) -> bool:
     if called or (action.kind is not VerbKind.FIND and _fixture(phrase)):
         return False
     return not _light(phrase, action) and (phrase.kind is None or phrase.kind.within_reach)
+
+
+def _anyone(phrase: Phrase) -> bool:
+    """Whether it is somebody, or any person at all ("is anybody in the hall")."""
+    return phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
 
 
 def _anybody(phrase: Phrase) -> bool:

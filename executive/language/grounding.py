@@ -147,7 +147,9 @@ class _Grounder:
         if location.phrase is None:
             raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
         if location.phrase.said_count not in (None, 1):
-            raise RefusalError(f"I go to one place at a time, not to {location.phrase.spoken!r}", [location.phrase.spoken])
+            raise RefusalError(
+                f"I go to one place at a time, not to {location.phrase.spoken!r}", [location.phrase.spoken]
+            )
         known = _spellings(self.knowledge, self.knowledge.place_names())
         room = self._room(location)
         candidates = self._any_place(location.phrase) or self._places(location.phrase, room, known)

@@ -87,7 +87,7 @@ class Phrase:
         """The words of a number that is none of things: "one two three", "zero", "infinity", "2.5", "at least two"."""
         odd = next((numeral for numeral in self._numerals() if not _value(numeral)), None)
         left = self.tokens[:-1]
-        words = [t.text for t in odd or () or (t for t in left if t.word in lexicon().no_numbers)]
+        words = [t.text for t in odd or (t for t in left if t.word in lexicon().no_numbers)]
         loose = any(t.word in lexicon().loose_numbers for t in left) and any(self._numerals())
         return " ".join(t.text for t in left) if loose else " ".join(words) or None
 

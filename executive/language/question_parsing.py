@@ -22,11 +22,6 @@ _WE: Final = frozenset({"we", "you", "i", "they"})
 _HAVE: Final = frozenset({"have", "got"})
 _DO: Final = frozenset({"do", "have"})
 _WHATEVER: Final = frozenset({"what", "anything", "something"})
-_BETWEEN: Final = frozenset(
-    """is 's are be there can could do does did you we i see find have got lies lie lying stands standing sits sitting
-    left now currently still else""".split()
-)
-_FULL: Final = frozenset({"empty", "free", "clear", "bare", "full", "occupied", "cleared", "vacant"})
 _OBJECTS: Final = Phrase((Token(0, 0, "objects", "object", "NOUN", "NNS", 0, "obj", kind=NounKind.THING),))
 
 
@@ -110,8 +105,10 @@ def what_is(row: Row, items: list[Item]) -> Item | None:
 def _whatever(row: Row) -> Chunk | None:
     """The place behind "what is" or "is there anything"."""
     at, asked = row.at, False
-    while at < len(row.tokens) and (row.tokens[at].word in _BETWEEN or (row.tokens[at].word in _WHATEVER and not asked)):
-        asked = asked or row.tokens[at].word in _WHATEVER
+    for word in (token.word for token in row.tokens[row.at :]):
+        if word not in row.words.asked_with and (asked or word not in _WHATEVER):
+            break
+        asked = asked or word in _WHATEVER
         at += 1
     return _place_at(row, at) if asked else None
 
@@ -131,7 +128,7 @@ def _fullness(row: Row) -> Chunk | None:
     """The place in "is the bench empty"."""
     phrase = row.phrase_at(row.at + 1) if _is_be(row, row.at) else None
     end = row.at + 1 + (0 if phrase is None else len(phrase.tokens))
-    if phrase is None or end >= len(row.tokens) or row.tokens[end].word not in _FULL:
+    if phrase is None or end >= len(row.tokens) or row.tokens[end].word not in row.words.fullness:
         return None
     if not (phrase.known or phrase.kind is NounKind.PLACE) or phrase.person:
         return None

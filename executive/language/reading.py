@@ -33,7 +33,6 @@ __all__ = ["split_items"]
 
 _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
-_TIMES: Final = frozenset({"early", "hourly", "daily", "nightly", "weekly", "monthly", "yearly", "annually"})
 _HAVING: Final = frozenset({"with", "containing", "holding"})
 _WITHIN: Final = frozenset({"in", "on"})
 _INSIDE: Final = "inside"
@@ -55,7 +54,10 @@ class _Reader(Row):
         """The items of the row in order; the first way of reading that fits takes its words."""
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
-            *(partial(step, self) for step in (where_is, how_many, what_is, do_we_have, told, narrated, needed, belongs, goes_on)),
+            *(
+                partial(step, self)
+                for step in (where_is, how_many, what_is, do_we_have, told, narrated, needed, belongs, goes_on)
+            ),
             self._verb,
             self._being,
             self._chunk,
@@ -266,7 +268,7 @@ class _Reader(Row):
         if self._purpose(items) or (not items and token.word in _AFTER and behind and behind[0].tag == "VBG"):
             self.at += 1
             return Separator("")
-        if token.tag == "RB" and token.word.endswith("ly") and token.word not in _TIMES:
+        if token.tag == "RB" and token.word in self.words.manners:
             self.at += 1
             return Separator(token.word)
         if token.pos in ("ADP", "ADV") and token.word not in _FROM and behind and behind[0].word in ("here", "there"):

@@ -37,8 +37,9 @@ __all__ = ["Trace", "trace_sentence"]
 class Trace:
     """What each step made of a sentence, in the order of the fields; steps behind a refusal are empty.
 
-    `unwanted` is what stands behind "not", `meanings` are pronouns with what each stood for, `notes` say which name was taken for which. `refused_at` names
-    the step that refused. `memory` is what was spoken of before, and afterwards what was spoken of last.
+    `unwanted` is what stands behind "not", `meanings` are pronouns with what each stood for, `notes` say which name was
+    taken for which. `refused_at` names the step that refused. `memory` is what was spoken of before, and afterwards
+    what was spoken of last.
     """
 
     text: str

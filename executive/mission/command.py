@@ -14,7 +14,17 @@ from typing import Any, Final
 
 from skills.api import Thing
 
-__all__ = ["START", "TIME_UNITS_S", "Command", "Task", "Thing", "is_attribute", "may_be_attribute", "parse_command", "thing"]
+__all__ = [
+    "START",
+    "TIME_UNITS_S",
+    "Command",
+    "Task",
+    "Thing",
+    "is_attribute",
+    "may_be_attribute",
+    "parse_command",
+    "thing",
+]
 
 _ATTRIBUTE: Final = re.compile(
     r"red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver|golden|dark|bright|light"

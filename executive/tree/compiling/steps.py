@@ -130,6 +130,8 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
     Raises InputError: it is no time, or too long a one.
     """
     command = builder.command
+    if command.item is not None:
+        raise builder.error(f"the {command.item} cannot be carried by waiting", "take it there in a step of its own")
     unit = TIME_UNITS_S.get("" if command.object is None else command.object.name)
     duration_s = 0.0 if unit is None else unit * command.object_count
     if not 0.0 < duration_s <= LONGEST_WAIT_S:
@@ -142,8 +144,10 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def charge_plan(builder: PlanBuilder) -> NodeSpec:
-    """Go to the dock and charge there."""
-    facts = builder.knowledge
+    """Go to the dock and charge there. Raises InputError: anything else is said with it."""
+    command, facts = builder.command, builder.knowledge
+    if not command.item is command.goal is command.object is None:
+        raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")
     return dock_plan(builder, pose_2d(facts.dock), facts.battery.charged)
 
 

@@ -288,6 +288,21 @@ def test_charging_goes_to_the_dock_and_charges_there(compiled, knowledge):
     assert tree.parts[0].goal.goal[0].name == "the dock"
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Take [Nothing] to [kitchen] and do [charge] to [Nothing]",
+        "Take [Nothing] to [Nothing] and do [charge] to [coke]",
+        "Take [coke] to [Nothing] and do [charge] to [Nothing]",
+        "Take [coke] to [kitchen] and do [wait] to [10 second]",
+    ],
+)
+def test_neither_charging_nor_waiting_does_more(compiled, text):
+    with pytest.raises(InputError) as error:
+        compiled(text)
+    assert error.value.hint
+
+
 def test_any_object_is_looked_for_by_all_classes(compiled, knowledge):
     tree = compiled("Take [Nothing] to [counter] and do [find] to [some object]")
     detects = [node for node in tree.mission.walk() if node.name == "detect"]

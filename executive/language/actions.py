@@ -188,14 +188,16 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     there = [place for place in roles.goals if place == THERE]
     places = [*roles.ats, *roles.sources, *there]
     place = next(iter(places), None)
-    simple = len(objects) == 1 and len(places) <= 1 and len(roles.goals) == len(there) and not roles.unknown
+    known = len(roles.goals) == len(there) and not (roles.unknown or roles.joined_goals)
+    simple = len(objects) == 1 and len(places) <= 1 and known
     fits = simple and (place or being.existential)
     asked_for = any(map(_asks, objects))
     before = [clause.subject] if clause.subject else []
     unknown = () if fits and not asked_for else (spoken_words([*before, being, *clause.items]),)
     asked = being.asked or clause.whether
     kind = VerbKind.FIND if asked else None
-    return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, teller=being.teller)
+    choices = tuple(map(tuple, roles.choices))
+    return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, choices=choices, teller=being.teller)
 
 
 def _narrated(clause: Clause, being: Being, words: Lexicon) -> Action:

@@ -189,12 +189,13 @@ class _Grounder:
 
     def _any_place(self, phrase: Phrase) -> Sequence[str]:
         """What a word for any place may mean ("the room", "a surface"); nothing for the name of a certain one."""
-        group = {"room": self.knowledge.places, "surface": self.knowledge.surfaces}.get(phrase.head.lemma, {})
-        return () if len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None else tuple(group)
+        groups = {"room": tuple(self.knowledge.places), "surface": tuple(self.knowledge.surfaces)}
+        named = len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None
+        return () if named else groups.get(phrase.head.lemma, ())
 
     def _left_over(self, phrase: Phrase, name: str) -> bool:
         """Whether something was said of a place that neither its names nor its room's account for ("kitchen 3")."""
-        extra = () if phrase.extra[:1] == ("of",) else phrase.extra
+        extra: tuple[str, ...] = () if phrase.extra[:1] == ("of",) else phrase.extra
         said = {word for part in (*(t.word for t in phrase.content[:-1]), *extra) for word in part.lower().split()}
         spellings = self.knowledge.spellings([name, self.knowledge.room(name)])
         known = (other for spelling in spellings for other in (spelling, *words_for(spelling)))

@@ -14,7 +14,7 @@ from executive.language.feasibility import check_feasible, not_understood
 from executive.language.grounding import check_unwanted, ground_noted, known_line
 from executive.language.harm import refuse_harm
 from executive.language.items import Item
-from executive.language.lexicon import lexicon
+from executive.language.lexicon import VerbKind, lexicon
 from executive.language.names import name_table, parse_with_names
 from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS
 from executive.language.nouns import NounKind
@@ -117,9 +117,10 @@ def _check(trace: Trace, context: _Context) -> Trace:
     unknown = [(word, action.said) for action in trace.actions for word in action.unknown]
     if unknown:
         raise not_understood(unknown, context.knowledge)
-    choices = [choice for action in trace.actions for choice in action.choices]
-    for choice in choices:
-        if not _any_will_do(choice):
+    asked = [(choice, action.kind) for action in trace.actions for choice in action.choices]
+    choices = [choice for choice, _ in asked]
+    for choice, kind in asked:
+        if kind is VerbKind.FIND or not _any_will_do(choice):
             raise _choosing(choice, trace.tokens)
     notes = [f"of {listing((p.spoken for p in choice), last='or')} I take the first" for choice in choices]
     trace = replace(trace, notes=(*trace.notes, *notes))

@@ -91,9 +91,9 @@ def understand(
         reason = f'the robot\'s name was not said; begin with "Hey {name}"'
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
     if (blank := placeholder(sentence)) is not None:
-        refusal = RefusalError(f"{blank!r} is no word; say it in words", [blank])
-        trace = Trace(sentence, refusal=refusal, refused_at="cleaning")
-        return Understanding(sentence, Status.REFUSED, (), refusal.reason, refusal.unknown, trace=trace)
+        odd = RefusalError(f"{blank!r} is no word; say it in words", [blank])
+        trace = Trace(sentence, refusal=odd, refused_at="cleaning")
+        return Understanding(sentence, Status.REFUSED, (), odd.reason, odd.unknown, trace=trace)
     facts = parser if isinstance(parser, WordFacts) else None
     corrected = Corrected(wake.text)
     if correct and knowledge is not None and facts is not None:

@@ -146,7 +146,7 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
 def charge_plan(builder: PlanBuilder) -> NodeSpec:
     """Go to the dock and charge there. Raises InputError: anything else is said with it."""
     command, facts = builder.command, builder.knowledge
-    if not command.item is command.goal is command.object is None:
+    if any(part is not None for part in (command.item, command.goal, command.object)):
         raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")
     return dock_plan(builder, pose_2d(facts.dock), facts.battery.charged)
 

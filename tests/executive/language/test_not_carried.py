@@ -50,6 +50,15 @@ def test_a_place_that_is_told_apart_by_what_the_world_does_not_know_is_asked_abo
 
 
 @pytest.mark.parametrize(
+    "sentence", ["is there a beer or a coke on the bench", "is there a beer on the bench or the counter"]
+)
+def test_a_question_after_one_or_the_other_is_asked_about(told, sentence):
+    answer = told(sentence)
+    assert answer.status is Status.QUESTION
+    assert len(answer.question.candidates) == 2
+
+
+@pytest.mark.parametrize(
     ("said", "count"),
     [
         ("two hammers", 2),
@@ -76,6 +85,13 @@ def test_a_number_of_things_is_kept(told, said, count):
         ("have we got a hammer in the workshop", ["Take [Nothing] to [workshop] and do [find] to [hammer]"]),
         ("go charge yourself", ["Take [Nothing] to [Nothing] and do [charge] to [Nothing]"]),
         ("go to the charging station and charge", ["Take [Nothing] to [Nothing] and do [charge] to [Nothing]"]),
+        (
+            "go to the workshop and back",
+            [
+                "Take [Nothing] to [workshop] and do [Nothing] to [Nothing]",
+                "Take [Nothing] to [start] and do [Nothing] to [Nothing]",
+            ],
+        ),
         ("wait there for ten seconds", ["Take [Nothing] to [Nothing] and do [wait] to [10 second]"]),
         ("wait in the hall for a minute", ["Take [Nothing] to [hall] and do [wait] to [minute]"]),
         (

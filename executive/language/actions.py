@@ -25,6 +25,7 @@ from executive.language.nouns import NounKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.roles import HERE, THERE, Location, Roles, read_roles
+from executive.mission.command import TIME_UNITS_S
 
 __all__ = ["Action", "read_actions"]
 
@@ -35,7 +36,8 @@ class Action:
 
     `kind` is None for a statement, which only tells where something is. `said` is all that was said of it, `unknown`
     the words that do not fit, `choices` phrases of which only one can be meant, `teller` who told by what they did.
-    `departs` says that a place is only left.
+    `departs` says that a place is only left, `ways` are where the way was said to lead past, `time` is how long it is
+    to be waited.
     """
 
     kind: VerbKind | None
@@ -48,6 +50,8 @@ class Action:
     choices: tuple[tuple[Phrase, ...], ...] = ()
     teller: Phrase | None = None
     departs: bool = False
+    ways: tuple[Location, ...] = ()
+    time: Phrase | None = None
 
 
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
@@ -184,14 +188,16 @@ def _being(clause: Clause, being: Being, words: Lexicon) -> Action:
     there = [place for place in roles.goals if place == THERE]
     places = [*roles.ats, *roles.sources, *there]
     place = next(iter(places), None)
-    simple = len(objects) == 1 and len(places) <= 1 and len(roles.goals) == len(there) and not roles.unknown
+    known = len(roles.goals) == len(there) and not (roles.unknown or roles.joined_goals)
+    simple = len(objects) == 1 and len(places) <= 1 and known
     fits = simple and (place or being.existential)
     asked_for = any(map(_asks, objects))
     before = [clause.subject] if clause.subject else []
     unknown = () if fits and not asked_for else (spoken_words([*before, being, *clause.items]),)
     asked = being.asked or clause.whether
     kind = VerbKind.FIND if asked else None
-    return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, teller=being.teller)
+    choices = tuple(map(tuple, roles.choices))
+    return Action(kind, "be", tuple(objects[:1]), place, unknown=unknown, choices=choices, teller=being.teller)
 
 
 def _narrated(clause: Clause, being: Being, words: Lexicon) -> Action:
@@ -257,6 +263,10 @@ def _acting(clause: Clause, verb: Verb, words: Lexicon) -> Iterator[Action]:
         yield from _going(blank, roles, words)
     elif kind is VerbKind.FIND or (kind is VerbKind.CHECK and roles.searched is not None):
         yield from _finding(replace(blank, kind=VerbKind.FIND), roles)
+    elif kind is VerbKind.WAIT:
+        yield _waiting(blank, roles)
+    elif kind is VerbKind.CHARGE:
+        yield _charging(blank, roles, words)
     elif kind is VerbKind.CHECK:
         bare = all(isinstance(item, Separator) for item in clause.items)
         looks = VerbKind.FIND if bare else blank.kind
@@ -275,11 +285,12 @@ def _kind(verb: Verb, roles: Roles) -> VerbKind:
 def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     """One action for each place to go to."""
     bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
-    ats = [place for place in roles.ats if not (roles.goals and place.preposition in _AROUND)]
-    roles = replace(roles, ats=ats)
+    passed = [place for place in roles.ats if roles.goals and place.preposition in _AROUND]
+    roles = replace(roles, ats=[place for place in roles.ats if place not in passed])
     if len(bare) == 1 and bare[0] is not HERE and len(roles.ats) == 1 and not roles.goals:
         bare = [replace(bare[0], within=roles.ats.pop())]
     if bare and blank.verb.endswith((" down", " up", " along")):
+        passed += [replace(place, preposition=blank.verb.split()[-1]) for place in bare if roles.goals]
         bare = [] if roles.goals else bare
     elif bare and (blank.verb not in words.bare_goal or (blank.verb in words.enters and _things(roles.objects))):
         blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
@@ -289,6 +300,7 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
         return
     headed = roles.searched if roles.searched is not None and roles.searched.kind is NounKind.PLACE else None
     places = [*roles.goals, *roles.ats, *bare, *([] if headed is None else [Location(headed)]), *roles.joined_goals]
+    passed += roles.paths if places else []
     places = places or roles.paths
     if not places and blank.verb in words.goes_back:
         places = [HERE]
@@ -296,7 +308,7 @@ def _going(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:
     unfit = (recipient, None if headed is not None else roles.searched)
     extra = [part.text for part in unfit if part is not None]
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
-    blank = replace(blank, unknown=(*blank.unknown, *extra))
+    blank = replace(blank, unknown=(*blank.unknown, *extra), ways=tuple(passed))
     yield from (replace(blank, goal=place) for place in places) if places else (blank,)
 
 
@@ -324,9 +336,36 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
     elsewhere = [] if roles.searched is None else places[1 : len(roles.objects)]
     unfit = [place for place in roles.goals if place != THERE]
     extra = [place.text for place in (*places[1 + len(elsewhere) :], *_others([HERE, *unfit]), *roles.paths)]
+    extra += ["here"] if HERE in unfit else []
     found = _with_object(replace(blank, objects=tuple(objects), source=next(iter(places), None)), extra)
     yield found
     yield from (replace(found, source=place) for place in (*elsewhere, *roles.joined_goals))
+
+
+def _waiting(blank: Action, roles: Roles) -> Action:
+    """Waiting for a time, here or in a place."""
+    times = [phrase for phrase in (roles.searched, *roles.objects) if phrase is not None]
+    places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
+    fits = len(times) == 1 and times[0].head.word in TIME_UNITS_S and times[0].count > 0
+    extra = [phrase.spoken for phrase in (times[1:] if fits else times)] + ([] if fits else [blank.verb])
+    extra += [place.text for place in (*places[1:], *_beyond(roles))]
+    goal, time = next(iter(places), None), times[0] if fits else None
+    return replace(blank, goal=goal, time=time, unknown=(*blank.unknown, *extra))
+
+
+def _charging(blank: Action, roles: Roles, words: Lexicon) -> Action:
+    """Charging the robot's own battery at its dock; it charges nothing else and nowhere else."""
+    things = [phrase.spoken for phrase in roles.objects if not phrase.addressed]
+    places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
+    docks = [place.text for place in places if place.phrase is None or place.phrase.head.lemma not in words.docks]
+    searched = [] if roles.searched is None else [roles.searched.spoken]
+    return replace(blank, unknown=(*blank.unknown, *things, *docks, *searched, *(p.text for p in _beyond(roles))))
+
+
+def _beyond(roles: Roles) -> Iterator[Location]:
+    """Where a verb that moves nothing cannot go: sources, paths, somebody, more places."""
+    recipient = () if roles.recipient in (None, HERE) else (roles.recipient,)
+    yield from (place for place in (*roles.sources, *roles.paths, *recipient, *roles.joined_goals) if place)
 
 
 def _carrying(blank: Action, roles: Roles, words: Lexicon) -> Iterator[Action]:

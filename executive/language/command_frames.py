@@ -20,6 +20,7 @@ _GOES_FOR: Final = frozenset({VerbKind.FIND, VerbKind.PICK, VerbKind.ROUND_TRIP,
 
 _FETCHES: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.PICK})
 _TAKES: Final = _GOES_FOR | {VerbKind.PLACE}
+_ALONE: Final = {VerbKind.GO: None, VerbKind.WAIT: Task.WAIT, VerbKind.CHARGE: Task.CHARGE}
 
 
 @dataclass(frozen=True)
@@ -101,11 +102,14 @@ def _join_going(actions: Sequence[ResolvedAction]) -> tuple[ResolvedAction, ...]
         there = before and action.kind in _GOES_FOR and action.source is not None and action.source.within is None
         same = before and there and before.goal and action.source and before.goal.name == action.source.name
         back = before and before.goal is HERE and action.kind is VerbKind.ROUND_TRIP
-        if same or back:
+        to_them = before and before.goal and before.goal.living and action.goal and action.goal.name == before.goal.name
+        goal = before.goal.phrase if before and before.goal else None
+        docks = action.kind is VerbKind.CHARGE and goal is not None and goal.head.lemma in lexicon().docks
+        if same or back or to_them or docks:
             joined.pop()
-            takes_source = takes_source and not back
+            takes_source = takes_source and not (back or to_them)
         if before and (takes_source or takes_goal):
-            joined = joined if back else joined[:-1]
+            joined = joined if back or to_them else joined[:-1]
             action = replace(action, source=before.goal) if takes_source else replace(action, goal=before.goal)
         joined.append(action)
     return tuple(joined)
@@ -138,8 +142,8 @@ def _one_by_one(actions: Sequence[ResolvedAction]) -> tuple[ResolvedAction, ...]
 
 
 def _frames(action: ResolvedAction, held: Phrase | None, later: bool) -> Iterator[CommandFrame]:
-    if action.kind is VerbKind.GO:
-        yield CommandFrame(action.verb, goal=action.goal)
+    if action.kind in _ALONE:
+        yield CommandFrame(action.verb, goal=action.goal, task=_ALONE[action.kind], object=action.time)
     elif action.kind is VerbKind.FIND and not later:
         yield CommandFrame(action.verb, goal=action.source, task=Task.FIND, object=action.target)
     else:
@@ -184,7 +188,7 @@ def _goal(action: ResolvedAction, later: bool) -> Location | None:
 
 
 def _held_after(action: ResolvedAction, held: Phrase | None, later: bool) -> Phrase | None:
-    if action.kind is VerbKind.GO or (action.kind is VerbKind.FIND and not later):
+    if action.kind in _ALONE or (action.kind is VerbKind.FIND and not later):
         return held
     return None if action.kind is VerbKind.PLACE or _goal(action, later) is not None else action.target
 

@@ -4,14 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Final
 
-from executive.language.items import Adverb, Being, Chunk, Correction, Item, Negation, Separator, Unknown, Verb
-from executive.language.lexicon import PrepositionRole
+from executive.language.items import (
+    Adverb,
+    Being,
+    Chunk,
+    Correction,
+    Item,
+    Negation,
+    Separator,
+    Unknown,
+    Verb,
+    spoken_words,
+)
+from executive.language.lexicon import PrepositionRole, VerbKind
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
+from executive.language.questions import RefusalError
 
-__all__ = ["repair_disfluencies"]
+__all__ = ["repair_disfluencies", "unwanted_things"]
 
 _IT: Final = frozenset({"it", "them"})
 _CONTRAST: Final = "but"
@@ -23,6 +36,9 @@ def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
     """The items as if the speaker had said at once what they mean.
 
     A correction or negation that fits nothing becomes an unknown word.
+
+    Raises:
+        RefusalError: something is forbidden.
     """
     rest, done = list(items), list[Item]()
     while rest:
@@ -36,16 +52,60 @@ def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
     return tuple(done)
 
 
+def unwanted_things(items: Sequence[Item]) -> tuple[Phrase, ...]:
+    """What stands right behind "not"."""
+    pairs = pairwise(item for item in items if not isinstance(item, Separator))
+    return tuple(b.phrase for a, b in pairs if isinstance(a, Negation) and isinstance(b, Chunk))
+
+
 def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[Item], list[Item]]:
-    """Leave out the clause or the chunks behind "not"."""
+    """Leave out the clause or the chunks behind "not", where that only tells them apart from what is asked for.
+
+    Raises RefusalError: it forbids something by itself ("but don't go to the kitchen").
+    """
     ahead = _without_separators(rest)
-    if ahead and isinstance(ahead[0], Verb) and not (done and isinstance(done[-1], Being)):
+    being = bool(done) and isinstance(done[-1], Being)
+    if ahead and isinstance(verb := ahead[0], Verb) and not being:
         first = next((item.phrase for item in ahead if isinstance(item, Chunk) and item.role is None), None)
         rest = _behind_clause(ahead)
+        if not _done_instead(verb, done, rest):
+            raise _forbidden(mark, ahead)
         return done, rest if first is None or first.pronoun or first.speaker else _one_of_them(rest, first)
-    if ahead and isinstance(ahead[0], Chunk) and not (done and isinstance(done[-1], Being)):
-        return done, _told_apart(_behind_chunks(ahead), ahead[0].phrase)
+    if ahead and isinstance(chunk := ahead[0], Chunk) and not being:
+        rest = _told_apart(_behind_chunks(ahead), chunk.phrase)
+        if not _meant_instead(chunk, mark, done, rest):
+            raise _forbidden(mark, ahead[:1])
+        return done, rest
     return [*done, Unknown(mark.word)], rest
+
+
+def _forbidden(mark: Negation, ahead: Sequence[Item]) -> RefusalError:
+    """The refusal of what the speaker does not want, and which is no part of a command."""
+    verb, *clause = ahead
+    end = next((n for n, item in enumerate(clause) if isinstance(item, Verb | Being | Correction)), len(clause))
+    said = spoken_words([mark, verb, *clause[:end]]).replace(" n't", "n't")
+    return RefusalError(f"I cannot keep to {said!r}; say only what I am to do", [said])
+
+
+def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> bool:
+    """Whether what follows is to be done in place of what was negated: going for going, handling for handling.
+
+    Where nothing was asked for before, what is not to be handled is simply left alone.
+    """
+    after = next((item for item in rest if isinstance(item, Verb)), None)
+    goes = negated.kinds == {VerbKind.GO}
+    first = not goes and not any(isinstance(item, Verb) for item in done)
+    return after is not None and (first or goes == (after.kinds == {VerbKind.GO}))
+
+
+def _meant_instead(negated: Chunk, mark: Negation, done: Sequence[Item], rest: Sequence[Item]) -> bool:
+    """Whether something else is said in the place of what was negated: "the milk, not the juice"."""
+    if negated.role is not None and mark.word.startswith(_CONTRAST):
+        return False
+    before = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), 0)
+    meant = [item for item in (*done[before:], *rest) if _corrects(negated, item)]
+    told = (item.phrase.content for item in meant if isinstance(item, Chunk))
+    return bool(meant) and (not negated.phrase.stands_for_one or any(len(words) > 1 for words in told))
 
 
 def _behind_clause(ahead: list[Item]) -> list[Item]:

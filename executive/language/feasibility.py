@@ -12,17 +12,22 @@ from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 from executive.language.reference import ResolvedAction
 from executive.language.roles import HERE, Location
+from executive.mission.errors import listing
 from executive.mission.knowledge import Knowledge
 
 __all__ = ["check_feasible", "not_understood"]
 
 
 def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | None) -> None:
-    """Refuse to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
+    """Refuse odd numbers, to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
 
     Raises:
         RefusalError: any action is out of reach; it names all that is.
     """
+    counted = (phrase for d in actions for phrase in (d.target, d.time) if phrase is not None)
+    odd = [number for phrase in counted if (number := phrase.odd_number)]
+    if odd:
+        raise RefusalError(f"{listing(map(repr, odd))} is no number of things; say how many in one whole number", odd)
     shared = [
         d.goal.phrase.spoken for d in actions if d.goal is not None and d.goal.phrase is not None and _serves_all(d)
     ]
@@ -31,6 +36,10 @@ def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | Non
     people = [f"{d.verb} {d.target.text}" for d in actions if _carries(d) and d.target is not None and d.target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
+    finds = (d.target for d in actions if d.kind is VerbKind.FIND and d.target is not None)
+    sought = [phrase.spoken for phrase in finds if _anyone(phrase)]
+    if sought and knowledge is not None:
+        raise RefusalError(f"I can look for things, not for people like {listing(map(repr, sought))}", sought)
     moved = [action.target for action in actions if _moved(action)]
     outside = [(part, part) for action in actions for part in _outside(action, action.target in moved)]
     if outside:
@@ -57,7 +66,7 @@ def _serves_all(action: ResolvedAction) -> bool:
 
 
 def _carries(action: ResolvedAction) -> bool:
-    return action.kind not in (VerbKind.GO, VerbKind.FIND)
+    return action.kind not in (VerbKind.GO, VerbKind.FIND, VerbKind.WAIT, VerbKind.CHARGE)
 
 
 _BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "bring over", "carry over", "hand"})
@@ -113,6 +122,11 @@ def _holdable(phrase: Phrase, action: ResolvedAction) -> bool:
     if called or (action.kind is not VerbKind.FIND and _fixture(phrase)):
         return False
     return not _light(phrase, action) and (phrase.kind is None or phrase.kind.within_reach)
+
+
+def _anyone(phrase: Phrase) -> bool:
+    """Whether it is somebody, or any person at all ("is anybody in the hall")."""
+    return phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
 
 
 def _anybody(phrase: Phrase) -> bool:

@@ -14,13 +14,14 @@ from executive.language.command_frames import CommandFrame
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.questions import ClarifyingQuestion, RefusalError, Slot, perhaps, which
+from executive.language.relations import check_relation
 from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.mission.command import Command, Task, Thing
 from executive.mission.errors import listing
-from executive.mission.knowledge import Knowledge
+from executive.mission.knowledge import ANYTHING, Knowledge
 
-__all__ = ["Grounded", "ground", "ground_noted", "known_line"]
+__all__ = ["Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Grounded:
 
 def known_line(knowledge: Knowledge | None) -> str:
     """What can be asked for and where one can be sent, in one line."""
-    able = "I can fetch, take, put and find things, and go to places"
+    able = "I can fetch, take, put and find things, go to places, wait and charge"
     if knowledge is None:
         return able
     return f"{able}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
@@ -57,6 +58,19 @@ def ground_noted(frames: Sequence[CommandFrame], knowledge: Knowledge, facts: Wo
     return Grounded(commands, tuple(dict.fromkeys(grounder.notes)))
 
 
+def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> None:
+    """Refuse to leave out one kind among several that a command takes: "a drink, but not a beer".
+
+    Raises RefusalError.
+    """
+    for phrase in unwanted:
+        names = filter(None, (knowledge.thing(form) for _, form in _readings(phrase)))
+        kinds = {kind for name in names for kind in knowledge.classes(name)}
+        things = (thing for command in commands for thing in (command.object, command.item) if thing is not None)
+        if any(not thing.attributes and kinds & {*knowledge.classes(thing.name)} for thing in things):
+            raise RefusalError(f"I cannot keep to 'not {phrase.spoken}'; name what I am to take", [phrase.spoken])
+
+
 @dataclass
 class _Grounder:
     """Looks names up in one world, and notes what it took for what."""
@@ -67,8 +81,11 @@ class _Grounder:
 
     def command(self, frame: CommandFrame) -> Command:
         """One frame as a command."""
-        item, target = (None if phrase is None else self.thing(phrase) for phrase in (frame.item, frame.object))
-        goal, goal_at = (None, None) if frame.goal is None else self.goal(frame.goal)
+        item = None if frame.item is None else self.thing(frame.item)
+        target = None if frame.object is None else self.target(frame.object, frame.task)
+        if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
+            raise RefusalError(f"which object? Known are {listing(self.knowledge.thing_names())}", [target.name])
+        goal, goal_at = (None, None) if frame.goal is None else self._kept_goal(frame, frame.goal)
         if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
             goal = self.knowledge.default_place(frame.task, target.name)
         return Command(
@@ -81,6 +98,22 @@ class _Grounder:
             object_count=1 if frame.object is None else frame.object.count,
             verb=frame.verb,
         )
+
+    def target(self, phrase: Phrase, task: Task | None) -> Thing:
+        """What a task is done to: a known thing, or a time."""
+        return Thing(phrase.head.lemma) if task is Task.WAIT else self.thing(phrase)
+
+    def _kept_goal(self, frame: CommandFrame, location: Location) -> tuple[str, str | None]:
+        """The frame's goal, whose relation the command keeps."""
+        looks = frame.task in (Task.GRASP, Task.FIND)
+        if looks and location == HERE:
+            raise RefusalError("I take and find things on surfaces: name a place", [HERE.name])
+        act = "look" if looks else "go" if frame.item is None else "bring"
+        check_relation(act, _KINDS, location)
+        goal, goal_at = self.goal(location)
+        own = (goal in self.knowledge.places, goal in self.knowledge.surfaces, True)
+        check_relation(act, [kind for kind, fits in zip(_KINDS, own, strict=True) if fits][:1], location)
+        return goal, goal_at
 
     def thing(self, phrase: Phrase) -> Thing:
         """The known thing or category, with the adjectives before it."""
@@ -113,10 +146,15 @@ class _Grounder:
         """
         if location.phrase is None:
             raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
+        if location.phrase.said_count not in (None, 1):
+            raise RefusalError(
+                f"I go to one place at a time, not to {location.phrase.spoken!r}", [location.phrase.spoken]
+            )
         known = _spellings(self.knowledge, self.knowledge.place_names())
         room = self._room(location)
-        candidates = self._places(location.phrase, room, known)
-        inside = [name for name in candidates if room in (None, name, self.knowledge.room(name))]
+        candidates = self._any_place(location.phrase) or self._places(location.phrase, room, known)
+        fitting = (name for name in candidates if room in (None, name, self.knowledge.room(name)))
+        inside = [name for name in fitting if not self._left_over(location.phrase, name)]
         if not inside:
             raise self._unknown(Slot.PLACE, (location.phrase.text, location.phrase.singular), known)
         return self._only(inside, Slot.PLACE, Phrase(location.phrase.tokens).text)
@@ -148,6 +186,20 @@ class _Grounder:
         other = [name for spelling, name in known.items() if _last(spelling) in nouns]
         called = [name for spelling, name in known.items() if any(_last(word) in nouns for word in words_for(spelling))]
         return list(dict.fromkeys([*own, *other, *called] if room is not None else own or other))
+
+    def _any_place(self, phrase: Phrase) -> Sequence[str]:
+        """What a word for any place may mean ("the room", "a surface"); nothing for the name of a certain one."""
+        groups = {"room": tuple(self.knowledge.places), "surface": tuple(self.knowledge.surfaces)}
+        named = len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None
+        return () if named else groups.get(phrase.head.lemma, ())
+
+    def _left_over(self, phrase: Phrase, name: str) -> bool:
+        """Whether something was said of a place that neither its names nor its room's account for ("kitchen 3")."""
+        extra: tuple[str, ...] = () if phrase.extra[:1] == ("of",) else phrase.extra
+        said = {word for part in (*(t.word for t in phrase.content[:-1]), *extra) for word in part.lower().split()}
+        spellings = self.knowledge.spellings([name, self.knowledge.room(name)])
+        known = (other for spelling in spellings for other in (spelling, *words_for(spelling)))
+        return not said <= {word.lower() for other in known for word in other.split()}
 
     def _person(self, phrase: Phrase) -> str | None:
         """The known person; None when the words mean nobody."""
@@ -224,4 +276,5 @@ def _around(location: Location) -> str | None:
     return " ".join(extra[1:]) if extra[:1] == ("of",) else None
 
 
+_KINDS: Final = ("room", "surface", "person")
 _PLURALS: Final = {Slot.THING: "things", Slot.PLACE: "places", Slot.PERSON: "people", Slot.GOAL: "places"}

@@ -26,6 +26,8 @@ class VerbKind(enum.Enum):
     FIND = "find"  # look for a thing
     GO = "go"  # go somewhere
     CHECK = "check"  # see whether something is so
+    WAIT = "wait"  # stay for a time
+    CHARGE = "charge"  # charge the battery at the dock
 
 
 class PrepositionRole(enum.Enum):
@@ -73,6 +75,7 @@ class Lexicon:
     there: frozenset[str]
     people: frozenset[str]
     everyone: frozenset[str]
+    anyone: frozenset[str]
     directions: frozenset[str]
     worn: frozenset[str]
     quantities: frozenset[str]
@@ -80,6 +83,9 @@ class Lexicon:
     somebody: frozenset[str]
     subjects: frozenset[str]
     asks: frozenset[str]
+    asked_with: frozenset[str]
+    fullness: frozenset[str]
+    manners: frozenset[str]
     told: frozenset[str]
     negations: frozenset[Phrase]
     corrections: Mapping[Phrase, bool]
@@ -92,7 +98,10 @@ class Lexicon:
     calls: frozenset[str]
     titles: frozenset[str]
     units: frozenset[str]
+    docks: frozenset[str]
     vague_numbers: frozenset[str]
+    no_numbers: frozenset[str]
+    loose_numbers: frozenset[str]
     definite: frozenset[str]
     numbers: Mapping[str, int]
 

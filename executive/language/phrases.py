@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import Final
 
 from executive.language.lexicon import lexicon
@@ -75,11 +77,19 @@ class Phrase:
     @property
     def said_count(self) -> int | None:
         """The number said, if any; that of "one" and "two" standing alone, too."""
-        words = self.tokens if self.counts else self._counting()
-        said = next((n for n in map(_number, words) if n is not None), None)
+        said = next((_value(numeral) for numeral in self._numerals()), None)
         if said is None and self.plural and self.tokens[0].word == "both":
             said = 2
         return said if self.numbered is None else self.numbered
+
+    @property
+    def odd_number(self) -> str | None:
+        """The words of a number that is none of things: "one two three", "zero", "infinity", "2.5", "at least two"."""
+        odd = next((numeral for numeral in self._numerals() if not _value(numeral)), None)
+        left = self.tokens[:-1]
+        words = [t.text for t in odd or (t for t in left if t.word in lexicon().no_numbers)]
+        loose = any(t.word in lexicon().loose_numbers for t in left) and any(self._numerals())
+        return " ".join(t.text for t in left) if loose else " ".join(words) or None
 
     @property
     def pronoun(self) -> bool:
@@ -230,6 +240,13 @@ class Phrase:
         """The words before the noun among which a count may be; that of a measure is none ("ten inch nails")."""
         return tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
 
+    def _numerals(self) -> Iterator[tuple[Token, ...]]:
+        """The numbers that count, each in its words side by side."""
+        words = self.tokens if self.counts else self._counting()
+        for numeral, run in groupby(words, key=_is_numeral):
+            if numeral:
+                yield tuple(run)
+
     def _measures(self, at: int) -> bool:
         """Whether the number there belongs to a unit of measure."""
         return (
@@ -243,6 +260,9 @@ _ENDS: Final = frozenset({"end", "start", "beginning", "middle"})
 _POINTING: Final = frozenset({"that", "this", "these", "those"})
 _ALL: Final = "all"
 _ONE: Final = frozenset({"one", "ones"})
+_DIGITS: Final = re.compile(r"-?\d+(?:[.,]\d+)?")
+_DOZEN: Final = "dozen"
+_TENS: Final = frozenset(range(20, 100, 10))
 
 
 def _joined_text(words: Sequence[Token | str]) -> str:
@@ -258,6 +278,22 @@ def _is_determiner(token: Token) -> bool:
     said_number = _number(token) is not None or token.word in lexicon().vague_numbers
     said_number = said_number or token.word in _POINTING
     return said_number or token.pos == "DET" or token.tag in ("PRP$", "DT", "PDT", "POS", "WP$") or token.text == "-"
+
+
+def _is_numeral(token: Token) -> bool:
+    return _number(token) is not None or token.tag == "CD" or _DIGITS.fullmatch(token.text) is not None
+
+
+def _value(numeral: Sequence[Token]) -> int | None:
+    """The number that words side by side make: "twenty one", "two dozen"; None for any others."""
+    first, *rest = map(_number, numeral)
+    if first is None or not rest:
+        return first
+    if len(rest) > 1 or rest[0] is None:
+        return None
+    if numeral[1].word == _DOZEN:
+        return first * rest[0]
+    return first + rest[0] if first in _TENS and 0 < rest[0] < 10 and first != rest[0] else None
 
 
 def _number(token: Token) -> int | None:

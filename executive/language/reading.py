@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -24,7 +25,7 @@ from executive.language.lexicon import Lexicon, PrepositionRole, VerbKind
 from executive.language.nouns import NounKind
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
-from executive.language.question_parsing import how_many, where_is
+from executive.language.question_parsing import do_we_have, how_many, what_is, where_is
 from executive.language.row import LONGEST, Row, command_position
 from executive.language.statements import belongs, goes_on, narrated, needed, told
 
@@ -32,7 +33,6 @@ __all__ = ["split_items"]
 
 _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
-_TIMES: Final = frozenset({"early", "hourly", "daily", "nightly", "weekly", "monthly", "yearly", "annually"})
 _HAVING: Final = frozenset({"with", "containing", "holding"})
 _WITHIN: Final = frozenset({"in", "on"})
 _INSIDE: Final = "inside"
@@ -43,6 +43,8 @@ _SIDES: Final = frozenset({"left", "right"})
 _SHOWN: Final = frozenset({"that", "this", "those", "these"})
 _WHO: Final = frozenset({"who", "that", "which"})
 _IS: Final = frozenset({"is", "'s", "are", "'re"})
+_OF_ALL: Final = re.compile(r"all|none|(?:any|every|no)(?:where|one|body|thing)")
+"""Behind these "but" means "except"."""
 
 
 class _Reader(Row):
@@ -52,7 +54,10 @@ class _Reader(Row):
         """The items of the row in order; the first way of reading that fits takes its words."""
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
-            *(partial(step, self) for step in (where_is, how_many, told, narrated, needed, belongs, goes_on)),
+            *(
+                partial(step, self)
+                for step in (where_is, how_many, what_is, do_we_have, told, narrated, needed, belongs, goes_on)
+            ),
             self._verb,
             self._being,
             self._chunk,
@@ -263,7 +268,7 @@ class _Reader(Row):
         if self._purpose(items) or (not items and token.word in _AFTER and behind and behind[0].tag == "VBG"):
             self.at += 1
             return Separator("")
-        if token.tag == "RB" and token.word.endswith("ly") and token.word not in _TIMES:
+        if token.tag == "RB" and token.word in self.words.manners:
             self.at += 1
             return Separator(token.word)
         if token.pos in ("ADP", "ADV") and token.word not in _FROM and behind and behind[0].word in ("here", "there"):
@@ -278,6 +283,8 @@ class _Reader(Row):
         if token.word in ("if", "whether"):
             self.at += 1
             return Whether()
+        if token.word == "but" and self.at > 0 and _OF_ALL.fullmatch(self.tokens[self.at - 1].word):
+            return None
         filler = self._particle(items) or self.match(self.words.fillers)
         if filler is None:
             return None

@@ -21,7 +21,10 @@ _SEVERAL: Final = frozenset({"them", "they", "these", "those"})
 
 @dataclass(frozen=True)
 class ResolvedAction:
-    """An action on one thing at most, without pronouns; `again` says that the thing was spoken of before."""
+    """An action on one thing at most, without pronouns; `again` says that the thing was spoken of before.
+
+    `time` is how long it is to be waited.
+    """
 
     kind: VerbKind
     verb: str
@@ -29,6 +32,7 @@ class ResolvedAction:
     source: Location | None = None
     goal: Location | None = None
     again: bool = False
+    time: Phrase | None = None
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,13 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
     looks = kind is not VerbKind.GO
     actions = (
         ResolvedAction(
-            kind, action.verb, thing, source or (memory.where_is(thing) if thing and looks else None), goal, same
+            kind=kind,
+            verb=action.verb,
+            target=thing,
+            source=source or (memory.where_is(thing) if thing and looks else None),
+            goal=goal,
+            again=same,
+            time=action.time,
         )
         for thing in things or (None,)
         for same in [again or (thing is not None and thing not in meant)]
@@ -199,8 +209,8 @@ def _place(place: Location | None, memory: Memory) -> Location | None:
         return place
     meant = memory.person if phrase is not None and phrase.stands_for_somebody and memory.person else memory.place
     if phrase is not None and phrase.person:
-        return memory.person or place
+        return place if memory.person is None else replace(memory.person, preposition=place.preposition)
     if meant is None:
         word = THERE.preposition if phrase is None else phrase.text
         raise RefusalError(f"which place is {word!r}?", [word], question=True)
-    return meant
+    return meant if phrase is None or meant.phrase is None else replace(meant, preposition=place.preposition)

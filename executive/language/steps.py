@@ -9,11 +9,12 @@ from typing import Final
 from executive.language.actions import Action, read_actions
 from executive.language.clauses import Clause, split_clauses, without_name
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
-from executive.language.disfluency import repair_disfluencies
+from executive.language.disfluency import repair_disfluencies, unwanted_things
 from executive.language.feasibility import check_feasible, not_understood
-from executive.language.grounding import ground_noted, known_line
+from executive.language.grounding import check_unwanted, ground_noted, known_line
+from executive.language.harm import refuse_harm
 from executive.language.items import Item
-from executive.language.lexicon import lexicon
+from executive.language.lexicon import VerbKind, lexicon
 from executive.language.names import name_table, parse_with_names
 from executive.language.normalise import MAX_CHARACTERS, MAX_WORDS
 from executive.language.nouns import NounKind
@@ -22,6 +23,7 @@ from executive.language.phrases import Phrase, noun_phrases
 from executive.language.questions import RefusalError, Slot, which
 from executive.language.reading import split_items
 from executive.language.reference import Memory, ResolvedAction, resolve
+from executive.language.relations import check_ways_and_speaker
 from executive.language.rephrasing import rephrased
 from executive.language.similar import WordFacts
 from executive.mission.command import Command, is_attribute
@@ -35,14 +37,16 @@ __all__ = ["Trace", "trace_sentence"]
 class Trace:
     """What each step made of a sentence, in the order of the fields; steps behind a refusal are empty.
 
-    `meanings` are pronouns with what each stood for, `notes` say which name was taken for which. `refused_at` names
-    the step that refused. `memory` is what was spoken of before, and afterwards what was spoken of last.
+    `unwanted` is what stands behind "not", `meanings` are pronouns with what each stood for, `notes` say which name was
+    taken for which. `refused_at` names the step that refused. `memory` is what was spoken of before, and afterwards
+    what was spoken of last.
     """
 
     text: str
     opened: str = ""
     tokens: tuple[Token, ...] = ()
     items: tuple[Item, ...] = ()
+    unwanted: tuple[Phrase, ...] = ()
     clauses: tuple[Clause, ...] = ()
     actions: tuple[Action, ...] = ()
     resolved: tuple[ResolvedAction, ...] = ()
@@ -92,13 +96,15 @@ def _parse(trace: Trace, context: _Context) -> Trace:
 
 
 def _read(trace: Trace, _: _Context) -> Trace:
-    return replace(trace, items=repair_disfluencies(split_items(trace.tokens, noun_phrases(trace.tokens), lexicon())))
+    items = split_items(trace.tokens, noun_phrases(trace.tokens), lexicon())
+    return replace(trace, items=repair_disfluencies(items), unwanted=unwanted_things(items))
 
 
 def _split(trace: Trace, context: _Context) -> Trace:
     clauses = split_clauses(trace.items)
     if not clauses:
         raise RefusalError(f"nothing was said; {known_line(context.knowledge)}")
+    refuse_harm(clauses)
     return replace(trace, clauses=clauses if context.knowledge else without_name(clauses))
 
 
@@ -111,12 +117,15 @@ def _check(trace: Trace, context: _Context) -> Trace:
     unknown = [(word, action.said) for action in trace.actions for word in action.unknown]
     if unknown:
         raise not_understood(unknown, context.knowledge)
-    choices = [choice for action in trace.actions for choice in action.choices]
-    for choice in choices:
-        if not _any_will_do(choice):
+    asked = [(choice, action.kind) for action in trace.actions for choice in action.choices]
+    choices = [choice for choice, _ in asked]
+    for choice, kind in asked:
+        if kind is VerbKind.FIND or not _any_will_do(choice):
             raise _choosing(choice, trace.tokens)
     notes = [f"of {listing((p.spoken for p in choice), last='or')} I take the first" for choice in choices]
     trace = replace(trace, notes=(*trace.notes, *notes))
+    if context.knowledge is not None:
+        check_ways_and_speaker(trace.clauses, trace.actions)
     if not any(action.kind for action in trace.actions):
         told = [phrase.text for action in trace.actions for phrase in action.objects]
         of = f" of {listing(told)}" if told else ""
@@ -159,6 +168,7 @@ def _command(trace: Trace, context: _Context) -> Trace:
         return replace(trace, commands=tuple(map(spoken_command, trace.frames)))
     facts = context.parser if isinstance(context.parser, WordFacts) else None
     grounded = ground_noted(trace.frames, context.knowledge, facts)
+    check_unwanted(trace.unwanted, grounded.commands, context.knowledge)
     return replace(trace, commands=grounded.commands, notes=(*trace.notes, *grounded.notes))
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from executive.language.foreign import foreign_reason
-from executive.language.normalise import clean
+from executive.language.normalise import clean, placeholder
 from executive.language.parser import DependencyParser
-from executive.language.questions import Answerer, ClarifyingQuestion, with_answer
+from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, with_answer
 from executive.language.reference import Memory
 from executive.language.similar import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
@@ -90,6 +90,10 @@ def understand(
     if require_wake and not wake.addressed:
         reason = f'the robot\'s name was not said; begin with "Hey {name}"'
         return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
+    if (blank := placeholder(sentence)) is not None:
+        odd = RefusalError(f"{blank!r} is no word; say it in words", [blank])
+        trace = Trace(sentence, refusal=odd, refused_at="cleaning")
+        return Understanding(sentence, Status.REFUSED, (), odd.reason, odd.unknown, trace=trace)
     facts = parser if isinstance(parser, WordFacts) else None
     corrected = Corrected(wake.text)
     if correct and knowledge is not None and facts is not None:

@@ -14,7 +14,17 @@ from typing import Any, Final
 
 from skills.api import Thing
 
-__all__ = ["START", "Command", "Task", "Thing", "is_attribute", "may_be_attribute", "parse_command", "thing"]
+__all__ = [
+    "START",
+    "TIME_UNITS_S",
+    "Command",
+    "Task",
+    "Thing",
+    "is_attribute",
+    "may_be_attribute",
+    "parse_command",
+    "thing",
+]
 
 _ATTRIBUTE: Final = re.compile(
     r"red|green|blue|yellow|orange|white|black|gr[ae]y|brown|pink|purple|violet|silver|golden|dark|bright|light"
@@ -25,6 +35,8 @@ _ATTRIBUTE: Final = re.compile(
 _NOTHING: Final = "Nothing"
 START: Final = "start"
 """The goal that is where the robot stood when it was spoken to."""
+TIME_UNITS_S: Final = {"second": 1.0, "seconds": 1.0, "minute": 60.0, "minutes": 60.0, "hour": 3600.0, "hours": 3600.0}
+"""What a command to wait takes as its object, counted: "do [wait] to [10 second]"."""
 _PLURAL: Final = "some"
 _RESERVED: Final = re.compile(r'[\[\]"]|^\s|\s$|\s\s|[^\S ]|^$')
 _NO_ATTRIBUTE: Final = re.compile(rf"\d+|{_PLURAL}|.*\s.*")
@@ -34,11 +46,13 @@ _THING: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+))'
 
 
 class Task(enum.Enum):
-    """What to do to the object at the goal."""
+    """What to do to the object at the goal; to wait takes a time as its object, to charge nothing."""
 
     GRASP = "grasp"
     FIND = "find"
     PLACE = "place"
+    WAIT = "wait"
+    CHARGE = "charge"
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,11 @@ class GoalCondition:
     wanted: str = ""
 
 
-def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition:
-    """The condition of a command; `elsewhere` are more surfaces from which its thing may be taken."""
+def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition | None:
+    """The condition of a command; `elsewhere` are more surfaces from which its thing may be taken.
+
+    Waiting where the robot stands has none.
+    """
     return _GOALS[command.task](command, knowledge, tuple(elsewhere))
 
 
@@ -120,6 +123,14 @@ def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) ->
     return GoalCondition(GoalKind.WENT, goal=(_place_area(knowledge, command.goal),))
 
 
+def _waited(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition | None:
+    return None if command.goal is None else _went(command, knowledge, elsewhere)
+
+
+def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondition:
+    return GoalCondition(GoalKind.WENT, goal=(_square("the dock", knowledge.dock, POSE_NEAR_M),))
+
+
 def _place_area(knowledge: Knowledge, goal: str) -> Area:
     """A room's outline; for a surface or the start a square about where the robot is to stand."""
     person = knowledge.person(goal)
@@ -134,6 +145,14 @@ def _square(name: str, pose: Pose, near_m: float = NEAR_M) -> Area:
     return Area(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
 
 
-_GOALS: Final[Mapping[Task | None, Callable[[Command, Knowledge, tuple[str, ...]], GoalCondition]]] = MappingProxyType(
-    {Task.GRASP: _grasped, Task.FIND: _answered, Task.PLACE: _carried, None: _went}
+_Goal = Callable[[Command, Knowledge, tuple[str, ...]], GoalCondition | None]
+_GOALS: Final[Mapping[Task | None, _Goal]] = MappingProxyType(
+    {
+        Task.GRASP: _grasped,
+        Task.FIND: _answered,
+        Task.PLACE: _carried,
+        Task.WAIT: _waited,
+        Task.CHARGE: _charged,
+        None: _went,
+    }
 )

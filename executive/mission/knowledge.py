@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -14,6 +14,7 @@ from executive.mission.yaml_source import YamlSource, read_yaml, validate
 from skills.perception.class_forms import class_forms
 
 __all__ = [
+    "ANYTHING",
     "BatteryFacts",
     "Knowledge",
     "Person",
@@ -26,6 +27,9 @@ __all__ = [
     "load_knowledge",
 ]
 
+ANYTHING: Final = "object"
+"""The name that stands for every class of things."""
+_ANYTHING: Final = frozenset({ANYTHING, "thing", "item"})
 Corner = tuple[float, float]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 
@@ -129,11 +133,14 @@ class Knowledge(_Facts):
 
     def thing(self, name: str) -> str | None:
         """The class or category that `name` means, by its own name; None when unknown."""
-        return _resolve(name, self.things) or next((c for c in self.categories() if c.lower() == name.lower()), None)
+        own = _resolve(name, self.things) or next((c for c in self.categories() if c.lower() == name.lower()), None)
+        return own or (ANYTHING if name.lower() in _ANYTHING else None)
 
     def classes(self, name: str) -> tuple[str, ...]:
         """The classes that a class, alias or category stands for, in the file's order; empty when unknown."""
         known = _resolve(name, self.things)
+        if known is None and self.thing(name) == ANYTHING:
+            return tuple(self.things)
         return (known,) if known else tuple(c for c, facts in self.things.items() if name.lower() in facts.categories)
 
     def categories(self) -> tuple[str, ...]:

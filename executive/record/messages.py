@@ -23,7 +23,8 @@ class TaskMessage:
 
     Types are class ids, several where a category was asked for ("drink"); 0 is Nothing. `goal_x`, `goal_y` are in the
     world frame (m), NaN where the goal was left open. `mission_count` says how many commands the mission has,
-    `task_count` which of them this is, from 1. `cmd_type`: 0 go or take, 1 grasp, 2 find, 3 place.
+    `task_count` which of them this is, from 1. `cmd_type`: 0 go or take, 1 grasp, 2 find, 3 place, 4 wait,
+    5 charge.
     """
 
     stamp: float

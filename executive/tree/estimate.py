@@ -207,6 +207,7 @@ def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
 
 _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "skill": _skill,
+    "pause": lambda node, walk, first: Estimate(node.options["duration_s"]),
     "remember": _remember,
     "selector": _first_of,
     "round": _all_that_can,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from executive.mission.command import START, Command, Thing, parse_command
+from executive.mission.command import START, TIME_UNITS_S, Command, Task, Thing, parse_command
 from executive.mission.errors import InputError, Problems, listing, suggestion
 from executive.mission.file.model import KeyPath
 from executive.mission.file.schema import MissionFile
@@ -37,7 +37,8 @@ def typed_command(file: MissionFile, index: int, knowledge: Knowledge) -> Comman
 
 
 def _unknown_names(file: MissionFile, path: KeyPath, command: Command, knowledge: Knowledge) -> Iterator[InputError]:
-    for key, thing in (("take", command.item), ("object", command.object)):
+    waits = command.task is Task.WAIT and command.object is not None and command.object.name in TIME_UNITS_S
+    for key, thing in (("take", command.item), ("object", None if waits else command.object)):
         if thing is not None and knowledge.thing(thing.name) is None:
             yield _unknown(file, (*path, key), "thing", thing.name, knowledge.thing_names(), knowledge)
     goals = (*knowledge.place_names(), *knowledge.people, START)

@@ -133,7 +133,7 @@ class StepFile(PolicyFile):
             raise ValueError(f"a step has either '{forms[0]}' or {listing([*forms[1:], *parts])}, not both")
         if not forms and not parts:
             raise ValueError(f"the step is empty: give it {FORMS}")
-        if (self.do is None) != (self.object is None):
+        if self.do is not Task.CHARGE and (self.do is None) != (self.object is None):
             raise ValueError("'do' and 'object' go together")
         if self.with_ is not None and self.skill is None and self.use is None:
             raise ValueError("'with' goes with 'skill' or 'use'")

@@ -45,7 +45,7 @@ def _battery_plan(builder: PlanBuilder) -> NodeSpec:
         f"charge to {facts.charged:.0%}",
         builder.node("remember", "where it was", part="remember", key=key),
         builder.skill("stow"),
-        _dock_plan(builder.at("dock"), dock, facts.charged),
+        dock_plan(builder.at("dock"), dock, facts.charged),
         builder.at("back").navigate(FromBoard(key)),
     )
     return builder.node(
@@ -59,7 +59,7 @@ def _battery_plan(builder: PlanBuilder) -> NodeSpec:
     )
 
 
-def _dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
+def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
     """Stand on the dock and charge; where it does not charge, back off and dock again."""
     charge = builder.skill("charge", {"level": level})
     attempt = builder.at("attempt").sequence("dock and charge", builder.navigate(dock, exactly=True), charge)

@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from executive.mission.command import START, Task, Thing
+from executive.mission.command import START, TIME_UNITS_S, Task, Thing
 from executive.mission.geometry import inside
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.compiling.handling import go_near_plan, held_plan, pick_up_plan, tidied, tuck_plan, unless_dropped
+from executive.tree.compiling.interrupts import dock_plan
 from executive.tree.compiling.search import (
     look_plans,
     required_surfaces,
@@ -24,6 +25,8 @@ from executive.tree.compiling.search import (
 from executive.tree.node import NodeSpec
 from skills.detect.words import numbered, plural
 from skills.robot import Pose2D
+
+LONGEST_WAIT_S: Final = 3600.0
 
 
 def step_plan(builder: PlanBuilder) -> NodeSpec:
@@ -121,6 +124,33 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
     return builder.sequence(f"go to {command.goal}", go_near_plan(builder, _goal_pose(builder, command.goal)))
 
 
+def wait_plan(builder: PlanBuilder) -> NodeSpec:
+    """Go to the place, where one is named, and wait there for a time.
+
+    Raises InputError: it is no time, or too long a one.
+    """
+    command = builder.command
+    if command.item is not None:
+        raise builder.error(f"the {command.item} cannot be carried by waiting", "take it there in a step of its own")
+    unit = TIME_UNITS_S.get("" if command.object is None else command.object.name)
+    duration_s = 0.0 if unit is None else unit * command.object_count
+    if not 0.0 < duration_s <= LONGEST_WAIT_S:
+        raise builder.error("it is not said for how long to wait", 'name a time up to an hour, such as "10 seconds"')
+    pause = builder.pause("wait", f"wait {duration_s:g} s", duration_s)
+    if command.goal is None:
+        return builder.sequence("wait here", pause)
+    goal = _goal_pose(builder, command.goal)
+    return builder.sequence(f"wait at {command.goal}", go_near_plan(builder, goal), pause)
+
+
+def charge_plan(builder: PlanBuilder) -> NodeSpec:
+    """Go to the dock and charge there. Raises InputError: anything else is said with it."""
+    command, facts = builder.command, builder.knowledge
+    if any(part is not None for part in (command.item, command.goal, command.object)):
+        raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")
+    return dock_plan(builder, pose_2d(facts.dock), facts.battery.charged)
+
+
 def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
     """Where to stand to meet a person: the pose of the place where they are, turned to them when that is known."""
     facts = builder.knowledge.people[person]
@@ -197,5 +227,7 @@ _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {
     Task.GRASP: grasp_plan,
     Task.FIND: find_plan,
     Task.PLACE: carry_plan,
+    Task.WAIT: wait_plan,
+    Task.CHARGE: charge_plan,
     None: go_plan,
 }

@@ -51,12 +51,12 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
 
 
 def refuse_several(builder: PlanBuilder) -> None:
-    """Refuse a count that no trips are made of; in a question any count will do.
+    """Refuse a count that no trips are made of; in a question and of a time any count will do.
 
     Raises InputError: more than one object, or an open number of objects.
     """
     command = builder.command
-    asked = 1 if command.task is Task.FIND else command.object_count
+    asked = 1 if command.task in (Task.FIND, Task.WAIT) else command.object_count
     for thing, count in ((command.item, command.item_count), (command.object, asked)):
         if count != 1:
             said = f"{count} of '{thing}'" if count else f"an open number of '{thing}'"

@@ -70,6 +70,14 @@ def test_each_step_keeps_its_line(load):
     assert {step.source.file.name for step in mission.steps} == {"mission.yaml"}
 
 
+def test_waiting_takes_a_time_and_charging_nothing(load):
+    mission = load('name: go\nsteps:\n  - {to: hall, do: wait, object: "10 second"}\n  - do: charge\n')
+    assert [str(command) for command in mission.commands] == [
+        "Take [Nothing] to [hall] and do [wait] to [10 second]",
+        "Take [Nothing] to [Nothing] and do [charge] to [Nothing]",
+    ]
+
+
 def test_world_and_robot_have_defaults(load):
     mission = load("name: go\nsteps:\n  - {to: kitchen}\n")
     assert (mission.world, mission.robot_name) == ("flat", "Alice")
@@ -86,7 +94,7 @@ def test_a_sentence_may_begin_with_the_missions_own_robot(load):
         ("world:", "wrold:", 2, "unknown key 'wrold'; did you mean 'world'?"),
         ("    object: 2", "    objekt: 2", 10, "unknown key 'objekt'; did you mean 'object'?"),
         ("name: tidy up\n", "", 1, "key 'name' is missing in the file; add 'name'"),
-        ("do: grasp", "do: juggle", 9, "'grasp', 'find' or 'place'"),
+        ("do: grasp", "do: juggle", 9, "'grasp', 'find', 'place', 'wait' or 'charge'"),
         ("    object: 2 red spanner\n", "", 8, "'do' and 'object' go together"),
         ("{to: lounge}", "{to: lunge}", 7, "unknown place or person 'lunge'; did you mean 'lounge'?"),
         ("{to: lounge}", "{to: moon base}", 7, "known are hall, kitchen"),

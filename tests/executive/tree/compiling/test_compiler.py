@@ -247,3 +247,64 @@ def test_an_absent_skill_and_an_empty_mission_are_refused(knowledge, registry):
 
 def test_a_mission_of_a_hundred_steps_compiles(compiled, make):
     assert len(compiled(*(make.FETCH * 50)).mission.children) == 101
+
+
+WAIT = "Take [Nothing] to [{}] and do [wait] to [{}]"
+CHARGE = "Take [Nothing] to [Nothing] and do [charge] to [Nothing]"
+
+
+@pytest.mark.parametrize(("time", "duration_s"), [("10 second", 10.0), ("minute", 60.0), ("2 minutes", 120.0)])
+def test_waiting_takes_its_time(compiled, time, duration_s):
+    (pause,) = [node for node in followed(compiled(WAIT.format("Nothing", time)).mission) if node.kind == "pause"]
+    assert pause.options["duration_s"] == duration_s
+
+
+def test_waiting_in_a_place_goes_there_first(compiled, run_tree, script):
+    tree = compiled(WAIT.format("kitchen", "10 second"))
+    kinds = [node.kind for node in followed(tree.mission) if node.kind in ("skill", "pause")]
+    assert kinds == ["skill", "pause"]
+    assert run_tree(tree).outcome is Outcome.SUCCESS
+    assert script.begun == ["navigate"]
+
+
+@pytest.mark.parametrize("time", ["some second", "2 hours", "coke"])
+def test_waiting_for_no_time_or_too_long_is_refused(compiled, time):
+    with pytest.raises(InputError, match="how long") as error:
+        compiled(WAIT.format("Nothing", time))
+    assert "10 seconds" in error.value.hint
+
+
+def test_waiting_where_it_stands_has_no_goal_condition_and_in_a_place_it_has(compiled):
+    here, there = (compiled(WAIT.format(goal, "10 second")).parts[0].goal for goal in ("Nothing", "kitchen"))
+    assert (here, there.goal[0].name) == (None, "kitchen")
+
+
+def test_charging_goes_to_the_dock_and_charges_there(compiled, knowledge):
+    tree = compiled(CHARGE)
+    navigate, charge = skills_of(tree)
+    dock = knowledge.dock
+    assert port(navigate, "goal").value == Pose2D(dock.x, dock.y, dock.yaw)
+    assert (charge.name, port(charge, "level").value) == ("charge", knowledge.battery.charged)
+    assert tree.parts[0].goal.goal[0].name == "the dock"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Take [Nothing] to [kitchen] and do [charge] to [Nothing]",
+        "Take [Nothing] to [Nothing] and do [charge] to [coke]",
+        "Take [coke] to [Nothing] and do [charge] to [Nothing]",
+        "Take [coke] to [kitchen] and do [wait] to [10 second]",
+    ],
+)
+def test_neither_charging_nor_waiting_does_more(compiled, text):
+    with pytest.raises(InputError) as error:
+        compiled(text)
+    assert error.value.hint
+
+
+def test_any_object_is_looked_for_by_all_classes(compiled, knowledge):
+    tree = compiled("Take [Nothing] to [counter] and do [find] to [some object]")
+    detects = [node for node in tree.mission.walk() if node.name == "detect"]
+    assert {port(node, "classes").value for node in detects} == {tuple(knowledge.things)}
+    assert tree.parts[0].goal.classes == tuple(knowledge.things)

@@ -14,10 +14,11 @@ from functools import cache
 from importlib.metadata import EntryPoints, entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, Protocol, get_args, get_type_hints
 
 import numpy as np
 
+from skills.quantities import range_text
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Pose2D
 
 if TYPE_CHECKING:
@@ -285,7 +286,20 @@ def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:
         return TypeAdapter(kind).validate_python(given)
     except ValidationError as error:
         first = error.errors()[0]
-        raise StackError((*path, *first["loc"]), first["msg"], f"it reads {first['input']!r} now"[:120]) from error
+        takes, now = range_text(_hint_at(kind, first["loc"])), f"it reads {first['input']!r} now"[:120]
+        raise StackError((*path, *first["loc"]), f"should be {takes}" if takes else first["msg"], now) from error
+
+
+def _hint_at(hint: Any, path: Sequence[int | str]) -> Any:
+    """The type of what stands at a path in something of type `hint`."""
+    for part in path:
+        if dataclasses.is_dataclass(hint):
+            hint = get_type_hints(hint, include_extras=True)[str(part)]
+        else:
+            items = get_args(hint)
+            hint = items[int(part)] if int(part) < len(items) and items[int(part)] is not Ellipsis else items[0]
+        hint = next((one for one in get_args(hint) if type(None) in get_args(hint) and one is not type(None)), hint)
+    return hint
 
 
 def _check_keys(path: tuple[str | int, ...], kind: type, given: Any) -> None:

@@ -12,6 +12,7 @@ from executive.mission.command import Task
 from executive.mission.errors import InputError, suggestion
 from executive.mission.yaml_source import YamlSource, read_yaml, validate
 from skills.perception.class_forms import class_forms
+from skills.quantities import Angle, Coordinate
 
 __all__ = [
     "BatteryFacts",
@@ -26,7 +27,7 @@ __all__ = [
     "load_knowledge",
 ]
 
-Corner = tuple[float, float]
+Corner = tuple[Coordinate, Coordinate]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 
 
@@ -37,9 +38,9 @@ class _Facts(BaseModel):
 class Pose(_Facts):
     """A planar pose in the world frame: x, y in metres, yaw in radians, counter-clockwise from x."""
 
-    x: float = Field(description="metres")
-    y: float = Field(description="metres")
-    yaw: float = Field(default=0.0, description="radians")
+    x: Coordinate = Field(description="metres")
+    y: Coordinate = Field(description="metres")
+    yaw: Angle = Field(default=0.0, description="radians")
 
 
 class RobotFacts(_Facts):
@@ -74,7 +75,7 @@ class SurfaceFacts(_Facts):
     """A flat top in a room: other names, height above the floor (m), outline, and poses from which it is seen whole."""
 
     place: str = Field(description="the room that it is in")
-    height: Annotated[float, Field(gt=0.0, description="of the top above the floor, m")]
+    height: Annotated[float, Field(gt=0.0, le=3.0, description="of the top above the floor, m")]
     polygon: Polygon = Field(description="outline of the top, corners (x, y)")
     viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1, description="poses from which it is seen whole")]
     aliases: tuple[str, ...] = Field(default=(), description="other names")

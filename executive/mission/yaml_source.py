@@ -7,13 +7,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType, UnionType
-from typing import Any, Final, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Final, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from executive.mission.errors import InputError, did_you_mean, listing, suggestion
+from skills.quantities import range_text, without_range
 
 __all__ = ["YamlSource", "read_yaml", "validate"]
 
@@ -177,6 +178,8 @@ def _input_error(model: type[BaseModel], source: YamlSource, error: ErrorDetails
         parent = ".".join(str(part) for part in path[:-1]) or "the file"
         return source.error(path[:-1], f"key {path[-1]!r} is missing in {parent}", f"add {path[-1]!r}")
     what = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
+    if error["type"] in _OUT_OF_RANGE:
+        what = f"should be {range_text(_kind_at(model, path))}"
     hint = _nearest_word(error) or f"it reads {error['input']!r} now"[:120]
     return source.error(path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", hint)
 
@@ -188,6 +191,7 @@ def _nearest_word(error: ErrorDetails) -> str | None:
     return None if near is None else f"did you mean {near!r}?"
 
 
+_OUT_OF_RANGE: Final = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 _PLAINER: Final[Mapping[str, str]] = MappingProxyType(
     {
         "model_type": "should be a mapping of keys to values",
@@ -213,17 +217,25 @@ def _field_names(model: type[BaseModel] | None) -> list[str]:
 
 
 def _model_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:
-    """The model that describes what stands at `path`, following fields, mappings and lists."""
+    """The model that describes what stands at `path`."""
+    kind = without_range(_kind_at(model, path))
+    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+
+
+def _kind_at(model: type[BaseModel], path: KeyPath) -> Any:
+    """The annotation of what stands at `path`, following fields, mappings and lists."""
     kind: Any = model
     for part in path:
         kind = _inside(kind, part)
-    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+    return kind
 
 
 def _inside(kind: Any, part: str | int) -> Any:
     """The annotation of what stands under `part` in something annotated `kind`."""
-    fields = {f.alias or n: f.annotation for n, f in getattr(kind, "model_fields", {}).items()}
+    kind = without_range(kind)
+    fields = {f.alias or n: Annotated[f.annotation, f] for n, f in getattr(kind, "model_fields", {}).items()}
     items = [arg for arg in get_args(kind) if arg is not Ellipsis]
     inner = fields[part] if part in fields else next(iter(items[-1:]), None)
-    optional = get_origin(inner) in (Union, UnionType)
-    return next(arg for arg in get_args(inner) if arg is not type(None)) if optional else inner
+    plain = without_range(inner)
+    optional = get_origin(plain) in (Union, UnionType)
+    return next(arg for arg in get_args(plain) if arg is not type(None)) if optional else inner

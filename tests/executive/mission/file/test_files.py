@@ -153,6 +153,13 @@ def test_a_plain_pose_is_a_goal(compile_text):
     assert ports == {"goal": Constant(Pose2D(1.0, 2.0, 0.5)), "max_speed_m_s": Constant(0.4)}
 
 
+@pytest.mark.parametrize("speed", ["-1", "0", "100", ".nan", ".inf", "-.inf"])
+def test_a_number_out_of_its_ports_range_is_refused_at_its_line(compile_text, speed):
+    text = f"name: m\nsteps:\n  - skill: navigate\n    with:\n      goal: kitchen\n      max_speed: {speed}\n"
+    error = refused(compile_text, text)
+    assert (error.line, "max_speed" in error.message, speed.strip("-.") in error.message) == (6, True, True)
+
+
 DETECT = """\
 name: m
 steps:

@@ -38,7 +38,7 @@ def test_json_is_one_object_for_all_files(write):
     result = invoke(GOOD, bad, "--json")
     assert result.exit_code == 2
     told = json.loads(result.stdout.splitlines()[-1])
-    assert set(told) == {"ok", "errors", "nodes", "commands"}
+    assert set(told) == {"ok", "errors", "warnings", "nodes", "commands"}
     assert told["ok"] is False
     assert told["nodes"] > 3
     assert told["commands"] == ["Take [Nothing] to [living room] and do [Nothing] to [Nothing]"]
@@ -46,7 +46,7 @@ def test_json_is_one_object_for_all_files(write):
         {
             "file": str(bad),
             "line": 4,
-            "message": "steps.1.timeout: input should be greater than 0",
+            "message": "steps.1.timeout: should be above 0 and at most 86400 s",
             "hint": "it reads 0 now",
         }
     ]

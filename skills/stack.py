@@ -315,7 +315,8 @@ def _known(path: tuple[str | int, ...], given: Any, known: Sequence[str]) -> Non
         raise StackError(path, "should be a mapping of keys to values", f"known keys are {', '.join(known)}")
     for key in given:
         if key not in known:
-            raise StackError((*path, key), f"unknown key {key!r}", f"known keys are {', '.join(known)}")
+            named = f"key {key!r}" if str(key).isidentifier() else "key that is no plain word"
+            raise StackError((*path, key), f"unknown {named}", f"known keys are {', '.join(known)}")
 
 
 def plain(stack: RobotStack) -> dict[str, Any]:

@@ -22,12 +22,11 @@ from executive.mission.file.model import (
     StepGuards,
     StepPolicy,
 )
-from executive.mission.yaml_source import YamlSource
+from executive.mission.yaml_source import Name, Text, YamlSource
 from skills.quantities import Duration, bounds, without_range, without_unit
 
 __all__ = ["AskFile", "GuardsFile", "MissionFile", "PolicyFile", "StepFile", "mission_json_schema"]
 
-Text = Annotated[str, Field(min_length=1)]
 Seconds = Annotated[Duration, Field(strict=True)]
 Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
 Attempts = Annotated[StrictInt, Field(ge=0, le=100)]
@@ -114,15 +113,15 @@ class StepFile(PolicyFile):
     to: Text | None = Field(None, description='The place or person, or "start", or "Robin at hall".')
     do: Task | None = Field(None, description="What to do there to the object.")
     object: Text | None = Field(None, description="The thing that it is done to.")
-    skill: Text | None = Field(None, description="The name of a registered skill.")
-    use: Text | None = Field(None, description="Another mission file, as seen from this file's folder.")
+    skill: Name | None = Field(None, description="The name of a registered skill.")
+    use: Name | None = Field(None, description="Another mission file, as seen from this file's folder.")
     elsewhere: StrictBool | None = Field(
         None, description="Whether a thing that is not in its place is looked for elsewhere, too (it is unless said)."
     )
     with_: dict[str, Any] | None = Field(
         None, alias="with", description="The skill's input ports, or the parameters of the used file."
     )
-    gives: dict[str, Text] | None = Field(
+    gives: dict[str, Name] | None = Field(
         None, description="Names for the skill's output ports; later steps read them with {from: NAME}."
     )
 
@@ -150,10 +149,10 @@ class MissionFile(PolicyFile):
 
     model_config = ConfigDict(title="Errand mission")
 
-    name: Text = Field(description="The mission's name; part of all path ids.")
+    name: Name = Field(description="The mission's name; part of all path ids.")
     description: str | None = Field(None, description="What it is for.")
-    world: Text = Field(DEFAULT_WORLD, description="A world by its name or folder.")
-    robot: Text | None = Field(None, description="The robot's name; the world's own unless said.")
+    world: Name = Field(DEFAULT_WORLD, description="A world by its name or folder.")
+    robot: Name | None = Field(None, description="The robot's name; the world's own unless said.")
     knowledge: dict[str, Any] | None = Field(
         None, description="Laid over the world's knowledge: what stands here replaces what stands there, key by key."
     )

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import EntryPoints, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol, get_args, get_type_hints
@@ -59,6 +60,7 @@ SLOTS: Final[Mapping[str, str]] = {
 """The slots of a stack file, and the entry-point group of each."""
 SKILLS: Final = "skills"
 SKILL_GROUP: Final = "errand.skills"
+DISTRIBUTION: Final = "spot-errand"
 USE: Final = "use"
 DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
 
@@ -233,11 +235,13 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
     """The name and the component of one slot. Raises StackError."""
     if not isinstance(given, Mapping):
         raise StackError((slot,), "should be a mapping", f"write '{slot}: {{{USE}: NAME}}', then the options")
-    known = components(slot)
-    name = given.get(USE, next(iter(known), None))
+    known = _names(slot)
+    name = given.get(USE, known[0])
     if name not in known:
         raise StackError((slot, USE), f"there is no {slot} {name!r}", f"known are {', '.join(known)}")
-    return name, _typed((slot,), known[name], {key: value for key, value in given.items() if key != USE})
+    return name, _typed(
+        (slot,), _loaded(slot, name, SLOTS[slot]), {key: value for key, value in given.items() if key != USE}
+    )
 
 
 @cache
@@ -258,23 +262,33 @@ def _names(slot: str) -> list[str]:
     return sorted(names, key=lambda name: (name != first, name))
 
 
+@cache
 def _loaded(slot: str, name: str, group: str) -> type:
-    (entry, *_) = _installed(group).select(name=name)
+    entry = max(_installed(group).select(name=name), key=_is_ours)
     try:
         component: type = entry.load()
-    except Exception as defect:
+    except (Exception, SystemExit) as defect:
         raise StackError((slot,), f"cannot load {entry.value} ({defect})", "uninstall that distribution") from defect
     if not (dataclasses.is_dataclass(component) and component.__dataclass_params__.frozen):  # type: ignore[attr-defined]
         raise StackError((slot,), f"{entry.value} is no frozen dataclass", "put @dataclass(frozen=True) above it")
     return component
 
 
+def _is_ours(entry: EntryPoint) -> bool:
+    """Whether it is the project's own, whose name nobody else takes."""
+    return entry.dist is not None and entry.dist.name == DISTRIBUTION
+
+
 @cache
 def skill_options() -> Mapping[str, type]:
-    """The options class of each installed skill that has one."""
-    skills = {entry.name: entry.load() for entry in _installed(SKILL_GROUP)}
-    found = {name: skill.Options for name, skill in sorted(skills.items()) if hasattr(skill, "Options")}
-    return MappingProxyType({name: kind for name, kind in found.items() if dataclasses.fields(kind)})
+    """The options class of each installed skill that has one and can be loaded."""
+    skills = {}
+    for entry in sorted(_installed(SKILL_GROUP), key=_is_ours):
+        with suppress(Exception, SystemExit):
+            skills[entry.name] = entry.load()
+    found = {name: getattr(skill, "Options", None) for name, skill in sorted(skills.items())}
+    kinds = {name: kind for name, kind in found.items() if isinstance(kind, type) and dataclasses.is_dataclass(kind)}
+    return MappingProxyType({name: kind for name, kind in kinds.items() if dataclasses.fields(kind)})
 
 
 def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:

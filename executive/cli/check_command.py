@@ -24,6 +24,7 @@ from executive.view.collapse import folded_to
 from executive.view.text import to_rich
 
 SHOWN_NODES: Final = 40
+MOST_LETTERS: Final = 300
 
 __all__ = ["CheckedFile", "Checker", "check"]
 
@@ -65,6 +66,9 @@ class Checker:
             checked = check_prepared(prepared, self._routes[world.folder])
         except InputError as error:
             return CheckedFile(file, _placed(file, (error, *error.others)), tree)
+        except Exception as defect:  # the other files are still to be checked
+            what = f"errand cannot check it ({type(defect).__name__}: {defect})"[:MOST_LETTERS]
+            return CheckedFile(file, _placed(file, (InputError(what, hint="report it with this file"),)), tree)
         return CheckedFile(file, _placed(file, checked.errors), tree, checked.estimate, checked.warnings)
 
 

@@ -15,7 +15,6 @@ from executive.mission.command import Command
 from executive.mission.mission import mission_from_commands
 from executive.run.control import Control
 from executive.tree.compiler import CompiledTree, compile_mission
-from executive.tree.registry import installed_skills
 
 __all__ = ["conversation_of", "load_ahead"]
 
@@ -52,6 +51,6 @@ def _compiled(commands: Sequence[Command], taken: frozenset[str], prepared: Prep
     mission = mission_from_commands(commands, world=prepared.world.name, robot_name=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
-    tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=installed_skills())
+    tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=usable_skills())
     refuse_impossible(replace(prepared, tree=tree))
     return tree

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from executive.cli.feasibility import refuse_impossible
+from executive.cli.plugins import usable_skills
 from executive.cli.requests import Prepared
 from executive.conversation import Conversation, Speech
 from executive.language import Understanding, load_parser, understand

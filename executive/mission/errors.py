@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-__all__ = ["InputError", "Problems", "SourceLine", "did_you_mean", "listing", "suggestion"]
+__all__ = ["InputError", "Problems", "SourceLine", "did_you_mean", "disk_is_full", "listing", "suggestion"]
 
 
 _USED_BY: Final = "used by"
@@ -70,6 +71,11 @@ class InputError(Exception):
             return self
         text = f"{self.message} ({_USED_BY} {file}:{line})"
         return InputError(text, hint=self.hint, file=self.file, line=self.line, others=others)
+
+
+def disk_is_full(error: BaseException) -> bool:
+    """Whether it was raised since no space is left."""
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 class Problems:

@@ -106,7 +106,8 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        connection.execute("ROLLBACK")
+        if connection.in_transaction:  # a full disk has rolled it back
+            connection.execute("ROLLBACK")
         raise
     connection.execute("COMMIT")
 

@@ -20,7 +20,7 @@ RUN = """
     from pathlib import Path
     from dataclasses import replace
     sys.path.insert(0, {tests!r})
-    from test_backend import ScriptedBackend
+    from scripted_backend import ScriptedBackend
     from executive.cli import requests, shown
     from executive.cli.durable import kept
     from executive.cli.mission_run import run_request

@@ -1,5 +1,7 @@
 """What a skill is made of. Skills, ours and others', import only this module and `skills.robot`.
 
+`skills.robot.quantities` are types of ports with ranges.
+
 A skill is a plain object with the life `begin -> step, step, ... -> end`. It never blocks, sleeps or ticks; the
 executive's leaf wraps it once, turns exceptions into failures with cause ERROR and calls `end` on every way out.
 """

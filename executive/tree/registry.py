@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 
-from executive.mission.errors import InputError, listing, suggestion
+from executive.mission.errors import InputError, suggestion
 from executive.tree.types import describe_type, field_types
 from skills.api import Cause, Skill
 
@@ -46,7 +46,7 @@ def missing(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, str]:
     """Why a registry has no skill of this name, and the hint."""
     if isinstance(registry, SkillRegistry) and name in registry.broken:
         return registry.broken[name].message, registry.broken[name].hint
-    return f"there is no skill '{name}'", suggestion(name, registry, f"registered are {listing(sorted(registry))}")
+    return f"there is no skill '{name}'", suggestion(name, registry)
 
 
 def installed_skills() -> SkillRegistry:

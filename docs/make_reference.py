@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from executive.mission.file.schema import MissionFile
+from executive.mission.file.schema import MissionFile, mission_json_schema
 from executive.mission.knowledge import Knowledge
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.registry import built_in_skills
@@ -25,6 +25,7 @@ from skills.testing.fault_kinds import STANDARD_FAULTS
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "reference"
+MISSION_SCHEMA = ROOT / "missions" / "mission.schema.json"
 STACK_SCHEMA = ROOT / "skills" / "stack.schema.json"
 NOTE = "<!-- Written by docs/make_reference.py; don't edit. -->\n\n"
 
@@ -273,10 +274,17 @@ def stack_schema_text() -> str:
     return json.dumps(stack_schema(), indent=2) + "\n"
 
 
+def mission_schema_text() -> str:
+    """The text of `missions/mission.schema.json`."""
+    inputs = {name: skill.Inputs for name, skill in built_in_skills().items()}
+    return json.dumps(mission_json_schema(inputs), indent=2, ensure_ascii=False) + "\n"
+
+
 def main() -> None:
     """Write all pages."""
     FOLDER.mkdir(exist_ok=True)
     STACK_SCHEMA.write_text(stack_schema_text(), encoding="utf-8")
+    MISSION_SCHEMA.write_text(mission_schema_text(), encoding="utf-8")
     for name, text in pages().items():
         (FOLDER / name).write_text(text, encoding="utf-8")
 

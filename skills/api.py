@@ -1,5 +1,7 @@
 """What a skill is made of. Skills, ours and others', import only this module and `skills.robot`.
 
+`skills.robot.quantities` are types of ports with ranges.
+
 A skill is a plain object with the life `begin -> step, step, ... -> end`. It never blocks, sleeps or ticks; the
 executive's leaf wraps it once, turns exceptions into failures with cause ERROR and calls `end` on every way out.
 """
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
+from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share
 from skills.robot import Clock, Lease, Pose2D, Robot, Scan
 from skills.stack import RobotStack, default_stack
 
@@ -94,8 +97,8 @@ class Surface:
     """A flat top where objects lie: outline in the world frame as (x, y) corners, height above the floor."""
 
     name: str
-    polygon_W: tuple[tuple[float, float], ...]
-    height_m: float
+    polygon_W: tuple[tuple[Coordinate, Coordinate], ...]
+    height_m: Height
 
 
 @dataclass(frozen=True)
@@ -106,12 +109,12 @@ class ObjectObservation:
     axes of a box that is turned by `yaw_rad` about the vertical; `surface` the name of the surface that it rests on.
     """
 
-    stamp_s: float
+    stamp_s: Delay
     thing: Thing
-    position_W: tuple[float, float, float]
-    size_m: tuple[float, float, float]
-    yaw_rad: float
-    score: float
+    position_W: tuple[Coordinate, Coordinate, Height]
+    size_m: tuple[Margin, Margin, Margin]
+    yaw_rad: Angle
+    score: Share
     surface: str | None = None
 
 

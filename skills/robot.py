@@ -19,6 +19,9 @@ from typing import TYPE_CHECKING, NewType, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from skills import quantities as quantities
+from skills.quantities import Angle, Coordinate
+
 if TYPE_CHECKING:  # Drake takes a third of a second to import; commands that move nothing do without
     from pydrake.math import RigidTransform
 
@@ -32,9 +35,9 @@ CommandId = NewType("CommandId", int)
 class Pose2D:
     """A planar pose: x_m, y_m, yaw_rad (counter-clockwise from x)."""
 
-    x_m: float
-    y_m: float
-    yaw_rad: float
+    x_m: Coordinate
+    y_m: Coordinate
+    yaw_rad: Angle
 
     def transform(self, z_m: float = 0.0) -> RigidTransform:
         """The same pose as a RigidTransform at height z_m."""

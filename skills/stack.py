@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import EntryPoints, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, Protocol, get_args, get_type_hints
 
 import numpy as np
 
+from skills.quantities import range_text
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities, Pose2D
 
 if TYPE_CHECKING:
@@ -58,6 +60,7 @@ SLOTS: Final[Mapping[str, str]] = {
 """The slots of a stack file, and the entry-point group of each."""
 SKILLS: Final = "skills"
 SKILL_GROUP: Final = "errand.skills"
+DISTRIBUTION: Final = "spot-errand"
 USE: Final = "use"
 DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
 
@@ -232,11 +235,13 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
     """The name and the component of one slot. Raises StackError."""
     if not isinstance(given, Mapping):
         raise StackError((slot,), "should be a mapping", f"write '{slot}: {{{USE}: NAME}}', then the options")
-    known = components(slot)
-    name = given.get(USE, next(iter(known), None))
+    known = _names(slot)
+    name = given.get(USE, known[0])
     if name not in known:
         raise StackError((slot, USE), f"there is no {slot} {name!r}", f"known are {', '.join(known)}")
-    return name, _typed((slot,), known[name], {key: value for key, value in given.items() if key != USE})
+    return name, _typed(
+        (slot,), _loaded(slot, name, SLOTS[slot]), {key: value for key, value in given.items() if key != USE}
+    )
 
 
 @cache
@@ -257,23 +262,33 @@ def _names(slot: str) -> list[str]:
     return sorted(names, key=lambda name: (name != first, name))
 
 
+@cache
 def _loaded(slot: str, name: str, group: str) -> type:
-    (entry, *_) = _installed(group).select(name=name)
+    entry = max(_installed(group).select(name=name), key=_is_ours)
     try:
         component: type = entry.load()
-    except Exception as defect:
+    except (Exception, SystemExit) as defect:
         raise StackError((slot,), f"cannot load {entry.value} ({defect})", "uninstall that distribution") from defect
     if not (dataclasses.is_dataclass(component) and component.__dataclass_params__.frozen):  # type: ignore[attr-defined]
         raise StackError((slot,), f"{entry.value} is no frozen dataclass", "put @dataclass(frozen=True) above it")
     return component
 
 
+def _is_ours(entry: EntryPoint) -> bool:
+    """Whether it is the project's own, whose name nobody else takes."""
+    return entry.dist is not None and entry.dist.name == DISTRIBUTION
+
+
 @cache
 def skill_options() -> Mapping[str, type]:
-    """The options class of each installed skill that has one."""
-    skills = {entry.name: entry.load() for entry in _installed(SKILL_GROUP)}
-    found = {name: skill.Options for name, skill in sorted(skills.items()) if hasattr(skill, "Options")}
-    return MappingProxyType({name: kind for name, kind in found.items() if dataclasses.fields(kind)})
+    """The options class of each installed skill that has one and can be loaded."""
+    skills = {}
+    for entry in sorted(_installed(SKILL_GROUP), key=_is_ours):
+        with suppress(Exception, SystemExit):
+            skills[entry.name] = entry.load()
+    found = {name: getattr(skill, "Options", None) for name, skill in sorted(skills.items())}
+    kinds = {name: kind for name, kind in found.items() if isinstance(kind, type) and dataclasses.is_dataclass(kind)}
+    return MappingProxyType({name: kind for name, kind in kinds.items() if dataclasses.fields(kind)})
 
 
 def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:
@@ -285,7 +300,20 @@ def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:
         return TypeAdapter(kind).validate_python(given)
     except ValidationError as error:
         first = error.errors()[0]
-        raise StackError((*path, *first["loc"]), first["msg"], f"it reads {first['input']!r} now"[:120]) from error
+        takes, now = range_text(_hint_at(kind, first["loc"])), f"it reads {first['input']!r} now"[:120]
+        raise StackError((*path, *first["loc"]), f"should be {takes}" if takes else first["msg"], now) from error
+
+
+def _hint_at(hint: Any, path: Sequence[int | str]) -> Any:
+    """The type of what stands at a path in something of type `hint`."""
+    for part in path:
+        if dataclasses.is_dataclass(hint):
+            hint = get_type_hints(hint, include_extras=True)[str(part)]
+        else:
+            items = get_args(hint)
+            hint = items[int(part)] if int(part) < len(items) and items[int(part)] is not Ellipsis else items[0]
+        hint = next((one for one in get_args(hint) if type(None) in get_args(hint) and one is not type(None)), hint)
+    return hint
 
 
 def _check_keys(path: tuple[str | int, ...], kind: type, given: Any) -> None:
@@ -301,7 +329,8 @@ def _known(path: tuple[str | int, ...], given: Any, known: Sequence[str]) -> Non
         raise StackError(path, "should be a mapping of keys to values", f"known keys are {', '.join(known)}")
     for key in given:
         if key not in known:
-            raise StackError((*path, key), f"unknown key {key!r}", f"known keys are {', '.join(known)}")
+            named = f"key {key!r}" if str(key).isidentifier() else "key that is no plain word"
+            raise StackError((*path, key), f"unknown {named}", f"known keys are {', '.join(known)}")
 
 
 def plain(stack: RobotStack) -> dict[str, Any]:

@@ -24,18 +24,20 @@ from executive.view.collapse import folded_to
 from executive.view.text import to_rich
 
 SHOWN_NODES: Final = 40
+MOST_LETTERS: Final = 300
 
 __all__ = ["CheckedFile", "Checker", "check"]
 
 
 @dataclass(frozen=True)
 class CheckedFile:
-    """One file: its errors, and what could be found out about it before them."""
+    """One file: its errors and warnings, and what could be found out about it before them."""
 
     file: Path
     errors: tuple[InputError, ...] = ()
     tree: CompiledTree | None = None
     estimate: Estimate = field(default_factory=Estimate)
+    warnings: tuple[InputError, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -64,7 +66,10 @@ class Checker:
             checked = check_prepared(prepared, self._routes[world.folder])
         except InputError as error:
             return CheckedFile(file, _placed(file, (error, *error.others)), tree)
-        return CheckedFile(file, _placed(file, checked.errors), tree, checked.estimate)
+        except Exception as defect:  # the other files are still to be checked
+            what = f"errand cannot check it ({type(defect).__name__}: {defect})"[:MOST_LETTERS]
+            return CheckedFile(file, _placed(file, (InputError(what, hint="report it with this file"),)), tree)
+        return CheckedFile(file, _placed(file, checked.errors), tree, checked.estimate, checked.warnings)
 
 
 def check(
@@ -88,11 +93,12 @@ def check(
 
 
 def to_json(checked: Sequence[CheckedFile]) -> dict[str, Any]:
-    """All files as one object: whether all are well, their errors, how many nodes, and the commands in order."""
+    """All files as one object: whether all are well, errors, warnings, how many nodes, and the commands in order."""
     trees = [one.tree for one in checked if one.tree is not None]
     return {
         "ok": all(one.ok for one in checked),
         "errors": [_error_json(error) for one in checked for error in one.errors],
+        "warnings": [_error_json(warning) for one in checked for warning in one.warnings],
         "nodes": sum(len(tree.path_ids) for tree in trees),
         "commands": [str(command) for tree in trees for command in tree.commands],
     }
@@ -118,6 +124,8 @@ def _show(one: CheckedFile, console: Console, *, quiet: bool) -> None:
     console.print(f"{mark} [bold]{escape(str(one.file))}[/bold]")
     for error in one.errors:
         typer.echo(f"errand: {error}", err=True)
+    for warning in one.warnings:
+        typer.echo(f"errand: warning: {warning}", err=True)
     if one.tree is None:
         return
     if not quiet:
@@ -130,7 +138,8 @@ def _show(one: CheckedFile, console: Console, *, quiet: bool) -> None:
 
 def _in_words(tree: CompiledTree, estimate: Estimate) -> str:
     minutes, seconds = divmod(round(estimate.duration_s), 60)
+    charge = f"{estimate.charge:.1%} of the battery" if estimate.charge <= 1.0 else "more than one charge"
     return (
         f"{len(tree.path_ids)} nodes; about {minutes} min {seconds:02d} s, {estimate.distance_m:.0f} m of driving and "
-        f"{estimate.charge:.1%} of the battery when all goes well"
+        f"{charge} when all goes well"
     )

@@ -10,8 +10,9 @@ from typing import Final
 
 from executive.cli.report import RunReport
 from executive.cli.requests import Prepared, prepare, replacing
-from executive.mission.errors import InputError
+from executive.mission.errors import InputError, disk_is_full
 from executive.mission.request import Request
+from executive.store.database import full_disk
 from executive.store.journal import StoreJournal
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.recollection import Recollection
@@ -137,16 +138,24 @@ def _text(file: Path) -> str | None:
 def kept(store: MissionStore, mission: StoredMission) -> Iterator[Callable[[RunReport], None]]:
     """Note in the store that a mission is under way, and, when told the report, how it ended.
 
-    A run that could not begin leaves things as they were; of one that is killed nobody notes anything.
+    A run that could not begin leaves things as they were; of one that is killed, or breaks off since the disk is full,
+    nobody notes anything. Raises InputError, which names the way on: the disk is full.
     """
     store.begin(mission.id)
+    over = False
 
     def ended(report: RunReport) -> None:
+        nonlocal over
+        over = True
         store.finish(mission.id, MissionState(report.outcome), report.message)
 
     try:
         yield ended
+    except OSError as error:
+        raise full_disk(store.path) if disk_is_full(error) else error from error
     except InputError:
+        if over:
+            raise
         if mission.queued or mission.starts:
             store.finish(mission.id, mission.state, mission.message)
         else:

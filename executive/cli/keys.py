@@ -9,7 +9,7 @@ import termios
 import threading
 import tty
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
@@ -148,7 +148,8 @@ def keys_pressed(keys: Keys, descriptor: int | None = None) -> Iterator[bool]:
             reader.join()
         for end in (wake, waker):
             os.close(end)
-        termios.tcsetattr(source, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # the terminal was closed
+            termios.tcsetattr(source, termios.TCSADRAIN, before)
 
 
 def keys_available() -> bool:
@@ -162,7 +163,10 @@ def _read(source: int, wake: int, keys: Keys) -> None:
         ready, _, _ = select.select([source, wake], [], [])
         if wake in ready:
             return
-        data = os.read(source, 64)
+        try:
+            data = os.read(source, 64)
+        except OSError:  # the terminal was closed
+            return
         if not data:
             return
         for key in data.decode(errors="ignore"):

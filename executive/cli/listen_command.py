@@ -14,6 +14,7 @@ from rich.live import Live
 from rich.text import Text
 
 from executive.cli.output import BAD_INPUT, console_for, refusals
+from executive.cli.signals import interrupted_by_hang_up
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Status, Understanding, load_parser
 from executive.mission.errors import InputError
@@ -159,7 +160,7 @@ def _follow_microphone(listener: Listener) -> None:
     console = console_for(as_json=False)
     called = f'"Hey {listener.reader.robot_name}, ..."' if listener.reader.require_wake else "your request"
     console.print(f"Listening; say {called}. Ctrl-C ends.", markup=False)
-    with closing(microphone_blocks()) as blocks, suppress(KeyboardInterrupt):
+    with suppress(KeyboardInterrupt), interrupted_by_hang_up(), closing(microphone_blocks()) as blocks:
         show_hearing(follow(blocks, listener), console, installed_voice())
 
 

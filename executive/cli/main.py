@@ -87,7 +87,7 @@ def run(
     if as_json:
         print_json(finished.report.to_json())
     if page is not None:
-        page.stay(view_for)
+        page.stay(0.0 if finished.hung_up else view_for)
     if not finished.report.achieved:
         raise typer.Exit(NOT_ACHIEVED)
 

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from types import FrameType
 
 from executive.cli.artifacts import Artifacts, draw_answer
 from executive.cli.backend import Backend
@@ -16,6 +11,7 @@ from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
 from executive.cli.report import RefereeReport, RunReport
 from executive.cli.requests import Prepared
+from executive.cli.signals import HUNG_UP, cancelled_by_signals
 from executive.cli.warm_up import warm_up
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
@@ -39,6 +35,11 @@ class Finished:
 
     report: RunReport
     tree: NodeView
+
+    @property
+    def hung_up(self) -> bool:
+        """Whether it ended since its terminal was closed."""
+        return self.report.message == HUNG_UP
 
 
 def run_request(
@@ -143,25 +144,3 @@ def _report(
         ticks=result.ticks,
         log=log,
     )
-
-
-@contextmanager
-def cancelled_by_signals(control: Control) -> Iterator[Control]:
-    """The control, which Ctrl-C and a polite kill cancel; a second Ctrl-C breaks in at once."""
-    asked: list[int] = []
-
-    def on_signal(number: int, _frame: FrameType | None) -> None:
-        if asked:
-            raise KeyboardInterrupt
-        asked.append(number)
-        control.cancel(f"cancelled by {signal.Signals(number).name}")
-
-    if threading.current_thread() is not threading.main_thread():
-        yield control
-        return
-    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield control
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from executive.cli.answers import answerer, ask_at_terminal
+from executive.cli.plugins import usable_skills
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Understanding, load_parser
 from executive.language.questions import Answerer
@@ -20,7 +21,6 @@ from executive.mission.knowledge import Knowledge
 from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
-from executive.tree.registry import installed_skills
 from plant.worlds.world import World
 
 __all__ = ["Prepared", "fingerprint", "prepare", "replacing"]
@@ -105,7 +105,7 @@ def _commanded(request: Request, world: World) -> Mission:
 def _prepared(
     request: Request, mission: Mission, world: World, knowledge: Knowledge, meant: Understanding | None = None
 ) -> Prepared:
-    tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
+    tree = compile_mission(mission, knowledge=knowledge, registry=usable_skills())
     compiled = _of_tree(replace(request, world_name=world.name, robot=mission.robot_name), tree)
     return Prepared(compiled, mission, world, knowledge, tree, meant)
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from executive.cli.feasibility import refuse_impossible
+from executive.cli.plugins import usable_skills
 from executive.cli.requests import Prepared
 from executive.conversation import Conversation, Speech
 from executive.language import Understanding, load_parser, understand
@@ -15,7 +16,6 @@ from executive.mission.command import Command
 from executive.mission.mission import mission_from_commands
 from executive.run.control import Control
 from executive.tree.compiler import CompiledTree, compile_mission
-from executive.tree.registry import installed_skills
 
 __all__ = ["conversation_of", "load_ahead"]
 
@@ -52,6 +52,6 @@ def _compiled(commands: Sequence[Command], taken: frozenset[str], prepared: Prep
     mission = mission_from_commands(commands, world=prepared.world.name, robot_name=prepared.mission.robot_name)
     names = (mission.name, *(f"{mission.name} {number}" for number in range(2, len(taken) + 3)))
     name = next(each for each in names if each not in taken)
-    tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=installed_skills())
+    tree = compile_mission(replace(mission, name=name), knowledge=prepared.knowledge, registry=usable_skills())
     refuse_impossible(replace(prepared, tree=tree))
     return tree

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
-__all__ = ["InputError", "Problems", "SourceLine", "did_you_mean", "listing", "suggestion"]
+__all__ = ["InputError", "Problems", "SourceLine", "did_you_mean", "disk_is_full", "listing", "suggestion"]
+
+
+_USED_BY: Final = "used by"
+_MOST_USERS: Final = 3
 
 
 @dataclass(frozen=True)
@@ -56,13 +62,20 @@ class InputError(Exception):
     def within(self, file: Path, line: int) -> InputError:
         """The same error, and the line of the file that brought it about by using the file in which it is.
 
-        An error that names no place gets that line as its own.
+        An error that names no place gets that line as its own; of a long chain the first files are named.
         """
         others = [other.within(file, line) for other in self.others]
         if self.file is None:
             return InputError(self.message, hint=self.hint, file=file, line=line, others=others)
-        text = f"{self.message} (used by {file}:{line})"
+        if self.message.count(_USED_BY) >= _MOST_USERS:
+            return self
+        text = f"{self.message} ({_USED_BY} {file}:{line})"
         return InputError(text, hint=self.hint, file=self.file, line=self.line, others=others)
+
+
+def disk_is_full(error: BaseException) -> bool:
+    """Whether it was raised since no space is left."""
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 class Problems:

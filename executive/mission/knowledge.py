@@ -10,8 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.mission.command import Task
 from executive.mission.errors import InputError, suggestion
-from executive.mission.yaml_source import YamlSource, read_yaml, validate
+from executive.mission.yaml_source import Name, YamlSource, read_yaml, validate
 from skills.perception.class_forms import class_forms
+from skills.quantities import Angle, Coordinate
 
 __all__ = [
     "ANYTHING",
@@ -30,7 +31,7 @@ __all__ = [
 ANYTHING: Final = "object"
 """The name that stands for every class of things."""
 _ANYTHING: Final = frozenset({ANYTHING, "thing", "item"})
-Corner = tuple[float, float]
+Corner = tuple[Coordinate, Coordinate]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 
 
@@ -41,16 +42,16 @@ class _Facts(BaseModel):
 class Pose(_Facts):
     """A planar pose in the world frame: x, y in metres, yaw in radians, counter-clockwise from x."""
 
-    x: float = Field(description="metres")
-    y: float = Field(description="metres")
-    yaw: float = Field(default=0.0, description="radians")
+    x: Coordinate = Field(description="metres")
+    y: Coordinate = Field(description="metres")
+    yaw: Angle = Field(default=0.0, description="radians")
 
 
 class RobotFacts(_Facts):
     """The robot: the name by which it is spoken to, and the names of other robots that listen, too."""
 
-    name: Annotated[str, Field(min_length=1, description='as in "Hey Alice"')]
-    others: tuple[str, ...] = Field(default=(), description="other robots: what is said to them is not for this one")
+    name: Name = Field(description='as in "Hey Alice"')
+    others: tuple[Name, ...] = Field(default=(), description="other robots: what is said to them is not for this one")
 
 
 class BatteryFacts(_Facts):
@@ -71,24 +72,24 @@ class Place(_Facts):
 
     pose: Pose = Field(description="where the robot stands to be there")
     polygon: Polygon = Field(description="outline, corners (x, y)")
-    aliases: tuple[str, ...] = Field(default=(), description="other names")
+    aliases: tuple[Name, ...] = Field(default=(), description="other names")
 
 
 class SurfaceFacts(_Facts):
     """A flat top in a room: other names, height above the floor (m), outline, and poses from which it is seen whole."""
 
     place: str = Field(description="the room that it is in")
-    height: Annotated[float, Field(gt=0.0, description="of the top above the floor, m")]
+    height: Annotated[float, Field(gt=0.0, le=3.0, description="of the top above the floor, m")]
     polygon: Polygon = Field(description="outline of the top, corners (x, y)")
     viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1, description="poses from which it is seen whole")]
-    aliases: tuple[str, ...] = Field(default=(), description="other names")
+    aliases: tuple[Name, ...] = Field(default=(), description="other names")
 
 
 class ThingFacts(_Facts):
     """A class of things: other names, the categories it belongs to, the surfaces where it usually is."""
 
-    aliases: tuple[str, ...] = Field(default=(), description="other names")
-    categories: tuple[str, ...] = Field(default=(), description='as in "a drink"')
+    aliases: tuple[Name, ...] = Field(default=(), description="other names")
+    categories: tuple[Name, ...] = Field(default=(), description='as in "a drink"')
     usual: tuple[str, ...] = Field(default=(), description="surfaces where it usually is, likeliest first")
 
 
@@ -96,7 +97,7 @@ class Person(_Facts):
     """Somebody: other names, the place where they usually are, and where exactly when that is known."""
 
     at: str = Field(description="the place where they usually are")
-    aliases: tuple[str, ...] = Field(default=(), description="other names")
+    aliases: tuple[Name, ...] = Field(default=(), description="other names")
     pose: Pose | None = Field(default=None, description="where exactly, when that is known")
 
 
@@ -107,10 +108,10 @@ class Knowledge(_Facts):
     start: Pose = Field(description="where it stands at the beginning")
     dock: Pose = Field(description="where it stands to charge")
     battery: BatteryFacts = Field(default=BatteryFacts(), description="when it charges, and until when")
-    places: dict[str, Place] = Field(description="the rooms by name")
-    surfaces: dict[str, SurfaceFacts] = Field(description="the flat tops where things lie, by name")
-    things: dict[str, ThingFacts] = Field(description="the classes of things by name")
-    people: dict[str, Person] = Field(default_factory=dict, description="the people by name")
+    places: dict[Name, Place] = Field(description="the rooms by name")
+    surfaces: dict[Name, SurfaceFacts] = Field(description="the flat tops where things lie, by name")
+    things: dict[Name, ThingFacts] = Field(description="the classes of things by name")
+    people: dict[Name, Person] = Field(default_factory=dict, description="the people by name")
     defaults: dict[str, dict[str, str]] = Field(
         default_factory=dict, description="for a task, the room for each thing or category when none was said"
     )

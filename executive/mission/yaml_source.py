@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import re
+import stat
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType, UnionType
-from typing import Any, Final, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Final, TypeVar, Union, get_args, get_origin
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from executive.mission.errors import InputError, did_you_mean, listing, suggestion
+from skills.quantities import range_text, without_range
 
-__all__ = ["YamlSource", "read_yaml", "validate"]
+__all__ = ["Name", "Text", "YamlSource", "read_yaml", "validate"]
+
+_FIRST = r"[^\s\x00-\x1f\x7f\u200b-\u200f\u2060\ufeff]"
+Text = Annotated[str, Field(min_length=1, pattern=rf"^\s*{_FIRST}[^\x00-\x08\x0b\x0c\x0e-\x1f\x7f]*$")]
+"""A text in a file: not blank, without control characters."""
+Name = Annotated[str, Field(min_length=1, pattern=rf"^ *{_FIRST}[^\x00-\x1f\x7f]*$")]
+"""A name in a file: the same on one line."""
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 KeyPath = tuple[str | int, ...]
 MAX_BYTES: Final = 1_000_000
+MOST_DIGITS: Final = 100
+_NUMBERS: Final = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+_WORD: Final = re.compile(r"[\w -]{1,40}")
 
 
 @dataclass(frozen=True)
@@ -52,8 +63,8 @@ def read_yaml(path: Path | str) -> YamlSource:
         text = _text(file)
         _refuse_aliases(text, file)
         root = _composed(text)
+        places = list(_walk(root, (), file))
         data = None if root is None else _plain(root)
-        places = list(_walk(root, ()))
     except OSError as error:
         raise InputError(f"cannot read it ({error.strerror})", hint="name a file that exists", file=file) from error
     except UnicodeDecodeError as error:
@@ -75,19 +86,22 @@ def read_yaml(path: Path | str) -> YamlSource:
     lines: dict[KeyPath, int] = {}
     for key_path, line in places:
         if key_path in lines:
-            what = f"key {key_path[-1]!r} stands twice (first in line {lines[key_path]})"
+            what = f"{_quoted(key_path[-1])} stands twice (first in line {lines[key_path]})"
             raise InputError(what, hint="remove one of the two", file=file, line=line)
         lines[key_path] = line
     return YamlSource(file, data, lines)
 
 
 def _text(file: Path) -> str:
-    """The file's text. Raises InputError when it is larger than anyone would write."""
-    size = file.stat().st_size
-    if size > MAX_BYTES:
-        what = f"it is too large ({size} bytes; at most {MAX_BYTES} are read)"
+    """The file's text. Raises InputError when it is no plain file, or larger than anyone would write."""
+    if not (stat.S_ISREG(file.stat().st_mode) or file.is_dir()):
+        raise InputError("it is a pipe or a device", hint="name a plain file", file=file, line=1)
+    with file.open("rb") as opened:
+        read = opened.read(MAX_BYTES + 1)
+    if len(read) > MAX_BYTES:
+        what = f"it is too large (at most {MAX_BYTES} bytes are read)"
         raise InputError(what, hint="split it into files that use each other", file=file, line=1)
-    return file.read_text(encoding="utf-8")
+    return read.decode("utf-8").replace("\r\n", "\n")
 
 
 def _composed(text: str) -> yaml.Node | None:
@@ -105,7 +119,7 @@ def _refuse_aliases(text: str, file: Path) -> None:
         return
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
-            what = f"the alias '*{event.anchor}' cannot be used here"
+            what = f"the alias '*{str(event.anchor)[:40]}' cannot be used here"
             raise InputError(what, hint="write it out", file=file, line=_line(event))
 
 
@@ -118,16 +132,20 @@ def _plain(root: yaml.Node) -> Any:
     return yaml.constructor.SafeConstructor().construct_document(root)
 
 
-def _walk(node: yaml.Node | None, path: KeyPath) -> Iterator[tuple[KeyPath, int]]:
-    """Every key and list item below `node` with its line."""
+def _walk(node: yaml.Node | None, path: KeyPath, file: Path) -> Iterator[tuple[KeyPath, int]]:
+    """Every key and list item below `node` with its line. Raises InputError: a number that nobody would write."""
+    if isinstance(node, yaml.ScalarNode) and node.tag in _NUMBERS and len(node.value) > MOST_DIGITS:
+        what = f"a number of {len(node.value)} digits (at most {MOST_DIGITS} are read)"
+        raise InputError(what, hint="write a shorter one", file=file, line=node.start_mark.line + 1)
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
+            yield from () if isinstance(key, yaml.CollectionNode) else _walk(key, path, file)
             yield (*path, key.value), key.start_mark.line + 1
-            yield from _walk(value, (*path, key.value))
+            yield from _walk(value, (*path, key.value), file)
     elif isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
             yield (*path, index), item.start_mark.line + 1
-            yield from _walk(item, (*path, index))
+            yield from _walk(item, (*path, index), file)
 
 
 def validate(model: type[ModelT], source: YamlSource) -> ModelT:
@@ -139,6 +157,10 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
     if not isinstance(source.data, dict):
         hint = f"begin with the keys {listing(_field_names(model))}"
         raise InputError("the file holds no mapping of keys to values", hint=hint, file=source.path, line=1)
+    known = _field_names(model)
+    if source.data and not any(key in known or did_you_mean(str(key)[:40], known) for key in source.data):
+        what, hint = "none of its keys is known here", f"begin with the keys {listing(known)}"
+        raise InputError(what, hint=hint, file=source.path, line=1)
     try:
         return model.model_validate(source.data)
     except ValidationError as error:
@@ -172,13 +194,20 @@ def _input_error(model: type[BaseModel], source: YamlSource, error: ErrorDetails
     known = _field_names(_model_at(model, path[:-1]))
     if error["type"] == "extra_forbidden":
         hint = suggestion(str(path[-1]), known, f"known keys are {listing(known)}")
-        return source.error(path, f"unknown key {path[-1]!r}", hint)
+        return source.error(path, f"unknown {_quoted(path[-1])}", hint)
     if error["type"] == "missing":
         parent = ".".join(str(part) for part in path[:-1]) or "the file"
         return source.error(path[:-1], f"key {path[-1]!r} is missing in {parent}", f"add {path[-1]!r}")
     what = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
+    if error["type"] in _OUT_OF_RANGE:
+        what = f"should be {range_text(_kind_at(model, path))}"
     hint = _nearest_word(error) or f"it reads {error['input']!r} now"[:120]
     return source.error(path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", hint)
+
+
+def _quoted(key: str | int) -> str:
+    """A key as an error names it: one that is no plain word is not repeated, for the file may be none of ours."""
+    return f"key {key!r}" if _WORD.fullmatch(str(key)) else "key that is no plain word"
 
 
 def _nearest_word(error: ErrorDetails) -> str | None:
@@ -188,6 +217,7 @@ def _nearest_word(error: ErrorDetails) -> str | None:
     return None if near is None else f"did you mean {near!r}?"
 
 
+_OUT_OF_RANGE: Final = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 _PLAINER: Final[Mapping[str, str]] = MappingProxyType(
     {
         "model_type": "should be a mapping of keys to values",
@@ -200,6 +230,7 @@ _PLAINER: Final[Mapping[str, str]] = MappingProxyType(
         "bool_type": "should be true or false",
         "string_too_short": "should not be empty",
         "too_short": "should not be empty",
+        "string_pattern_mismatch": "should hold something that can be seen, and no control characters",
         "finite_number": "should be a finite number",
     }
 )
@@ -213,17 +244,25 @@ def _field_names(model: type[BaseModel] | None) -> list[str]:
 
 
 def _model_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:
-    """The model that describes what stands at `path`, following fields, mappings and lists."""
+    """The model that describes what stands at `path`."""
+    kind = without_range(_kind_at(model, path))
+    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+
+
+def _kind_at(model: type[BaseModel], path: KeyPath) -> Any:
+    """The annotation of what stands at `path`, following fields, mappings and lists."""
     kind: Any = model
     for part in path:
         kind = _inside(kind, part)
-    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+    return kind
 
 
 def _inside(kind: Any, part: str | int) -> Any:
     """The annotation of what stands under `part` in something annotated `kind`."""
-    fields = {f.alias or n: f.annotation for n, f in getattr(kind, "model_fields", {}).items()}
+    kind = without_range(kind)
+    fields = {f.alias or n: Annotated[f.annotation, f] for n, f in getattr(kind, "model_fields", {}).items()}
     items = [arg for arg in get_args(kind) if arg is not Ellipsis]
     inner = fields[part] if part in fields else next(iter(items[-1:]), None)
-    optional = get_origin(inner) in (Union, UnionType)
-    return next(arg for arg in get_args(inner) if arg is not type(None)) if optional else inner
+    plain = without_range(inner)
+    optional = get_origin(plain) in (Union, UnionType)
+    return next(arg for arg in get_args(plain) if arg is not type(None)) if optional else inner

@@ -10,6 +10,7 @@ import enum
 import json
 import math
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -29,7 +30,8 @@ class EventLog:
     """An open event log. Call it to log a message (`skills.api.Publish`); `close` it at the end.
 
     Whatever is older than a second of the robot's clock has reached the file, so that a killed process leaves a log
-    that can be read. `bytes` counts those of all messages but the wall's times, which differ from run to run.
+    that can be read. When the disk is full, nothing more is written, and what was written can be read. `bytes` counts
+    those of all messages but the wall's times, which differ from run to run.
     """
 
     def __init__(self, path: Path, clock: Clock) -> None:
@@ -45,6 +47,7 @@ class EventLog:
         self._sequence = 0
         self.bytes = 0
         self._closed = False
+        self._failure: OSError | None = None
         self._listeners: list[Listener] = []
 
     def listen(self, listener: Listener) -> None:
@@ -52,9 +55,18 @@ class EventLog:
         self._listeners.append(listener)
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Log a message under a topic. Raises ValueError on a closed log."""
+        """Log a message under a topic. Raises ValueError on a closed log, OSError: it cannot be written."""
         if self._closed:
             raise ValueError("the event log is closed")
+        if self._failure is not None:
+            raise self._failure
+        try:
+            self._log(topic, message)
+        except OSError as error:
+            self._failure = error
+            raise
+
+    def _log(self, topic: str, message: Mapping[str, Any]) -> None:
         now_s = self._clock.now()
         for shown_under, shown in drawable(topic, message, now_s):
             self._write(shown_under, plain_values(shown), now_s)
@@ -76,11 +88,13 @@ class EventLog:
         self._writer.flush()
 
     def close(self) -> None:
-        """Finish the file; idempotent."""
-        if not self._closed:
-            self._closed = True
-            self._writer.finish()
-            self._file.close()
+        """Finish the file; idempotent. Raises OSError when it cannot be written, but not twice for one reason."""
+        if self._closed:
+            return
+        self._closed, broken = True, self._failure is not None
+        with suppress(OSError) if broken else nullcontext(), self._file:
+            if not broken:
+                self._writer.finish()
 
     def _channel(self, topic: str, schema: Schema) -> int:
         key = (topic, schema.name)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
 
+from executive.mission.errors import disk_is_full
 from executive.record.profile import Profile
 from executive.record.schemas import CONTROL
 from executive.record.ticks import TickMeter
@@ -104,7 +105,7 @@ def run(
     ticked, and what passes does not count against any limit. Whatever happens, all trees and robots are stopped and all
     leases returned before this returns. Without control, equal seeds give equal logs. `work` counts what is computed,
     `profile` times the skills. Raises ValueError: no entries, two robots of one name, or a breakpoint at a node that
-    there is not.
+    there is not. Raises OSError, when all is stopped: the disk is full.
     """
     names = [entry.robot.name for entry in entries]
     if not entries or len(set(names)) != len(names):
@@ -155,6 +156,7 @@ class _Run:
 
     def _watched_run(self, entries: Sequence[RunEntry]) -> RunResult:
         ending: Ending | None = None
+        full: BaseException | None = None
         try:
             for entry in sorted(entries, key=lambda entry: entry.robot.name):
                 self._sessions.append(self._open(entry))
@@ -163,11 +165,14 @@ class _Run:
         except (Exception, VerbHung, KeyboardInterrupt) as stop:
             self._publish.ending = True
             ending = self._ending(stop)
+            full = stop if disk_is_full(stop) else None
         finally:
             self._publish.ending = True
             for session in self._sessions:
                 session.close(ending)
             self._tell(self._control.end())
+        if full is not None:
+            raise full
         return self._result(entries, ending)
 
     def _open(self, entry: RunEntry) -> Session:

@@ -8,11 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from executive.mission.errors import InputError
+from executive.mission.errors import InputError, disk_is_full
 
 VERSION: Final = 2
 APPLICATION_ID: Final = 0x45525244  # "ERRD"
 BUSY_S: Final = 2.0
+_DAMAGED: Final = "move it away (its missions are lost), or name another by --store"
 _SCHEMA: Final = """
 CREATE TABLE mission (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -64,6 +65,8 @@ def connect(path: Path, *, create: bool) -> sqlite3.Connection:
     """
     if not create and not path.is_file():
         raise InputError("there is no store", hint="run or queue a mission first, or name one by --store", file=path)
+    if path.is_file() and path.stat().st_size == 0:
+        raise InputError("the store is damaged (it is empty)", hint=_DAMAGED, file=path)
     with told(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
@@ -103,7 +106,8 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        connection.execute("ROLLBACK")
+        if connection.in_transaction:  # a full disk has rolled it back
+            connection.execute("ROLLBACK")
         raise
     connection.execute("COMMIT")
 
@@ -114,16 +118,25 @@ def told(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.OperationalError as error:
+        if "full" in str(error):
+            raise full_disk(path) from error
         hint = "end the program that keeps it open, then try again" if _busy(error) else "name another by --store"
         what = "another program has locked the store" if _busy(error) else f"cannot use the store ({error})"
         raise InputError(what, hint=hint, file=path) from error
     except sqlite3.DatabaseError as error:
-        hint = "move it away (its missions are lost), or name another by --store"
-        raise InputError(f"the store is damaged ({error})", hint=hint, file=path) from error
+        raise InputError(f"the store is damaged ({error})", hint=_DAMAGED, file=path) from error
     except OSError as error:
+        if disk_is_full(error):
+            raise full_disk(path) from error
         raise InputError(
             f"cannot use the store ({error.strerror})", hint="name another by --store", file=path
         ) from error
+
+
+def full_disk(store: Path) -> InputError:
+    """The way on when the disk has become full under a mission of a store."""
+    hint = f"what was written is kept: free space, then go on with `errand resume --store {store}`"
+    return InputError("the disk is full", hint=hint)
 
 
 def _busy(error: sqlite3.OperationalError) -> bool:

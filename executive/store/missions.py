@@ -8,10 +8,11 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import TextIO
 
 from py_trees.common import Status
 
@@ -139,18 +140,23 @@ class MissionStore:
 
         Raises InputError: another process runs one.
         """
-        with told(self.path), self.path.with_name(f"{self.path.name}-claim").open("a+") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                file.seek(0)
-                hint = "wait until it is done, or give another folder by --out or another --store"
-                what = f"process {file.read() or '?'} runs a mission of this store"
-                raise InputError(what, hint=hint, file=self.path) from error
-            file.truncate(0)
-            file.write(str(os.getpid()))
-            file.flush()
+        with ExitStack() as stack:
+            with told(self.path):
+                file = stack.enter_context(self.path.with_name(f"{self.path.name}-claim").open("a+"))
+                self._claim(file)
             yield
+
+    def _claim(self, file: TextIO) -> None:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            file.seek(0)
+            hint = "wait until it is done, or give another folder by --out or another --store"
+            what = f"process {file.read() or '?'} runs a mission of this store"
+            raise InputError(what, hint=hint, file=self.path) from error
+        file.truncate(0)
+        file.write(str(os.getpid()))
+        file.flush()
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -13,10 +13,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
-from executive.mission.errors import InputError, listing, suggestion
+from executive.mission.errors import InputError
 from executive.mission.yaml_source import YamlSource, read_yaml, validate
 from executive.testing.small_room import room_knowledge
 from executive.tree.port_values import PortValueError, gathered, port_value
+from executive.tree.registry import missing
 from executive.tree.types import describe_type, field_types, required
 from skills.api import Cause, Skill
 from skills.testing.fault_kinds import STANDARD_FAULTS, FaultKind
@@ -178,8 +179,7 @@ def load_skill_tests(
     file = validate(SkillTestFile, source)
     file._source = source
     if file.skill not in skills:
-        hint = suggestion(file.skill, skills, f"registered are {listing(skills)}")
-        raise file.error(("skill",), f"there is no skill '{file.skill}'", hint)
+        raise file.error(("skill",), *missing(file.skill, skills))
     for index, test in enumerate(file.tests):
         file.inputs(index, skills[file.skill])
         for number, words in enumerate(test.faults):

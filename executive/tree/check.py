@@ -42,6 +42,7 @@ class Checked:
 
     errors: tuple[InputError, ...]
     estimate: Estimate
+    warnings: tuple[InputError, ...] = ()
 
 
 class PlannedRoutes(RoutePlanner):
@@ -82,8 +83,8 @@ def check_tree(
     enough, its places in reach, and does the gripper hold in each step what that step needs?"""
     impossible = tuple(error for part in tree.parts for error in _impossible(part, tree, knowledge, abilities))
     grasps = tuple(_gripper_errors(tree, knowledge, held))
-    estimate, unreachable = estimate_tree(tree.root, start=start, planner=planner, estimates=estimates)
-    return Checked((*impossible, *grasps, *unreachable), estimate)
+    estimate, unreachable, warnings = estimate_tree(tree.root, start=start, planner=planner, estimates=estimates)
+    return Checked((*impossible, *grasps, *unreachable), estimate, warnings)
 
 
 def _gripper_errors(tree: CompiledTree, knowledge: Knowledge, held: InGripper | None) -> Iterator[InputError]:

@@ -23,6 +23,7 @@ __all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "e
 
 Positive = Annotated[float, Field(gt=0.0)]
 NAVIGATE: Final = "navigate"
+CHARGE: Final = "charge"
 
 
 class _Data(BaseModel):
@@ -91,7 +92,7 @@ class _CannotError(Exception):
 
 @dataclass
 class _Walk:
-    """Where the robot would be by now, and which poses it would have noted."""
+    """Where the robot would be by now, which poses it would have noted, and the charge drawn since it was last full."""
 
     planner: RoutePlanner
     estimates: Estimates
@@ -99,14 +100,23 @@ class _Walk:
     noted: dict[str, Pose2D] = field(default_factory=dict)
     written: set[str] = field(default_factory=set)
     errors: list[InputError] = field(default_factory=list)
+    warnings: list[InputError] = field(default_factory=list)
+    drawn: float = 0.0
+
+    def draw(self, node: NodeSpec, charge: float) -> None:
+        """A skill draws this share of a full battery, or charges it; the one that empties it is warned of."""
+        before, self.drawn = self.drawn, 0.0 if node.name == CHARGE else self.drawn + charge
+        if before <= 1.0 < self.drawn:
+            hint = f"charge before it (`skill: {CHARGE}`) or split the mission, or it is interrupted for the dock"
+            self.warnings.append(InputError.at(node.source, "a full battery does not last until here", hint=hint))
 
 
 def estimate_tree(
     root: NodeSpec, *, start: Pose2D, planner: RoutePlanner, estimates: Estimates
-) -> tuple[Estimate, tuple[InputError, ...]]:
-    """What a tree will take from `start` on, and the places in it that cannot be reached, with their lines."""
+) -> tuple[Estimate, tuple[InputError, ...], tuple[InputError, ...]]:
+    """What a tree will take from `start` on, with their lines the places that cannot be reached, and warnings."""
     walk = _Walk(planner, estimates, start)
-    return _followed(root, walk, first=False), tuple(walk.errors)
+    return _followed(root, walk, first=False), tuple(walk.errors), tuple(walk.warnings)
 
 
 @functools.cache
@@ -159,11 +169,11 @@ def _all_that_can(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 def _tried(way: NodeSpec, walk: _Walk, reasons: list[InputError]) -> Estimate | None:
     """One branch; None where it cannot be followed: then the walk stands as before, and `reasons` has its reason."""
-    here, noted = walk.pose, dict(walk.noted)
+    here, noted, drawn = walk.pose, dict(walk.noted), walk.drawn
     try:
         return _followed(way, walk, first=True)
     except _CannotError as cannot:
-        walk.pose, walk.noted = here, noted
+        walk.pose, walk.noted, walk.drawn = here, noted, drawn
         reasons += [] if cannot.error is None else [cannot.error]
         return None
 
@@ -181,6 +191,12 @@ def _remember(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 
 def _skill(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    taken = _skill_alone(node, walk)
+    walk.draw(node, taken.charge)
+    return taken
+
+
+def _skill_alone(node: NodeSpec, walk: _Walk) -> Estimate:
     goal = _goal(node, walk)
     walk.written.update(node.options["outputs"].values())
     if goal is None:

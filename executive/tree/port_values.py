@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import enum
 import math
-import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
@@ -22,12 +21,12 @@ from executive.mission.errors import listing, suggestion
 from executive.mission.knowledge import Knowledge
 from executive.tree.types import describe_type, field_types, required
 from skills.api import Surface, Thing
+from skills.quantities import bounds, in_range, range_text, without_range, without_unit
 from skills.robot import Pose2D
 
 __all__ = ["FROM_KEY", "PortValueError", "gathered", "port_value"]
 
 FROM_KEY: Final = "from"
-_UNIT: Final = re.compile(r"_(m|rad|s|n|m_s|rad_s|kg|deg)$")
 Path = tuple[str | int, ...]
 
 
@@ -64,7 +63,9 @@ def gathered(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, A
 
 
 def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> Any:
-    """`value` as the type `hint`. Raises PortValueError."""
+    """`value` as the type `hint`, in its range. Raises PortValueError."""
+    if bounds(hint):
+        return _in_range(port_value(value, without_range(hint), knowledge, path), hint, path)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if hint is Any:
         return value
@@ -87,7 +88,7 @@ def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> 
 def _named(key: str, names: Iterable[str]) -> str | None:
     """The name that a key means, with or without its unit."""
     known = list(names)
-    return key if key in known else next((name for name in known if _UNIT.sub("", name) == key), None)
+    return key if key in known else next((name for name in known if without_unit(name) == key), None)
 
 
 def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable[str]) -> str:
@@ -98,7 +99,7 @@ def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable
     ]
     if len(fitting) == 1:
         return fitting[0]
-    fields = {_UNIT.sub("", name) for names in (*records.values(), hints) for name in names}
+    fields = {without_unit(name) for names in (*records.values(), hints) for name in names}
     known = {**dict.fromkeys(hints), **dict.fromkeys(sorted(fields))}
     wrong = next((key for key in loose if _named(key, known) is None), next(iter(loose)))
     ports = f"its ports are {listing(hints)}" if hints else "it has no input ports"
@@ -148,7 +149,7 @@ def _mapping(value: Any, arguments: tuple[Any, ...], knowledge: Knowledge, path:
 def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
     """A dataclass from a mapping of its fields."""
     hints = field_types(record)
-    plain = [_UNIT.sub("", field.name) for field in dataclasses.fields(record)]
+    plain = [without_unit(field.name) for field in dataclasses.fields(record)]
     if not isinstance(value, dict):
         raise _refusal(value, f"a mapping with {listing(plain)}", path)
     read: dict[str, Any] = {}
@@ -161,7 +162,7 @@ def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
     filled = {**_DEFAULTS.get(record, {}), **read}
     for name in required(record):
         if name not in filled:
-            raise PortValueError(path, f"'{_UNIT.sub('', name)}' is missing", f"give {listing(plain)}")
+            raise PortValueError(path, f"'{without_unit(name)}' is missing", f"give {listing(plain)}")
     try:
         return record(**filled)
     except (ValueError, TypeError) as error:
@@ -190,6 +191,12 @@ def _plain(value: Any, hint: Any, path: Path) -> Any:
     if not fits or (isinstance(value, float) and not math.isfinite(value)):
         raise _refusal(value, kinds[1], path)
     return float(value) if hint is float else value
+
+
+def _in_range(value: float, hint: Any, path: Path) -> float:
+    if not in_range(value, hint):
+        raise PortValueError(path, f"{value:g} is out of range", f"give a value {range_text(hint)}")
+    return value
 
 
 def _pose(value: Any, knowledge: Knowledge, path: Path) -> Pose2D:

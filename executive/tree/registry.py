@@ -11,10 +11,11 @@ import dataclasses
 import inspect
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 
-from executive.mission.errors import InputError
+from executive.mission.errors import InputError, suggestion
 from executive.tree.types import describe_type, field_types
 from skills.api import Cause, Skill
 
@@ -24,17 +25,44 @@ DISTRIBUTION: Final = "spot-errand"
 SkillClass = type[Skill[Any]]
 
 
-def installed_skills() -> dict[str, SkillClass]:
-    """All registered skills by name, ours and others', in the order of their names.
+@dataclass(frozen=True)
+class SkillRegistry(Mapping[str, SkillClass]):
+    """The skills that can be used, by name. `broken` says why others cannot, naming the distribution."""
 
-    Raises InputError: a registered skill cannot be loaded, does not keep the rules for skills, or has the name of
-    another; the message names the distribution that registers it. Or none of ours are registered.
+    usable: Mapping[str, SkillClass]
+    broken: Mapping[str, InputError]
+
+    def __getitem__(self, name: str) -> SkillClass:
+        return self.usable[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.usable)
+
+    def __len__(self) -> int:
+        return len(self.usable)
+
+
+def missing(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, str]:
+    """Why a registry has no skill of this name, and the hint."""
+    if isinstance(registry, SkillRegistry) and name in registry.broken:
+        return registry.broken[name].message, registry.broken[name].hint
+    return f"there is no skill '{name}'", suggestion(name, registry)
+
+
+def installed_skills() -> SkillRegistry:
+    """All registered skills, ours and others', in the order of their names.
+
+    One that cannot be loaded, does not keep the rules for skills, or has the name of another is broken: it does not
+    harm the others, and never takes the place of ours. Raises InputError: ours are not registered, or one is broken.
     """
     found = tuple(entry_points(group=GROUP))
     if not any(_distribution(entry) == DISTRIBUTION for entry in found):
         hint = "install the project that these sources belong to: pip install --editable ."
         raise InputError(f"no skill of {DISTRIBUTION} is registered under '{GROUP}'", hint=hint)
-    return skills_of(found)
+    ours = skills_of(entry for entry in found if _distribution(entry) == DISTRIBUTION)
+    others = _registry_of(found)
+    usable = {name: others[name] for name in others if name not in ours} | ours
+    return SkillRegistry(dict(sorted(usable.items())), others.broken)
 
 
 def built_in_skills() -> dict[str, SkillClass]:
@@ -44,15 +72,30 @@ def built_in_skills() -> dict[str, SkillClass]:
 
 def skills_of(entries: Iterable[EntryPoint]) -> dict[str, SkillClass]:
     """The skills of these entry points by name, each checked. Raises InputError."""
+    registry = _registry_of(entries)
+    for error in registry.broken.values():
+        raise error
+    return dict(registry)
+
+
+def _registry_of(entries: Iterable[EntryPoint]) -> SkillRegistry:
+    """The skills of these entry points, those apart that cannot be used."""
     owners: dict[str, EntryPoint] = {}
-    found: dict[str, SkillClass] = {}
+    usable: dict[str, SkillClass] = {}
+    broken: dict[str, InputError] = {}
     for entry in sorted(entries, key=lambda entry: (entry.name, _distribution(entry))):
-        if entry.name in owners and owners[entry.name].value != entry.value:
-            both = f"{_distribution(owners[entry.name])} and {_distribution(entry)}"
-            raise InputError(f"{both} both register a skill '{entry.name}'", hint="uninstall one, or rename its skill")
-        owners[entry.name] = entry
-        found[entry.name] = _checked(entry)
-    return found
+        try:
+            _refuse_second(entry, owners.setdefault(entry.name, entry))
+            usable[entry.name] = _checked(entry)
+        except InputError as error:
+            broken[entry.name] = error
+    return SkillRegistry({name: skill for name, skill in usable.items() if name not in broken}, broken)
+
+
+def _refuse_second(entry: EntryPoint, owner: EntryPoint) -> None:
+    if owner.value != entry.value:
+        both = f"{_distribution(owner)} and {_distribution(entry)}"
+        raise InputError(f"{both} both register a skill '{entry.name}'", hint="uninstall one, or rename its skill")
 
 
 def _checked(entry: EntryPoint) -> SkillClass:
@@ -65,7 +108,7 @@ def _checked(entry: EntryPoint) -> SkillClass:
 def _loaded(entry: EntryPoint) -> Any:
     try:
         return entry.load()
-    except Exception as defect:
+    except (Exception, SystemExit) as defect:
         what = f"cannot load {entry.value} ({type(defect).__name__}: {defect})"
         raise _error(entry, what, "repair or uninstall that distribution") from defect
 

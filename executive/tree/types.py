@@ -9,9 +9,16 @@ import typing
 from collections.abc import Mapping
 from typing import Any, Union
 
+from skills.quantities import bounds, in_range, range_text, without_range
+
 
 def conforms(value: Any, hint: Any) -> bool:
-    """True when `value` is of the type that `hint` names; an int passes as a float, parameters are checked."""
+    """True when `value` is of the type that `hint` names and in its range.
+
+    An int passes as a float; parameters are checked.
+    """
+    if bounds(hint):
+        return conforms(value, without_range(hint)) and in_range(value, hint)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if hint is Any:
         return True
@@ -33,7 +40,8 @@ def _tuple_conforms(value: tuple[Any, ...], arguments: tuple[Any, ...]) -> bool:
 
 
 def assignable(source: Any, target: Any) -> bool:
-    """True when every value of type `source` may go into a port of type `target`."""
+    """True when every value of type `source` may go into a port of type `target`, whose range is checked elsewhere."""
+    source, target = without_range(source), without_range(target)
     if target is Any or source == target or (source is int and target is float):
         return True
     if typing.get_origin(target) in (Union, types.UnionType):
@@ -49,15 +57,22 @@ def required(record: type) -> tuple[str, ...]:
 
 
 def describe_type(hint: Any) -> str:
-    """A type hint as a user reads it."""
+    """A type hint as a user reads it: "float above 0 and at most 3"."""
+    if bounds(hint):
+        return f"{describe_type(without_range(hint))} {range_text(hint)}"
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is tuple:
+        return f"tuple[{', '.join('...' if one is Ellipsis else describe_type(one) for one in arguments)}]"
+    if origin in (Union, types.UnionType):
+        return " | ".join("None" if one is type(None) else describe_type(one) for one in arguments)
     return hint.__name__ if isinstance(hint, type) and not typing.get_args(hint) else str(hint).replace("typing.", "")
 
 
 def field_types(record: type) -> Mapping[str, Any]:
-    """The resolved type hints of a dataclass, by field name."""
+    """The resolved type hints of a dataclass, ranges included, by field name."""
     return _resolved(record)
 
 
 @functools.lru_cache(maxsize=512)
 def _resolved(record: type) -> Mapping[str, Any]:
-    return types.MappingProxyType(typing.get_type_hints(record))
+    return types.MappingProxyType(typing.get_type_hints(record, include_extras=True))

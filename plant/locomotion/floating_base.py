@@ -28,26 +28,26 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from plant.snapshot.values import State
-from skills.robot import FloatArray, Pose2D
+from skills.robot import FloatArray, Pose2D, quantities
 
 
 @dataclass(frozen=True)
 class FloatingBaseLimits:
     """A planar floating base that bears the body: what it can do; forces in N, torques in N m."""
 
-    speed_m_s: float = 1.6
-    turn_rate_rad_s: float = 2.0
-    acceleration_m_s2: float = 2.0
-    turn_acceleration_rad_s2: float = 4.0
-    stop_deceleration_m_s2: float = 5.0
-    stop_turn_deceleration_rad_s2: float = 12.0
-    posture_speed_m_s: float = 0.25
-    pitch_rate_rad_s: float = 0.6
-    force_n: float = 250.0
-    torque_nm: float = 120.0
-    lift_n: float = 900.0
-    pitch_torque_nm: float = 250.0
-    lead_m: float = 0.02
+    speed_m_s: quantities.Speed = 1.6
+    turn_rate_rad_s: quantities.TurnRate = 2.0
+    acceleration_m_s2: quantities.Acceleration = 2.0
+    turn_acceleration_rad_s2: quantities.TurnAcceleration = 4.0
+    stop_deceleration_m_s2: quantities.Acceleration = 5.0
+    stop_turn_deceleration_rad_s2: quantities.TurnAcceleration = 12.0
+    posture_speed_m_s: quantities.Speed = 0.25
+    pitch_rate_rad_s: quantities.TurnRate = 0.6
+    force_n: quantities.Force = 250.0
+    torque_nm: quantities.Torque = 120.0
+    lift_n: quantities.Force = 900.0
+    pitch_torque_nm: quantities.Torque = 250.0
+    lead_m: quantities.Length = 0.02
 
 
 @dataclass(frozen=True)

@@ -77,9 +77,10 @@ class SnapshotFile:
         self.next_number = max(numbers.values()) + 1
 
     def write(self, content: bytes) -> None:
-        """Write one whole snapshot."""
-        slot = self._slots[0]
-        os.pwrite(self._files[slot], content, 0)
+        """Write one whole snapshot. Raises OSError when the disk is full: the one before stays whole."""
+        slot, done = self._slots[0], 0
+        while done < len(content):
+            done += os.pwrite(self._files[slot], content[done:], done)
         self._slots.reverse()
         self.next_number += 1
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 WORLDS_FOLDER = Path(__file__).resolve().parent
 PACKAGE_NAME = "errand"
+MAX_BYTES = 1_000_000
 
 Point = tuple[float, float]
 Polygon = tuple[Point, ...]
@@ -32,7 +33,7 @@ class WorldError(ValueError):
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Rules(_Strict):
@@ -187,6 +188,8 @@ def _find_folder(name_or_path: str | Path) -> Path:
 
 def _read(path: Path, schema: type[ModelT]) -> ModelT:
     """Read and check a YAML file; every error names the file, the line and the key."""
+    if path.exists() and not (path.is_file() and path.stat().st_size <= MAX_BYTES):
+        raise WorldError(f"{path}: it is no plain file of at most {MAX_BYTES} bytes; every world needs this file")
     try:
         text = path.read_text(encoding="utf-8")
         root = yaml.compose(text, Loader=yaml.CSafeLoader)
@@ -198,6 +201,8 @@ def _read(path: Path, schema: type[ModelT]) -> ModelT:
         raise WorldError(f"{path}:{line}: broken YAML, {error.problem}; correct the syntax there") from error
     except ValidationError as error:
         raise WorldError(f"{path}:{_complaint(root, error)}") from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise WorldError(f"{path}:1: it cannot be read as YAML ({type(error).__name__}); correct it") from error
 
 
 def _complaint(root: yaml.Node | None, error: ValidationError) -> str:

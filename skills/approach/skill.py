@@ -20,6 +20,7 @@ from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.planning import body_height_m, within_reach
 from skills.navigate.skill import NavigateInputs
+from skills.quantities import Count, Length, Margin, Speed, Turn
 from skills.robot import Pose2D
 
 _STILL_BEFORE_M = 1.3
@@ -41,11 +42,11 @@ class ApproachOptions:
     `good_grasp` above the best there is, it stays.
     """
 
-    position_tolerance_m: float = 0.06
-    yaw_tolerance_rad: float = 0.08
-    speed_m_s: float = 0.5
-    tries: int = 3
-    good_grasp: float = 0.1
+    position_tolerance_m: Length = 0.06
+    yaw_tolerance_rad: Turn = 0.08
+    speed_m_s: Speed = 0.5
+    tries: Count = 3
+    good_grasp: Margin = 0.1
 
 
 class Approach(ArmSkill[ApproachInputs]):

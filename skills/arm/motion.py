@@ -14,6 +14,7 @@ from pydrake.math import RigidTransform
 from skills.api import PlanningError
 from skills.arm.collision import ArmScene
 from skills.arm.kinematics import ArmModel
+from skills.quantities import Count, Duration, Length, Tries, Turn, TurnAcceleration, TurnRate
 from skills.robot import ArmTrajectory, FloatArray
 
 _FEWEST_POINTS = 9
@@ -29,15 +30,15 @@ class RrtConnect:
     points `dense_rad` apart.
     """
 
-    step_rad: float = 0.25
-    iterations: int = 1500
-    shortcuts: int = 80
-    line_step_m: float = 0.01
-    line_jump_rad: float = 0.35
-    speed_rad_s: float = 1.2
-    acceleration_rad_s2: float = 3.0
-    sample_s: float = 0.04
-    dense_rad: float = 0.02
+    step_rad: Turn = 0.25
+    iterations: Count = 1500
+    shortcuts: Tries = 80
+    line_step_m: Length = 0.01
+    line_jump_rad: Turn = 0.35
+    speed_rad_s: TurnRate = 1.2
+    acceleration_rad_s2: TurnAcceleration = 3.0
+    sample_s: Duration = 0.04
+    dense_rad: Turn = 0.02
 
     def path(
         self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator

@@ -13,6 +13,7 @@ from skills.api import Cause, Failed, Running, Skill, SkillContext, Step, Succee
 from skills.geometry import compose, relative
 from skills.navigate.base import Base
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
+from skills.quantities import Delay, Length, Speed
 from skills.robot import Pose2D
 
 DIRECTIONS_RAD = tuple(math.radians(degrees) for degrees in (180, 150, -150, 90, -90, 30, -30, 0))
@@ -24,17 +25,17 @@ _STEP_M = 0.05
 class BackOffInputs:
     """How far (m) to go, and how far at least for it to count."""
 
-    distance_m: float = 0.4
-    least_m: float = 0.15
+    distance_m: Length = 0.4
+    least_m: Length = 0.15
 
 
 @dataclass(frozen=True)
 class BackOffOptions:
     """How fast the robot goes, how near the goal it stops (m), and how long it takes to come to rest (s)."""
 
-    speed_m_s: float = 0.25
-    arrived_m: float = 0.03
-    settle_s: float = 0.4
+    speed_m_s: Speed = 0.25
+    arrived_m: Length = 0.03
+    settle_s: Delay = 0.4
 
 
 class BackOff(Skill[BackOffInputs]):

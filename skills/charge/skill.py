@@ -7,21 +7,22 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
+from skills.quantities import Duration, Share
 
 
 @dataclass(frozen=True)
 class ChargeInputs:
     """The state of charge (0 to 1) to wait for."""
 
-    level: float = 0.8
+    level: Share = 0.8
 
 
 @dataclass(frozen=True)
 class ChargeOptions:
     """A battery that has not gained `least_gain` (a share) within `no_gain_s` does not charge."""
 
-    no_gain_s: float = 30.0
-    least_gain: float = 0.005
+    no_gain_s: Duration = 30.0
+    least_gain: Share = 0.005
 
 
 class Charge(Skill[ChargeInputs]):

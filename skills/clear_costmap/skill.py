@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from skills.api import Cause, Failed, ForgettingCostmap, Running, Skill, Step, Succeeded
+from skills.quantities import Delay
 
 
 @dataclass(frozen=True)
 class ClearCostmapInputs:
     """How long (s) to look anew before going on; two scans must agree on what they see."""
 
-    look_s: float = 1.0
+    look_s: Delay = 1.0
 
 
 class ClearCostmap(Skill[ClearCostmapInputs]):

@@ -33,6 +33,7 @@ from skills.perception.detection_3d import FLOOR, Detection3D, detections_3d, ob
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.perception.surface_segmentation import Cluster, view_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
+from skills.quantities import Angle, Coordinate, Duration, Height, Length, Tries
 from skills.robot import FloatArray, Image
 
 _LEAST_SEEN = 0.02
@@ -51,8 +52,8 @@ class DetectInputs:
     classes: tuple[str, ...]
     surfaces: tuple[Surface, ...]
     attributes: tuple[str, ...] = ()
-    expected_W: tuple[float, float, float] | None = None
-    count: int = 1
+    expected_W: tuple[Coordinate, Coordinate, Height] | None = None
+    count: Tries = 1
     floor: bool = False
 
 
@@ -80,13 +81,13 @@ class DetectOptions:
     `expected_within_m` of where it is expected, and on the floor within `floor_within_m` of the robot.
     """
 
-    confirm_shifts_rad: tuple[float, ...] = (0.25, -0.3)
-    candidates: int = 3
-    expected_within_m: float = 0.35
-    floor_within_m: float = 2.2
-    closer_looks: int = 3
-    fresh_s: float = 1.5
-    around_rad: tuple[float, ...] = (0.7, -0.7)
+    confirm_shifts_rad: tuple[Angle, ...] = (0.25, -0.3)
+    candidates: Tries = 3
+    expected_within_m: Length = 0.35
+    floor_within_m: Length = 2.2
+    closer_looks: Tries = 3
+    fresh_s: Duration = 1.5
+    around_rad: tuple[Angle, ...] = (0.7, -0.7)
 
 
 class Detect(ArmSkill[DetectInputs]):

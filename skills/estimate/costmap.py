@@ -18,6 +18,7 @@ from skills.estimate.scan_points import scan_points, sensor_pose
 from skills.estimate.seen_layer import clear_cells, mark_cells
 from skills.estimate.self_filter import SelfFilter, in_body_axes
 from skills.geometry import compose
+from skills.quantities import Count, Delay, Height, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 
@@ -30,14 +31,14 @@ class CostmapOptions:
     a beam sees past it. A depth picture must put `min_points_per_cell` points into a cell.
     """
 
-    heights_m: tuple[float, float] = (0.1, 1.0)
-    max_range_m: float = 4.0
-    azimuths: int = 450
-    explained_m: float = 0.15
-    confirm_s: float = 0.6
-    memory_s: float = 12.0
-    cell_m: float = 0.05
-    min_points_per_cell: int = 3
+    heights_m: tuple[Height, Height] = (0.1, 1.0)
+    max_range_m: Length = 4.0
+    azimuths: Count = 450
+    explained_m: Margin = 0.15
+    confirm_s: Delay = 0.6
+    memory_s: Delay = 12.0
+    cell_m: Length = 0.05
+    min_points_per_cell: Count = 3
 
     def build(self, keepout: GridMap) -> LayeredCostmap:
         """A costmap on a surveyed keep-out grid."""

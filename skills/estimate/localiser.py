@@ -13,6 +13,7 @@ from skills.estimate.grid_map import GridMap
 from skills.estimate.matching import Match, MatchOptions, match, score_poses
 from skills.estimate.scan_points import scan_points
 from skills.geometry import compose, inverse, relative
+from skills.quantities import Count, Height, Length, Share, Turn
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 _HEIGHTS_M = (0.7, 1.3)
@@ -30,23 +31,23 @@ class LocaliserOptions:
     shares differ by less than `alike_share` count as alike.
     """
 
-    height_band_m: tuple[float, float] | None = None
-    max_range_m: float = 15.0
-    azimuths: int = 200
-    max_points: int = 500
-    min_points: int = 40
-    initial_sigma: tuple[float, float, float] = (0.15, 0.15, 0.1)
-    drift_per_m: float = 0.03
-    yaw_drift_rad_per_m: float = 0.02
-    yaw_drift_per_rad: float = 0.03
-    unsure_sigma: tuple[float, float, float] = (0.5, 0.5, 0.3)
-    unsure_radius_m: float = 4.0
-    lost_share: float = 0.4
-    found_share: float = 0.6
-    alike_share: float = 0.02
-    lost_scans: int = 5
-    search_radius_m: float = 1.5
-    search_every_scans: int = 10
+    height_band_m: tuple[Height, Height] | None = None
+    max_range_m: Length = 15.0
+    azimuths: Count = 200
+    max_points: Count = 500
+    min_points: Count = 40
+    initial_sigma: tuple[Length, Length, Turn] = (0.15, 0.15, 0.1)
+    drift_per_m: Share = 0.03
+    yaw_drift_rad_per_m: Share = 0.02
+    yaw_drift_per_rad: Share = 0.03
+    unsure_sigma: tuple[Length, Length, Turn] = (0.5, 0.5, 0.3)
+    unsure_radius_m: Length = 4.0
+    lost_share: Share = 0.4
+    found_share: Share = 0.6
+    alike_share: Share = 0.02
+    lost_scans: Count = 5
+    search_radius_m: Length = 1.5
+    search_every_scans: Count = 10
     matching: MatchOptions = field(default_factory=MatchOptions)
 
     def build(self, grid: GridMap, start: Pose2D, *, surely: bool) -> ScanMatchingLocaliser:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from skills.estimate.compiled import bilinear, compiled
 from skills.estimate.grid_map import GridMap
 from skills.geometry import wrap
+from skills.quantities import Count, Factor, Length
 from skills.robot import FloatArray, Pose2D
 
 INLIER_M = 0.15
@@ -25,11 +26,11 @@ class MatchOptions:
     as `effective_points` independent ones. Points further off than `outlier_m` have no weight.
     """
 
-    sigma_m: float = 0.05
-    effective_points: float = 80.0
-    outlier_m: float = 0.25
-    coarse_outlier_m: float = 0.5
-    iterations: int = 12
+    sigma_m: Length = 0.05
+    effective_points: Factor = 80.0
+    outlier_m: Length = 0.25
+    coarse_outlier_m: Length = 0.5
+    iterations: Count = 12
 
 
 @dataclass(frozen=True)

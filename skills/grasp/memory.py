@@ -10,6 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.grasp.candidates import GraspCandidate
+from skills.quantities import Coordinate, Cosine
 from skills.robot import FloatArray
 
 SAME_TURN_RAD = 0.35
@@ -22,9 +23,9 @@ Vector = tuple[float, float, float]
 class TriedGrasp:
     """A grasp in the world's axes: where the fingers point, how they close, the hand from the object (m)."""
 
-    pointing_W: Vector
-    closing_W: Vector
-    hand_from_thing_W: Vector
+    pointing_W: tuple[Cosine, Cosine, Cosine]
+    closing_W: tuple[Cosine, Cosine, Cosine]
+    hand_from_thing_W: tuple[Coordinate, Coordinate, Coordinate]
 
 
 def tried_grasp(candidate: GraspCandidate, centre_B: tuple[float, float], X_WB: RigidTransform) -> TriedGrasp:

@@ -12,6 +12,7 @@ from skills.api import PlanningError
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.quantities import Margin, TurnRate
 from skills.robot import ArmTrajectory, Capabilities, FloatArray, GripperCapabilities
 from skills.stack import ArmPlanner
 
@@ -51,11 +52,11 @@ class GeometricGraspPlanner:
     objects that lie low, since a finger that comes down on top of one is stopped by it.
     """
 
-    padding_m: float = 0.01
-    final_padding_m: float = 0.003
-    approach_rad_s: float = 0.4
-    beside_fixed_m: float = 0.010
-    beside_fixed_low_m: float = 0.017
+    padding_m: Margin = 0.01
+    final_padding_m: Margin = 0.003
+    approach_rad_s: TurnRate = 0.4
+    beside_fixed_m: Margin = 0.010
+    beside_fixed_low_m: Margin = 0.017
 
     def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
         """Grasps, the best first; empty when the object is too wide. p_BS is the shoulder."""

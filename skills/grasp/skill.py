@@ -22,6 +22,7 @@ from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, body_hei
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.perception.surface_segmentation import Cluster, SurfaceView, cluster_of, parted, view_surface
+from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import FloatArray, Image
 
 _LOOK_HALF_SIDE_M = 0.4
@@ -58,10 +59,10 @@ class GraspOptions:
     while it lifts has lost it. After lifting the hand draws back by `pull_back_m`.
     """
 
-    force_n: float = 80.0
-    same_object_m: float = 0.12
-    slip_rad: float = 0.12
-    pull_back_m: float = 0.12
+    force_n: Force = 80.0
+    same_object_m: Length = 0.12
+    slip_rad: Turn = 0.12
+    pull_back_m: Margin = 0.12
 
 
 class Grasp(ArmSkill[GraspInputs]):

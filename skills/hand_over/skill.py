@@ -20,6 +20,7 @@ from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import NavigateInputs
 from skills.perception.people import SeenPerson, people_in_scan
+from skills.quantities import Height, Length
 from skills.robot import FloatArray, Pose2D
 
 _FACING_RAD = 0.5
@@ -43,11 +44,11 @@ class HandOverOptions:
     at `height_m`, at the first of `gaps_m` from the person's axis that the arm can reach, `furthest_m` at most.
     """
 
-    stand_off_m: float = 1.5
-    stand_off_range_m: tuple[float, float] = (1.25, 1.65)
-    height_m: float = 1.0
-    gaps_m: tuple[float, ...] = (0.55, 0.5, 0.45, 0.62, 0.7, 0.8)
-    furthest_m: float = 0.85
+    stand_off_m: Length = 1.5
+    stand_off_range_m: tuple[Length, Length] = (1.25, 1.65)
+    height_m: Height = 1.0
+    gaps_m: tuple[Length, ...] = (0.55, 0.5, 0.45, 0.62, 0.7, 0.8)
+    furthest_m: Length = 0.85
 
 
 class HandOver(ArmSkill[HandOverInputs]):

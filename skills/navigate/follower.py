@@ -11,6 +11,7 @@ from skills.api import Costmap
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m
 from skills.navigate.path import TURN_M_PER_RAD, Path
+from skills.quantities import Acceleration, Delay, Duration, Factor, Length, Margin, Speed, TurnAcceleration, TurnRate
 from skills.robot import FloatArray, Pose2D
 
 
@@ -23,23 +24,23 @@ class FollowerOptions:
     between `near_m` and `wide_m` of clearance the speed falls from full to near_speed_m_s.
     """
 
-    max_speed_m_s: float = 0.8
-    backward_m_s: float = 0.35
-    lateral_m_s: float = 0.3
-    turn_rad_s: float = 0.9
-    acceleration_m_s2: float = 0.8
-    braking_m_s2: float = 0.5
-    turn_acceleration_rad_s2: float = 2.5
-    gain: float = 1.6
-    lead_s: float = 0.2
-    touch_m: float = 0.02
-    look_m: float = 1.6
-    near_m: float = 0.08
-    wide_m: float = 0.3
-    near_speed_m_s: float = 0.3
-    creep_m_s: float = 0.04
-    lost_path_m: float = 0.35
-    period_s: float = 0.05
+    max_speed_m_s: Speed = 0.8
+    backward_m_s: Speed = 0.35
+    lateral_m_s: Speed = 0.3
+    turn_rad_s: TurnRate = 0.9
+    acceleration_m_s2: Acceleration = 0.8
+    braking_m_s2: Acceleration = 0.5
+    turn_acceleration_rad_s2: TurnAcceleration = 2.5
+    gain: Factor = 1.6
+    lead_s: Delay = 0.2
+    touch_m: Margin = 0.02
+    look_m: Length = 1.6
+    near_m: Margin = 0.08
+    wide_m: Length = 0.3
+    near_speed_m_s: Speed = 0.3
+    creep_m_s: Speed = 0.04
+    lost_path_m: Length = 0.35
+    period_s: Duration = 0.05
 
     def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> PathFollower:
         """A follower of one path, at most so fast."""

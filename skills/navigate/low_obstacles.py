@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Job, SkillContext
+from skills.quantities import Count, Delay, Duration, Height, Length
 from skills.robot import FloatArray, Image
 
 
@@ -20,11 +21,11 @@ class WatchOptions:
     `reach_m` of the camera.
     """
 
-    period_s: float = 0.35
-    latency_s: float = 0.1
-    columns: int = 110
-    heights_m: tuple[float, float] = (0.06, 0.5)
-    reach_m: float = 2.0
+    period_s: Duration = 0.35
+    latency_s: Delay = 0.1
+    columns: Count = 110
+    heights_m: tuple[Height, Height] = (0.06, 0.5)
+    reach_m: Length = 2.0
 
 
 class LowObstacleWatch:

@@ -11,6 +11,7 @@ import numpy as np
 from skills.api import Costmap, LocalisationEstimate
 from skills.navigate.footprint import Footprint, disc_centres, pose_array
 from skills.perception.people import SeenPerson
+from skills.quantities import Delay, Length, Margin, Speed
 from skills.robot import FloatArray, Pose2D, Robot
 
 __all__ = ["Pace", "PaceManager", "SpaceOptions", "WithPeople", "outline_distance_m", "spaced"]
@@ -26,18 +27,18 @@ class SpaceOptions:
     Plans keep `room_m` where start and goal leave so much, and `least_room_m` where there is no other way.
     """
 
-    far_m: float = 2.5
-    near_m: float = 1.0
-    near_m_s: float = 0.3
-    stop_m: float = 0.7
-    look_ahead_m: float = 1.2
-    patience_s: float = 3.0
-    pass_m_s: float = 0.15
-    forget_s: float = 3.0
-    room_m: float = 0.65
-    least_room_m: float = 0.2
-    slack_m: float = 0.05
-    away_m: float = 0.3
+    far_m: Length = 2.5
+    near_m: Length = 1.0
+    near_m_s: Speed = 0.3
+    stop_m: Margin = 0.7
+    look_ahead_m: Length = 1.2
+    patience_s: Delay = 3.0
+    pass_m_s: Speed = 0.15
+    forget_s: Delay = 3.0
+    room_m: Margin = 0.65
+    least_room_m: Margin = 0.2
+    slack_m: Margin = 0.05
+    away_m: Length = 0.3
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from skills.navigate.lattice import Lattice, Needs, Space, cost_to_go, lattice_m
 from skills.navigate.motion_cost import Weights, segment_cost
 from skills.navigate.path import Path
 from skills.navigate.smoothing import clearances, densify, relax, shortcut
+from skills.quantities import Count, Factor, Length, Margin, Speed, TurnRate
 from skills.robot import FloatArray, Pose2D
 
 FIELD_CELL_M = 0.05
@@ -35,19 +36,19 @@ class LatticePlanner:
     worse, within `escape_m`. The search covers the box about start and goal, `around_m` wider to all sides.
     """
 
-    forward_m_s: float = 0.8
-    backward_m_s: float = 0.25
-    lateral_m_s: float = 0.25
-    turn_rad_s: float = 0.9
-    margin_m: float = SAFE_MARGIN_M
-    soft_m: float = 0.35
-    soft_weight: float = 3.0
-    escape_m: float = 0.6
-    deepest_start_m: float = 0.2
-    cell_m: float = 0.1
-    headings: int = 16
-    greed: float = 1.3
-    around_m: float = 8.0
+    forward_m_s: Speed = 0.8
+    backward_m_s: Speed = 0.25
+    lateral_m_s: Speed = 0.25
+    turn_rad_s: TurnRate = 0.9
+    margin_m: Margin = SAFE_MARGIN_M
+    soft_m: Length = 0.35
+    soft_weight: Factor = 3.0
+    escape_m: Margin = 0.6
+    deepest_start_m: Margin = 0.2
+    cell_m: Length = 0.1
+    headings: Count = 16
+    greed: Factor = 1.3
+    around_m: Margin = 8.0
 
     def weights(self) -> Weights:
         """The numbers that a motion's cost depends on, for the compiled loops."""

@@ -15,6 +15,7 @@ from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
 from skills.perception.people_watch import PeopleOptions, PeopleWatch
+from skills.quantities import Delay, Duration, Length, Speed, Tries, Turn, TurnRate
 from skills.robot import Pose2D
 from skills.stack import LocalController
 
@@ -26,9 +27,9 @@ class NavigateInputs:
     """Where to go: `goal` is the body's pose in the world; how exactly, and how fast at most."""
 
     goal: Pose2D
-    position_tolerance_m: float = 0.10
-    yaw_tolerance_rad: float = 0.10
-    max_speed_m_s: float = 0.8
+    position_tolerance_m: Length = 0.10
+    yaw_tolerance_rad: Turn = 0.10
+    max_speed_m_s: Speed = 0.8
 
 
 @dataclass(frozen=True)
@@ -39,17 +40,17 @@ class NavigateOptions:
     again without being counted, up to person_patience_s.
     """
 
-    planning_latency_s: float = 0.3
-    localising_patience_s: float = 3.0
-    blocked_patience_s: float = 1.5
-    replan_pause_s: float = 2.0
-    replans: int = 6
-    stuck_s: float = 4.0
-    settle_s: float = 2.0
-    still_m_s: float = 0.03
-    still_rad_s: float = 0.05
-    after_person_s: float = 14.0
-    person_patience_s: float = 45.0
+    planning_latency_s: Delay = 0.3
+    localising_patience_s: Delay = 3.0
+    blocked_patience_s: Delay = 1.5
+    replan_pause_s: Delay = 2.0
+    replans: Tries = 6
+    stuck_s: Duration = 4.0
+    settle_s: Delay = 2.0
+    still_m_s: Speed = 0.03
+    still_rad_s: TurnRate = 0.05
+    after_person_s: Delay = 14.0
+    person_patience_s: Delay = 45.0
     low_obstacles: WatchOptions = field(default_factory=WatchOptions)
     people: PeopleOptions = field(default_factory=PeopleOptions)
     space: SpaceOptions = field(default_factory=SpaceOptions)

@@ -15,6 +15,7 @@ from skills.geometry import relative
 from skills.perception.detector.camera_images import found_in_grey
 from skills.perception.people import SeenPerson, merged
 from skills.perception.position import position_of
+from skills.quantities import Count, Delay, Duration, Length, Margin, Share, Turn
 from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
 
 PEOPLE_TOPIC: Final = "people"
@@ -37,19 +38,19 @@ class PeopleOptions:
     remembered for `memory_s`, and for `beside_s` as long as the costmap knows something within `beside_m` of the place.
     """
 
-    period_s: float = 0.5
-    idle_s: float = 2.0
-    near_m: float = 5.0
-    view_rad: float = 1.0
-    again_s: float = 0.2
-    latency_s: float = 0.15
-    least_score: float = 0.5
-    reach_m: float = 4.0
-    same_m: float = 0.7
-    misses: int = 3
-    memory_s: float = 2.0
-    beside_s: float = 10.0
-    beside_m: float = 0.5
+    period_s: Duration = 0.5
+    idle_s: Duration = 2.0
+    near_m: Length = 5.0
+    view_rad: Turn = 1.0
+    again_s: Delay = 0.2
+    latency_s: Delay = 0.15
+    least_score: Share = 0.5
+    reach_m: Length = 4.0
+    same_m: Length = 0.7
+    misses: Count = 3
+    memory_s: Delay = 2.0
+    beside_s: Delay = 10.0
+    beside_m: Margin = 0.5
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from skills.grasp.candidates import hand_rotation
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import free_spots, spots
+from skills.quantities import Length
 from skills.robot import FloatArray, GripperCapabilities, Pose2D
 from skills.stack import ArmPlanner
 
@@ -49,9 +50,9 @@ class PlaceOptions:
     It is lowered in steps of `step_m` until the arm lags by `contact_m`. It must be seen again within `seen_again_m`.
     """
 
-    step_m: float = 0.008
-    contact_m: float = 0.005
-    seen_again_m: float = 0.12
+    step_m: Length = 0.008
+    contact_m: Length = 0.005
+    seen_again_m: Length = 0.12
 
 
 class Place(ArmSkill[PlaceInputs]):

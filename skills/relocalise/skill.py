@@ -10,6 +10,7 @@ from typing import ClassVar
 from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, SkillContext, Succeeded
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.navigate.base import Base
+from skills.quantities import Delay, Tries, Turn, TurnRate
 from skills.robot import Scan
 
 _SCAN_PATIENCE_S = 2.0
@@ -19,17 +20,17 @@ _SCAN_PATIENCE_S = 2.0
 class RelocaliseInputs:
     """`turns`: in how many headings it searches at most, an eighth of a turn apart."""
 
-    turns: int = 8
+    turns: Tries = 8
 
 
 @dataclass(frozen=True)
 class RelocaliseOptions:
     """How long a search takes (s), how fast and how far the robot turns between searches."""
 
-    search_latency_s: float = 1.0
-    turn_rad_s: float = 0.4
-    turn_rad: float = math.pi / 4
-    agree_s: float = 1.0
+    search_latency_s: Delay = 1.0
+    turn_rad_s: TurnRate = 0.4
+    turn_rad: Turn = math.pi / 4
+    agree_s: Delay = 1.0
 
 
 class Relocalise(RoutineSkill[RelocaliseInputs]):

@@ -1,6 +1,7 @@
 """The reference pages are those that the schemas, skills and faults give now."""
 
 import importlib.util
+import json
 import sys
 from pathlib import Path
 
@@ -38,3 +39,13 @@ def test_every_key_of_a_schema_is_explained(page):
 def test_the_schema_of_stack_files_is_current():
     """Run `python docs/make_reference.py` when this fails."""
     assert make_reference.STACK_SCHEMA.read_text(encoding="utf-8") == make_reference.stack_schema_text()
+
+
+def test_the_schema_of_mission_files_is_current_and_shows_the_ranges_of_the_ports():
+    """Run `python docs/make_reference.py` when this fails."""
+    text = make_reference.MISSION_SCHEMA.read_text(encoding="utf-8")
+    assert text == make_reference.mission_schema_text()
+    rules = json.loads(text)["$defs"]["StepFile"]["allOf"]
+    (navigate,) = (rule["then"] for rule in rules if rule["if"]["properties"]["skill"]["const"] == "navigate")
+    speed, *_ = navigate["properties"]["with"]["properties"]["max_speed"]["anyOf"]
+    assert speed == {"type": "number", "exclusiveMinimum": 0.0, "maximum": 3.0}

@@ -1,13 +1,27 @@
 """The stack: what a file chooses, what it may set, and what is refused."""
 
 import dataclasses
+from typing import get_args, get_type_hints
 
 import pytest
 from planar_robot import Bench
 
+from executive.tree.registry import built_in_skills
+from executive.tree.types import conforms, field_types
 from skills.navigate.skill import Navigate
+from skills.quantities import bounds, without_range
 from skills.robot import Pose2D
-from skills.stack import DEFAULT_FILE, SLOTS, StackError, default_stack, plain, stack_of, stack_schema
+from skills.stack import (
+    DEFAULT_FILE,
+    SLOTS,
+    StackError,
+    components,
+    default_stack,
+    plain,
+    skill_options,
+    stack_of,
+    stack_schema,
+)
 
 
 def test_what_a_file_leaves_out_is_as_in_the_default():
@@ -42,6 +56,8 @@ def test_a_skill_takes_its_options_from_the_stack():
         ({"planner": {"use": "magic"}}, ("planner", "use"), "lattice"),
         ({"planner": {"margin": 0.1}}, ("planner", "margin"), "margin_m"),
         ({"planner": {"margin_m": "wide"}}, ("planner", "margin_m"), "'wide'"),
+        ({"planner": {"margin_m": float("nan")}}, ("planner", "margin_m"), "nan"),
+        ({"skills": {"hand_over": {"gaps_m": [0.5, 1e9]}}}, ("skills", "hand_over", "gaps_m", 1), "1000000000"),
         ({"localiser": {"matching": {"sigma": 1}}}, ("localiser", "matching", "sigma"), "sigma_m"),
         ({"skills": {"fly": {}}}, ("skills", "fly"), "navigate"),
         ({"skills": {"navigate": {"people": {"periods": 1}}}}, ("skills", "navigate", "people", "periods"), "period_s"),
@@ -54,6 +70,36 @@ def test_what_does_not_fit_is_refused_with_its_place(data, path, hint):
         stack_of(data)
     assert error.value.path == path
     assert hint in error.value.hint
+
+
+@pytest.mark.parametrize("value", [-1, 0, 100, float("inf")])
+def test_a_value_out_of_range_is_refused_with_the_range(value):
+    with pytest.raises(StackError) as error:
+        stack_of({"controller": {"max_speed_m_s": value}})
+    assert "above 0 and at most 3 m/s" in error.value.message
+
+
+def numbers(record, where):
+    """Every number in a dataclass, in what it holds as well, by its place."""
+    for name, hint in get_type_hints(record, include_extras=True).items():
+        parts = [hint, *get_args(hint)] if not bounds(hint) else [hint]
+        yield from ((f"{where}.{name}", part) for part in parts if without_range(part) in (int, float))
+        for part in parts:
+            if dataclasses.is_dataclass(part):
+                yield from numbers(part, f"{where}.{name}")
+
+
+OPTIONS = {**skill_options(), **{name: kind for slot in SLOTS for name, kind in components(slot).items()}}
+INPUTS = {f"{name}.Inputs": skill.Inputs for name, skill in built_in_skills().items()}
+
+
+@pytest.mark.parametrize("record", [*OPTIONS.values(), *INPUTS.values()], ids=[*OPTIONS, *INPUTS])
+def test_every_number_of_a_port_and_of_an_option_has_a_range_that_holds_its_default(record):
+    for where, hint in numbers(record, record.__name__):
+        assert bounds(hint).keys() & {"gt", "ge"} and bounds(hint).keys() & {"lt", "le"}, where
+    for field in dataclasses.fields(record):
+        if field.default is not dataclasses.MISSING:
+            assert conforms(field.default, field_types(record)[field.name]), field.name
 
 
 def test_the_schema_knows_every_slot_and_option():

@@ -25,6 +25,7 @@ from executive.mission.yaml_source import read_yaml, validate
 __all__ = ["load_mission", "mission_from_file"]
 
 MAX_STEPS: Final = 5000
+MAX_DEPTH: Final = 20
 REASON_LETTERS: Final = 500
 _NOT_UNDERSTOOD: Final = "the sentence was not understood"
 _NONE_GIVEN: Final[Given] = MappingProxyType({})
@@ -129,6 +130,9 @@ class _Resolver:
         if used_path.resolve() in chain:
             names = [one.name for one in (*chain[chain.index(used_path.resolve()) :], used_path)]
             raise file.error(path, f"the files use each other in a circle: {' -> '.join(names)}", "break the circle")
+        if len(chain) >= MAX_DEPTH:
+            what = f"more than {MAX_DEPTH} files use each other in a row"
+            raise file.error(path, what, "put what they say into fewer files")
         here = file.source_line(path)
         try:
             used = load_mission(used_path, step.with_ or {})

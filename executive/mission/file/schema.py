@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from pathlib import Path
+import dataclasses
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StrictBool, StrictInt, field_validator, model_validator
 
@@ -23,18 +22,19 @@ from executive.mission.file.model import (
     StepGuards,
     StepPolicy,
 )
-from executive.mission.yaml_source import YamlSource
+from executive.mission.yaml_source import Name, Text, YamlSource
+from skills.quantities import Duration, bounds, without_range, without_unit
 
-__all__ = ["AskFile", "GuardsFile", "MissionFile", "PolicyFile", "StepFile", "mission_json_schema", "schema_text"]
+__all__ = ["AskFile", "GuardsFile", "MissionFile", "PolicyFile", "StepFile", "mission_json_schema"]
 
-Text = Annotated[str, Field(min_length=1)]
-Seconds = Annotated[float, Field(gt=0.0, strict=True, allow_inf_nan=False)]
+Seconds = Annotated[Duration, Field(strict=True)]
 Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
 Attempts = Annotated[StrictInt, Field(ge=0, le=100)]
 Scalar = str | StrictBool | StrictInt | Annotated[float, Field(strict=True)] | None
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
 FORMS: Final = "'say', some of 'take', 'to', 'do' and 'object', 'skill', or 'use'"
 ONCE: Final = 1
+_NO_SKILLS: Final[Mapping[str, type]] = MappingProxyType({})
 
 
 class _Strict(BaseModel):
@@ -113,15 +113,15 @@ class StepFile(PolicyFile):
     to: Text | None = Field(None, description='The place or person, or "start", or "Robin at hall".')
     do: Task | None = Field(None, description="What to do there to the object.")
     object: Text | None = Field(None, description="The thing that it is done to.")
-    skill: Text | None = Field(None, description="The name of a registered skill.")
-    use: Text | None = Field(None, description="Another mission file, as seen from this file's folder.")
+    skill: Name | None = Field(None, description="The name of a registered skill.")
+    use: Name | None = Field(None, description="Another mission file, as seen from this file's folder.")
     elsewhere: StrictBool | None = Field(
         None, description="Whether a thing that is not in its place is looked for elsewhere, too (it is unless said)."
     )
     with_: dict[str, Any] | None = Field(
         None, alias="with", description="The skill's input ports, or the parameters of the used file."
     )
-    gives: dict[str, Text] | None = Field(
+    gives: dict[str, Name] | None = Field(
         None, description="Names for the skill's output ports; later steps read them with {from: NAME}."
     )
 
@@ -149,10 +149,10 @@ class MissionFile(PolicyFile):
 
     model_config = ConfigDict(title="Errand mission")
 
-    name: Text = Field(description="The mission's name; part of all path ids.")
+    name: Name = Field(description="The mission's name; part of all path ids.")
     description: str | None = Field(None, description="What it is for.")
-    world: Text = Field(DEFAULT_WORLD, description="A world by its name or folder.")
-    robot: Text | None = Field(None, description="The robot's name; the world's own unless said.")
+    world: Name = Field(DEFAULT_WORLD, description="A world by its name or folder.")
+    robot: Name | None = Field(None, description="The robot's name; the world's own unless said.")
     knowledge: dict[str, Any] | None = Field(
         None, description="Laid over the world's knowledge: what stands here replaces what stands there, key by key."
     )
@@ -203,28 +203,44 @@ def with_source(file: MissionFile, source: YamlSource) -> MissionFile:
     return file
 
 
-def mission_json_schema() -> dict[str, Any]:
-    """The JSON Schema of mission files. What is no text may also be a parameter, "${name}"."""
+def mission_json_schema(inputs: Mapping[str, type] = _NO_SKILLS) -> dict[str, Any]:
+    """The JSON Schema of mission files. What is no text may also be a parameter, "${name}".
+
+    `inputs` are the `Inputs` of skills by name: where a step names one of them, its numbers keep the ports' ranges.
+    """
     schema = MissionFile.model_json_schema(by_alias=True)
     described: dict[str, Any] = _open_to_parameters(schema)
     step = described["$defs"]["StepFile"]
     step["anyOf"] = [{"required": [key]} for key in ("say", *COMMAND_KEYS, "skill", "use")]
+    step["allOf"] = [
+        {
+            "if": {"properties": {"skill": {"const": name}}, "required": ["skill"]},
+            "then": {"properties": {"with": {"properties": dict(_ports(record))}}},
+        }
+        for name, record in inputs.items()
+    ]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
 
 
-def schema_text() -> str:
-    """The text of `missions/mission.schema.json`."""
-    return json.dumps(mission_json_schema(), indent=2, ensure_ascii=False) + "\n"
+def _ports(record: type) -> Iterator[tuple[str, Any]]:
+    """The schemas of a skill's numbers that have a range, by all names that a file may give them.
 
-
-def write_schema(path: Path) -> None:
-    """Write the JSON Schema to a file."""
-    path.write_text(schema_text(), encoding="utf-8")
+    A number may also be a parameter, or what an earlier step gave; the fields of a pose may stand by themselves.
+    """
+    for name, hint in get_type_hints(record, include_extras=True).items():
+        limits = {_KEYWORDS[bound]: limit for bound, limit in bounds(hint).items()}
+        if limits:
+            kind = "integer" if without_range(hint) is int else "number"
+            taken = [{"type": kind, **limits}, dict(_PARAMETER), {"type": "object", "required": ["from"]}]
+            yield from ((each, {"anyOf": taken}) for each in dict.fromkeys((name, without_unit(name))))
+        elif isinstance(hint, type) and dataclasses.is_dataclass(hint):
+            yield from _ports(hint)
 
 
 _REFERENCE: Final = r"^\$\{[A-Za-z_][A-Za-z0-9_]*\}$"
 _PARAMETER: Final[Mapping[str, Any]] = MappingProxyType({"type": "string", "pattern": _REFERENCE})
 _CLOSED_TYPES: Final = ("number", "integer", "boolean")
+_KEYWORDS: Final = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 
 
 def _open_to_parameters(node: Any) -> Any:

@@ -12,6 +12,7 @@ from executive.tree.behaviours.board import Binding, Constant, FromBoard
 from executive.tree.compiling.builder import Registry, skill_spec, slug
 from executive.tree.node import NodeSpec
 from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_value
+from executive.tree.registry import missing
 from executive.tree.types import field_types
 from skills.api import Skill
 
@@ -40,8 +41,7 @@ def skill_plan(
 
 def _registered(call: SkillCall, registry: Registry) -> type[Skill[Any]]:
     if call.skill not in registry:
-        hint = suggestion(call.skill, registry, f"registered are {listing(sorted(registry))}")
-        raise call.error(("skill",), f"there is no skill '{call.skill}'", hint)
+        raise call.error(("skill",), *missing(call.skill, registry))
     return registry[call.skill]
 
 

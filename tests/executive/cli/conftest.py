@@ -1,4 +1,4 @@
-"""Lets the tests here import the small detector of the skills' tests and the made speech of the speech's tests."""
+"""Lets the tests here import the skills' small detector, the made speech of the speech's tests, and a backend."""
 
 import json
 import sys
@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 sys.path[:0] = [str(Path(__file__).parents[2] / "skills"), str(Path(__file__).parents[1] / "speech")]
+sys.path.append(str(Path(__file__).parent))
 
 
 @pytest.fixture

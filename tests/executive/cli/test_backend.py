@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
+from scripted_backend import ScriptedBackend
 
 from executive.cli import requests
 from executive.cli.mission_run import run_request
@@ -13,38 +14,6 @@ from executive.mission.request import Request
 from executive.record.profile import Profile
 from executive.record.reader import read_events
 from executive.run.outcome import Outcome
-from executive.run.runner import RunEntry
-from plant.spot.capabilities import spot_capabilities
-from skills.testing.clock import VirtualClock
-from skills.testing.estimators import BlockCostmap, KnownPlace
-from skills.testing.robot import ScriptedRobot
-
-
-class ScriptedBackend:
-    """A scripted robot at the origin of an empty world."""
-
-    def __init__(self):
-        self.clock = VirtualClock()
-        self.robot = ScriptedRobot(self.clock, capabilities=spot_capabilities())
-        self.asked = []
-
-    def entry(self, tree, durable):
-        return RunEntry(tree, self.robot, KnownPlace(), BlockCostmap())
-
-    def show_live(self):
-        return None
-
-    def judge(self, tree, result):
-        self.asked.append((tree.mission_name, result.outcome))
-
-    def attach(self, profile):
-        profile.attach("scripted", self.clock, "advance")
-
-    def work(self):
-        return {"calls": len(self.robot.calls)}
-
-    def leave(self, artifacts, out):
-        return None
 
 
 @pytest.fixture

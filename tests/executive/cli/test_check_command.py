@@ -1,12 +1,15 @@
 """`errand check`: what scripts rely on, and what people see."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from executive.cli import entry
+from executive.cli import check_command, entry
 
 ROOT = Path(__file__).parents[3]
 GOOD = ROOT / "missions" / "go_living_room.yaml"
@@ -38,7 +41,7 @@ def test_json_is_one_object_for_all_files(write):
     result = invoke(GOOD, bad, "--json")
     assert result.exit_code == 2
     told = json.loads(result.stdout.splitlines()[-1])
-    assert set(told) == {"ok", "errors", "nodes", "commands"}
+    assert set(told) == {"ok", "errors", "warnings", "nodes", "commands"}
     assert told["ok"] is False
     assert told["nodes"] > 3
     assert told["commands"] == ["Take [Nothing] to [living room] and do [Nothing] to [Nothing]"]
@@ -46,7 +49,7 @@ def test_json_is_one_object_for_all_files(write):
         {
             "file": str(bad),
             "line": 4,
-            "message": "steps.1.timeout: input should be greater than 0",
+            "message": "steps.1.timeout: should be above 0 and at most 86400 s",
             "hint": "it reads 0 now",
         }
     ]
@@ -101,3 +104,35 @@ def test_a_stack_file_that_cannot_be_used_is_refused_with_its_line(write):
     bad = write("planner: {use: lattice}\nlocaliser: {use: none_such}\n", "stack.yaml")
     (error,) = json.loads(invoke(GOOD, "--json", "--stack", bad).stdout)["errors"]
     assert (error["file"], error["line"]) == (str(bad), 2)
+
+
+def test_a_broken_plug_in_is_reported_once_and_fails_only_the_file_that_uses_it(write, tmp_path):
+    info = tmp_path / "wavers-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: wavers\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[errand.skills]\nwave = wavers:Wave\n[errand.planners]\nbad = wavers:Bad\n")
+    (tmp_path / "wavers.py").write_text("raise SystemExit(0)\n")
+    bad, other = write("name: w\nsteps:\n  - skill: wave\n"), tmp_path / "other.yaml"
+    other.write_text("name: o\nsteps:\n  - to: kitchen\n")
+    command = [sys.executable, "-m", "executive.cli.entry", "check", "--json", str(GOOD), str(bad), str(other)]
+    where = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(command, env={**os.environ, "PYTHONPATH": where}, capture_output=True, text=True, check=False)
+    (error,) = json.loads(done.stdout)["errors"]
+    assert (error["file"], error["line"], "distribution wavers" in error["message"]) == (str(bad), 3, True)
+    assert len([line for line in done.stderr.splitlines() if "distribution wavers" in line]) == 1
+
+
+def test_each_file_is_checked_on_its_own(write, monkeypatch):
+    """A defect that one file brings about is its error, and the others are still checked."""
+    poison, checked = write("name: x\nsteps:\n  - to: kitchen\n"), check_command.prepare
+
+    def prepared(request, **more):
+        if request.file == poison:
+            raise RecursionError("too deep")
+        return checked(request, **more)
+
+    monkeypatch.setattr(check_command, "prepare", prepared)
+    result = invoke(poison, GOOD, "--json")
+    told = json.loads(result.stdout.splitlines()[-1])
+    assert [(error["file"], "RecursionError" in error["message"]) for error in told["errors"]] == [(str(poison), True)]
+    assert told["commands"]

@@ -126,7 +126,7 @@ def test_poses_are_those_of_the_file(knowledge):
         ("dock:", "dok:", 3, "unknown key 'dok'; did you mean 'dock'?"),
         ("    height: 0.9\n", "    hight: 0.9\n", 16, "unknown key 'hight'; did you mean 'height'?"),
         ("    height: 0.9\n", "", 13, "key 'height' is missing in surfaces.kitchen counter"),
-        ("    height: 0.9\n", "    height: -1\n", 16, "greater than 0"),
+        ("    height: 0.9\n", "    height: -1\n", 16, "above 0"),
         ("    height: 0.9\n", "    height: high\n", 16, "surfaces.kitchen counter.height"),
         ("place: kitchen\n", "place: kitchin\n", 14, "'kitchin' is not known; did you mean 'kitchen'?"),
         ("usual: [workbench]}\n  cube", "usual: [work bench]}\n  cube", 27, "did you mean 'workbench'?"),

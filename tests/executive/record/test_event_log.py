@@ -1,12 +1,15 @@
 """The event log: what is written comes back, also from a file that was cut off."""
 
 import base64
+import errno
+import io
 import math
 import os
 import signal
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -93,6 +96,36 @@ def test_a_killed_process_leaves_a_readable_log(tmp_path):
     process.wait()
     process.stdout.close()
     assert read_events(path)[-1].stamp_s >= last_s - 1.2
+
+
+class FillingDisk(io.FileIO):
+    """A file on a disk with so much room: it takes a part of what is written, and refuses the rest."""
+
+    room = 6_000
+
+    def write(self, data):
+        taken = bytes(data)[: self.room - self.tell()]
+        if not taken:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return super().write(taken)
+
+
+def test_on_a_disk_that_is_full_what_was_written_can_be_read(tmp_path, clock, monkeypatch):
+    monkeypatch.setattr(Path, "open", lambda path, mode: io.BufferedWriter(FillingDisk(path, mode)))
+    log = EventLog(tmp_path / "log.mcap", clock)
+    monkeypatch.undo()
+    with pytest.raises(OSError, match="No space left"):
+        for number in range(200):
+            clock.advance(1.0)
+            log("mine", {"number": number, "noise": os.urandom(100).hex()})
+    with pytest.raises(OSError, match="No space left"):
+        log("mine", {"number": -1})
+    log.close()
+    size = log.path.stat().st_size
+    log.close()
+    read = [event.data["number"] for event in read_events(log.path)]
+    assert read == list(range(len(read)))
+    assert (len(read) > 10, size, log.path.stat().st_size) == (True, FillingDisk.room, FillingDisk.room)
 
 
 def test_pictures_become_compressed_images_that_viewers_draw(tmp_path, clock):

@@ -138,6 +138,32 @@ def test_a_damaged_store_is_refused(path):
         MissionStore(path)
 
 
+def test_an_empty_store_is_damaged(path):
+    path.parent.mkdir()
+    path.touch()
+    for create in (True, False):
+        with pytest.raises(InputError, match=r"the store is damaged .*move it away"):
+            MissionStore(path, create=create)
+    assert path.stat().st_size == 0
+
+
+def test_what_goes_wrong_while_a_store_is_claimed_is_not_the_stores(path):
+    with MissionStore(path) as store, pytest.raises(OSError, match="elsewhere"), store.claimed():
+        raise OSError("elsewhere")
+    with MissionStore(path) as store, store.claimed():
+        pass
+
+
+def test_a_store_that_cannot_grow_names_the_way_on(path):
+    with MissionStore(path) as store:
+        number = store.add(REQUEST, queued=True).id
+        (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
+        store._connection.execute(f"PRAGMA max_page_count = {pages}")
+        with pytest.raises(InputError, match=r"the disk is full.*errand resume"):
+            store.finish(number, MissionState.SUCCESS, "long " * 10_000)
+        assert store.mission(number).state is MissionState.QUEUED
+
+
 def test_a_store_cut_off_in_the_middle_is_refused(path):
     with MissionStore(path) as store:
         for _ in range(200):

@@ -26,16 +26,16 @@ ONLY_COKE = {"classes": frozenset({"coke"})}
 
 
 class StraightRoutes:
-    """Ways as the crow flies; there is none to what lies beyond `far_m` in x."""
+    """Ways as the crow flies, `stretched` so many times; there is none to what lies beyond `far_m` in x."""
 
-    def __init__(self, far_m=99.0):
-        self.far_m, self.asked = far_m, []
+    def __init__(self, far_m=99.0, stretched=1.0):
+        self.far_m, self.stretched, self.asked = far_m, stretched, []
 
     def route(self, start, goal):
         self.asked.append((start, goal))
         if goal.x_m > self.far_m:
             raise ValueError(f"There is no way to ({goal.x_m:.2f}, {goal.y_m:.2f}).")
-        length_m = ((goal.x_m - start.x_m) ** 2 + (goal.y_m - start.y_m) ** 2) ** 0.5
+        length_m = ((goal.x_m - start.x_m) ** 2 + (goal.y_m - start.y_m) ** 2) ** 0.5 * self.stretched
         return Route(length_m, length_m)
 
 
@@ -73,6 +73,20 @@ def test_a_good_mission_has_no_errors_and_an_estimate(check, make):
     assert 50 < checked.estimate.duration_s < 120
     assert checked.estimate.distance_m == pytest.approx(2 * 4.6, abs=0.5)
     assert 0.001 < checked.estimate.charge < 0.02
+
+
+def test_what_empties_the_battery_is_warned_of_with_its_line_unless_it_charges_before(check, registry):
+    there, back = GO.format("kitchen"), GO.format("start")
+    far = StraightRoutes(far_m=1e9, stretched=300.0)
+    one_way = check(there, ways=far).estimate.charge
+    assert 0.25 < one_way < 0.5
+    trips = [there, back] * 2
+    tired, rested = (
+        check(*trips, ways=far),
+        check(*trips[:2], SkillCall("charge", {"level": 0.8}), *trips[2:], ways=far),
+    )
+    assert [warning.line for warning in tired.warnings] == [1 + int(1.0 / one_way)]
+    assert (tired.errors, rested.warnings) == ((), ())
 
 
 def test_time_and_charge_follow_from_the_way(check):

@@ -3,12 +3,14 @@
 import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
+from pydantic import Field
 
 from executive.tree.port_values import PortValueError, gathered, port_value
 from skills.api import ObjectObservation, Surface, Thing
+from skills.quantities import Length, Speed
 from skills.robot import Pose2D
 
 
@@ -21,6 +23,13 @@ class Side(enum.Enum):
 class Drive:
     goal: Pose2D
     max_speed_m_s: float = 0.8
+
+
+@dataclass(frozen=True)
+class Ranged:
+    speed_m_s: Speed
+    gaps_m: tuple[Length, ...] = ()
+    tries: Annotated[int, Field(gt=0, lt=4)] = 1
 
 
 @dataclass(frozen=True)
@@ -110,6 +119,13 @@ def test_a_record_of_records(knowledge):
         ([1], Mapping[str, int], (), "a mapping"),
         (1, object, (), "let an earlier step give it"),
         (None, int, (), "a whole number"),
+        ({"speed": 3.1}, Ranged, ("speed",), "above 0 and at most 3 m/s"),
+        ({"speed": 0}, Ranged, ("speed",), "above 0 and at most 3 m/s"),
+        ({"speed": float("nan")}, Ranged, ("speed",), "a number"),
+        ({"speed": 1, "gaps": [1, float("inf")]}, Ranged, ("gaps", 1), "a number"),
+        ({"speed": 1, "gaps": [1, 1e9]}, Ranged, ("gaps", 1), "above 0 and at most 100 m"),
+        ({"speed": 1, "tries": 4}, Ranged, ("tries",), "above 0 and below 4"),
+        ({"x": 1e9, "y": 0}, Pose2D, ("x",), "at least -10000 and at most 10000 m"),
     ],
 )
 def test_a_wrong_value_is_refused_with_its_place_and_the_hint(knowledge, value, hint, path, says):

@@ -14,7 +14,7 @@ import pytest
 
 import skills
 from executive.mission.errors import InputError
-from executive.tree.registry import GROUP, built_in_skills, installed_skills, skills_of
+from executive.tree.registry import GROUP, built_in_skills, installed_skills, missing, skills_of
 from skills.api import Skill
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -126,5 +126,17 @@ def test_two_distributions_with_one_name_are_refused_naming_both(others):
 
 def test_another_distribution_cannot_take_the_name_of_one_of_ours(others):
     others(GOOD.replace('"wave"', '"navigate"'), entry="navigate = {module}:Wave")
-    with pytest.raises(InputError, match="both register a skill 'navigate'"):
-        installed_skills()
+    found = installed_skills()
+    assert found["navigate"] is built_in_skills()["navigate"]
+    assert "both register a skill 'navigate'" in str(found.broken["navigate"])
+
+
+@pytest.mark.parametrize("source", ["raise SystemExit(3)", "1 / 0", GOOD.replace("def step", "def leap")])
+def test_a_broken_skill_harms_no_other_and_a_file_that_uses_it_is_told_why(others, source):
+    others(source)
+    others(GOOD.replace('"wave"', '"wink"'), name="winkers", entry="wink = {module}:Wave", module="winkers_skill")
+    found = installed_skills()
+    assert {"wink", *built_in_skills()} <= set(found)
+    assert "wave" not in found
+    assert "distribution wavers" in missing("wave", found)[0]
+    assert "there is no skill" in missing("wavy", found)[0]

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from executive.tree.types import assignable, conforms, describe_type
+from skills.quantities import Count, Speed
 
 
 @pytest.mark.parametrize(
@@ -21,6 +22,9 @@ from executive.tree.types import assignable, conforms, describe_type
         (None, str | None, True),
         (3, str | None, False),
         (object(), Any, True),
+        (3.0, Speed, True),
+        (3.1, Speed, False),
+        ((1.0, 0.0), tuple[Speed, ...], False),
     ],
 )
 def test_conforms(value, hint, expected):
@@ -29,12 +33,16 @@ def test_conforms(value, hint, expected):
 
 @pytest.mark.parametrize(
     ("source", "target", "expected"),
-    [(int, float, True), (float, int, False), (bool, int, True), (str, str | None, True), (int, Any, True),
-     (tuple[str, ...], tuple[str, ...], True), (tuple[str, ...], tuple[int, ...], False)],
+    [(int, float, True), (float, int, False), (float, Speed, True), (bool, int, True), (str, str | None, True),
+     (int, Any, True), (tuple[str, ...], tuple[str, ...], True), (tuple[str, ...], tuple[int, ...], False)],
 )  # fmt: skip
 def test_assignable(source, target, expected):
     assert assignable(source, target) is expected
 
 
 def test_types_are_described_as_users_read_them():
-    assert [describe_type(hint) for hint in (float, tuple[str, ...])] == ["float", "tuple[str, ...]"]
+    assert [describe_type(hint) for hint in (float, tuple[str, ...], tuple[Speed, Count] | None)] == [
+        "float",
+        "tuple[str, ...]",
+        "tuple[float above 0 and at most 3 m/s, int at least 1 and at most 100000] | None",
+    ]

@@ -1,5 +1,9 @@
 """The snapshot's files: whole after a kill at any byte, refused when damaged."""
 
+import errno
+import math
+import os
+
 import numpy as np
 import pytest
 
@@ -33,6 +37,30 @@ def test_a_write_that_was_cut_off_leaves_the_one_before(path):
         slot = path.with_name("kept.plant.a")
         slot.write_bytes(third[:size] + slot.read_bytes()[size:])
         assert read_snapshot(path).values["value"] == 2
+
+
+def test_on_a_disk_that_is_full_the_one_before_stays_whole(path, monkeypatch):
+    """A disk that fills up takes a part of what is written, says so, and refuses the rest."""
+    file, room, write = SnapshotFile(path), [math.inf], os.pwrite
+
+    def filling(descriptor, data, offset):
+        taken = int(min(len(data), room[0]))
+        if not taken:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        room[0] -= taken
+        return write(descriptor, data[:taken], offset)
+
+    monkeypatch.setattr(os, "pwrite", filling)
+    for value in (1, 2):
+        file.write(content(file.next_number, value))
+    for left in (60, 0):
+        room[0] = left
+        with pytest.raises(OSError, match="No space left"):
+            file.write(content(file.next_number, 3))
+        assert read_snapshot(path).values["value"] == 2
+    room[0] = math.inf
+    file.write(content(file.next_number, 4))
+    assert read_snapshot(path).values["value"] == 4
 
 
 def test_a_shorter_one_over_a_longer_one_is_read(path):

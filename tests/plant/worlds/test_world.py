@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -66,6 +67,23 @@ def test_a_wrong_value_is_told_with_its_line(copy: Path) -> None:
     line = replace(copy / "knowledge.yaml", "height: 0.75", "height: high")
     with pytest.raises(WorldError, match=rf"knowledge\.yaml:{line}: surfaces\.kitchen table\.height"):
         load_world(copy)
+
+
+def test_a_pipe_is_refused_at_once(copy: Path) -> None:
+    (copy / "objects.yaml").unlink()
+    os.mkfifo(copy / "objects.yaml")
+    with pytest.raises(WorldError, match=r"objects\.yaml: .*no plain file"):
+        load_world(copy)
+
+
+@pytest.mark.parametrize(
+    "text", [b"\xff", b"a: !!python/object:x.y {}", b"x: 0x" + b"f" * 10_000, b"[" * 3000, b"x: " + b"9" * 5000]
+)
+def test_what_is_no_yaml_is_told_with_its_file(copy: Path, text: bytes) -> None:
+    (copy / "objects.yaml").write_bytes(text)
+    with pytest.raises(WorldError, match=r"objects\.yaml:[12]: ") as error:
+        load_world(copy)
+    assert len(str(error.value)) < 500
 
 
 def test_a_missing_file_is_named(copy: Path) -> None:

@@ -4,7 +4,7 @@ import pytest
 
 from executive.mission.errors import InputError
 from executive.mission.file.overrides import overridden
-from executive.mission.file.resolve import MAX_STEPS, load_mission, mission_from_file
+from executive.mission.file.resolve import MAX_DEPTH, MAX_STEPS, load_mission, mission_from_file
 from executive.tree.behaviours.board import Constant, FromBoard
 from skills.robot import Pose2D
 
@@ -119,6 +119,23 @@ def test_files_that_multiply_are_stopped(compile_text):
     assert f"more than {MAX_STEPS} steps" in str(error)
 
 
+@pytest.mark.parametrize("most", [MAX_DEPTH, 300])
+def test_a_chain_of_used_files_has_an_end(compile_text, most):
+    last = {f"f{most}": "name: end\nsteps: [{to: hall}]\n"}
+    files = {f"f{n}": f"name: f{n}\nsteps:\n  - use: f{n + 1}.yaml\n" for n in range(1, most)}
+    error = refused(compile_text, "name: m\nsteps:\n  - use: f1.yaml\n", **files, **last)
+    assert (error.line, error.file.name) == (3, f"f{MAX_DEPTH - 1}.yaml")
+    assert str(MAX_DEPTH) in error.message
+    assert len(str(error)) < 2000
+
+
+def test_the_longest_chain_of_used_files_compiles(compile_text):
+    last = {f"f{MAX_DEPTH - 1}": "name: end\nsteps: [{to: hall}]\n"}
+    files = {f"f{n}": f"name: f{n}\nsteps:\n  - use: f{n + 1}.yaml\n" for n in range(1, MAX_DEPTH - 1)}
+    tree = compile_text("name: m\nsteps:\n  - use: f1.yaml\n", **files, **last)
+    assert len(tree.commands) == 1
+
+
 def test_knowledge_of_the_file_is_laid_over_the_worlds(tmp_path, parser, flat):
     path = tmp_path / "m.yaml"
     path.write_text(
@@ -151,6 +168,13 @@ def test_a_plain_pose_is_a_goal(compile_text):
     (navigate,) = [node for node in leaves(tree, "navigate") if node.path_id == "alice/m/1-navigate"]
     ports = navigate.options["inputs"]
     assert ports == {"goal": Constant(Pose2D(1.0, 2.0, 0.5)), "max_speed_m_s": Constant(0.4)}
+
+
+@pytest.mark.parametrize("speed", ["-1", "0", "100", ".nan", ".inf", "-.inf"])
+def test_a_number_out_of_its_ports_range_is_refused_at_its_line(compile_text, speed):
+    text = f"name: m\nsteps:\n  - skill: navigate\n    with:\n      goal: kitchen\n      max_speed: {speed}\n"
+    error = refused(compile_text, text)
+    assert (error.line, "max_speed" in error.message, speed.strip("-.") in error.message) == (6, True, True)
 
 
 DETECT = """\

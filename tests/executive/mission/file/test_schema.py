@@ -1,16 +1,14 @@
 """The schema of mission files: what is refused, with which line and hint; and the JSON Schema for editors."""
 
 import json
-from pathlib import Path
 
 import pytest
 
 from executive.mission.errors import InputError
 from executive.mission.file.model import OnFailure, OperatorQuestion, StaleData, StepGuards, StepPolicy
 from executive.mission.file.resolve import load_mission
-from executive.mission.file.schema import MissionFile, mission_json_schema, schema_text
+from executive.mission.file.schema import MissionFile, mission_json_schema
 
-SCHEMA = Path(__file__).parents[4] / "missions" / "mission.schema.json"
 GOOD = """\
 name: round
 timeout: 600
@@ -56,17 +54,17 @@ def test_on_failure_retry_is_one_retry_unless_said(load):
     ("old", "new", "line", "says"),
     [
         ("timeout: 600", "timeuot: 600", 2, "did you mean 'timeout'?"),
-        ("timeout: 600", "timeout: 0", 2, "greater than 0"),
+        ("timeout: 600", "timeout: 0", 2, "above 0"),
         ("timeout: 600", "timeout: soon", 2, "timeout: should be a number"),
         ("timeout: 600", "timeout: true", 2, "timeout: should be a number"),
-        ("timeout: 600", "timeout: .nan", 2, "finite"),
+        ("timeout: 600", "timeout: .nan", 2, "above 0"),
         ("timeout: 600", "on_failure: skip", 2, "a whole mission cannot be skipped"),
         ("timeout: 600", "on_failure: ask\nask: {default: skip}", 3, "a whole mission cannot be skipped"),
         ("retries: 1", "retries: 1.5", 3, "each.retries: should be a whole number"),
-        ("retries: 1", "retries: -1", 3, "greater than or equal to 0"),
+        ("retries: 1", "retries: -1", 3, "at least 0"),
         ("on_failure: skip", "on_failure: skipp", 3, "did you mean 'skip'?"),
         ("each: {", "each: {to: hall, ", 3, "unknown key 'to'"),
-        ("battery: 0.3", "battery: 30", 7, "less than or equal to 1"),
+        ("battery: 0.3", "battery: 30", 7, "at most 1"),
         ("battery: 0.3", "batery: 0.3", 7, "did you mean 'battery'?"),
         ("localised: true", 'localised: "yes"', 7, "guards.localised: should be true or false"),
         ("stale: fail", "stale: faill", 7, "did you mean 'fail'?"),
@@ -95,10 +93,6 @@ def test_all_errors_are_told_at_once(load):
         load("name: 3\ntimeout: 0\nsteps:\n  - {too: hall}\n  - {do: juggle, object: coke}\n")
     lines = [one.line for one in (error.value, *error.value.others)]
     assert lines == [4, 1, 2, 5]
-
-
-def test_the_committed_json_schema_is_current():
-    assert SCHEMA.read_text(encoding="utf-8") == schema_text(), "write it anew with `write_schema`"
 
 
 def test_the_json_schema_names_every_key_with_a_description():

@@ -1,0 +1,79 @@
+"""Signals that end a run in order: Ctrl-C, a polite kill, and the terminal's end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+from typing import Final
+
+from executive.run.control import Control
+
+__all__ = ["HUNG_UP", "cancelled_by_signals", "interrupted_by_hang_up"]
+
+_OUTPUTS: Final = (1, 2)
+_REASON: Final = "cancelled by {}"
+HUNG_UP: Final = _REASON.format(signal.SIGHUP.name)
+"""The reason of a run that ended since its terminal was closed."""
+
+
+@contextmanager
+def cancelled_by_signals(control: Control) -> Iterator[Control]:
+    """The control, which Ctrl-C, a polite kill and closing the terminal cancel; a second Ctrl-C breaks in at once.
+
+    What is printed after the terminal is closed is dropped. Under `nohup` the run goes on.
+    """
+    asked: list[int] = []
+    terminals = [output for output in _OUTPUTS if os.isatty(output)]
+
+    def on_signal(number: int, _frame: FrameType | None) -> None:
+        if number == signal.SIGHUP:
+            _drop_output(terminals)
+        elif asked:
+            raise KeyboardInterrupt
+        else:
+            asked.append(number)
+        control.cancel(_REASON.format(signal.Signals(number).name))
+
+    if threading.current_thread() is not threading.main_thread():
+        yield control
+        return
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        numbers.append(signal.SIGHUP)
+    before = {number: signal.signal(number, on_signal) for number in numbers}
+    try:
+        yield control
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def interrupted_by_hang_up() -> Iterator[None]:
+    """Closing the terminal is Ctrl-C, where no robot moves; what is printed afterwards is dropped."""
+    terminals = [output for output in _OUTPUTS if os.isatty(output)]
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        _drop_output(terminals)
+        raise KeyboardInterrupt
+
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+        yield
+        return
+    before = signal.signal(signal.SIGHUP, on_signal)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def _drop_output(terminals: Sequence[int]) -> None:
+    """Turn these descriptors to nowhere: every write to a terminal that is gone fails."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for terminal in terminals:
+        os.dup2(nowhere, terminal)
+    os.close(nowhere)

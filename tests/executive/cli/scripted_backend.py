@@ -1,0 +1,34 @@
+"""A backend without plant, referee and recorder, for tests of what runs on it."""
+
+from executive.run.runner import RunEntry
+from plant.spot.capabilities import spot_capabilities
+from skills.testing.clock import VirtualClock
+from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.robot import ScriptedRobot
+
+
+class ScriptedBackend:
+    """A scripted robot at the origin of an empty world."""
+
+    def __init__(self):
+        self.clock = VirtualClock()
+        self.robot = ScriptedRobot(self.clock, capabilities=spot_capabilities())
+        self.asked = []
+
+    def entry(self, tree, durable):
+        return RunEntry(tree, self.robot, KnownPlace(), BlockCostmap())
+
+    def show_live(self):
+        return None
+
+    def judge(self, tree, result):
+        self.asked.append((tree.mission_name, result.outcome))
+
+    def attach(self, profile):
+        profile.attach("scripted", self.clock, "advance")
+
+    def work(self):
+        return {"calls": len(self.robot.calls)}
+
+    def leave(self, artifacts, out):
+        return None

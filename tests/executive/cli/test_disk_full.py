@@ -1,0 +1,77 @@
+"""A disk that fills up in the middle of a run: the robot stops, nothing is lost, and the user is told the way on."""
+
+import errno
+import os
+
+import pytest
+import typer
+from scripted_backend import ScriptedBackend
+
+from executive.cli import requests
+from executive.cli.durable import kept
+from executive.cli.mission_run import run_request
+from executive.cli.output import refusals
+from executive.cli.requests import prepare
+from executive.mission.request import Request
+from executive.record.event_log import EventLog
+from executive.record.reader import read_events
+from executive.run.outcome import Outcome
+from executive.store.missions import MissionState, MissionStore
+
+FULL_AT_S = 3.0
+
+
+@pytest.fixture
+def prepared(tmp_path, monkeypatch):
+    monkeypatch.setattr(requests, "load_parser", lambda: None)  # no step here is a sentence
+    path = tmp_path / "drive.yaml"
+    path.write_text("name: drive\nsteps:\n  - {skill: navigate, with: {x: 3.0, y: 0.5}}\n")
+    return prepare(Request(file=path, out=tmp_path, seed=4))
+
+
+def full():
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.fixture
+def filling(monkeypatch):
+    """The log's file takes no more from a time on."""
+    flush = EventLog.flush
+    monkeypatch.setattr(EventLog, "flush", lambda log: full() if log._clock.now() > FULL_AT_S else flush(log))
+
+
+def run_kept(prepared, store, backend, ending=None):
+    mission = store.add(prepared.request, queued=False)
+    with refusals(), kept(store, mission) as ended:
+        finished = run_request(prepared, backend)
+        if ending is not None:
+            ending()
+        ended(finished.report)
+
+
+def test_the_robot_stops_and_the_way_on_is_named(prepared, filling, tmp_path, capsys):
+    backend = ScriptedBackend()
+    with MissionStore(tmp_path / "missions.sqlite") as store, pytest.raises(typer.Exit) as left:
+        run_kept(prepared, store, backend)
+    assert left.value.exit_code != 0
+    told = capsys.readouterr().err
+    assert ("disk is full" in told, f"errand resume --store {tmp_path}" in told) == (True, True)
+    assert "stop" in backend.robot.calls[-2:]
+    assert backend.robot._lease is None
+
+
+def test_the_mission_may_be_resumed_and_what_was_logged_is_there(prepared, filling, tmp_path):
+    with MissionStore(tmp_path / "missions.sqlite") as store, pytest.raises(typer.Exit):
+        run_kept(prepared, store, ScriptedBackend())
+    with MissionStore(tmp_path / "missions.sqlite", create=False) as store:
+        assert [mission.state for mission in store.missions()] == [MissionState.RUNNING]
+    assert read_events(tmp_path / "log.mcap")[-1].stamp_s > FULL_AT_S - 1.2
+
+
+def test_a_disk_that_is_full_when_pictures_are_written_leaves_the_mission_resumable(prepared, tmp_path):
+    backend = ScriptedBackend()
+    with MissionStore(tmp_path / "missions.sqlite") as store, pytest.raises(typer.Exit):
+        run_kept(prepared, store, backend, ending=full)
+    assert backend.asked == [("drive", Outcome.SUCCESS)]
+    with MissionStore(tmp_path / "missions.sqlite", create=False) as store:
+        assert [mission.state for mission in store.missions()] == [MissionState.RUNNING]

@@ -15,7 +15,7 @@ from plant.models.catalogue import MODELS_FOLDER
 
 FORMS: Final[Mapping[tuple[str, str], int]] = MappingProxyType(
     {
-        ("coke", "slim_can"): 8,
+        ("coke", "cola_can"): 6,
         ("coke", "glass_bottle"): 9,
         ("beer", "green_bottle"): 11,
         ("beer", "stubby_bottle"): 10,

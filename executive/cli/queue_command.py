@@ -88,7 +88,7 @@ def remove(number: Number, out: Out = Path("out"), store: Store = None) -> None:
 def run(
     out: Out = Path("out"),
     store: Store = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Run all that is queued, each mission in the world as the one before has left it."""

@@ -14,6 +14,9 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
+from executive.cli.output import refusals
+from executive.cli.wake_check import refuse_unaddressed
+
 __all__ = ["app", "loaded", "main"]
 
 
@@ -73,6 +76,9 @@ class _LazyGroup(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first argument names, imported."""
         if args and args[0] in COMMANDS:
+            if any(arg.startswith("--say") for arg in args):
+                with refusals():
+                    refuse_unaddressed(args[1:])
             self.add_command(loaded(args[0]), args[0])
         return super().resolve_command(ctx, args)
 

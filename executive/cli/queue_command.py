@@ -33,7 +33,9 @@ def add(
     say: Annotated[str | None, typer.Option(help="What is said.")] = None,
     world: Annotated[str | None, typer.Option(help="World by name or folder.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
-    no_wake: Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")] = False,
+    wake: Annotated[
+        bool | None, typer.Option("--wake/--no-wake", help="Must the robot's name be said? If the world asks for it.")
+    ] = None,
     stack: STACK = None,
     out: Out = Path("out"),
     store: Store = None,
@@ -44,9 +46,7 @@ def add(
     """Queue a sentence or a mission file, checked."""
     with refusals():
         load_stack(stack)
-        asked = Request(
-            say, file, world, require_wake=not no_wake, seed=seed, out=out, record=not no_record, stack=stack
-        )
+        asked = Request(say, file, world, wake, seed=seed, out=out, record=not no_record, stack=stack)
         prepared = prepare(asked)
         if not anyway:
             from executive.cli.feasibility import refuse_impossible

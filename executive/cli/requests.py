@@ -64,15 +64,17 @@ def prepare(
     knowledge = knowledge_of(world)
     if request.sentence is None:
         return _prepared(request, _commanded(request, world), world, knowledge)
+    robot = knowledge.robot
+    wake = robot.require_wake if request.require_wake is None else request.require_wake
     meant = understood(
         request.sentence,
         parser=load_parser(),
         knowledge=knowledge,
-        require_wake=request.require_wake,
+        require_wake=wake,
         answer=answerer(request.answers, request.questions, ask),
     )
-    mission = mission_from_meaning(meant, world=world.name, robot_name=knowledge.robot.name)
-    return _prepared(replace(request, sentence=meant.text), mission, world, knowledge, meant)
+    mission = mission_from_meaning(meant, world=world.name, robot_name=robot.name)
+    return _prepared(replace(request, sentence=meant.text, require_wake=wake), mission, world, knowledge, meant)
 
 
 def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:

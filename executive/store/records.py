@@ -47,7 +47,7 @@ def row_of(request: Request) -> dict[str, Any]:
     """A request that was understood as columns; its answers stand in its sentence."""
     own = {name: getattr(request, name) for name in _AS_THEY_ARE}
     paths = {name: None if (path := getattr(request, name)) is None else str(path) for name in ("file", "stack")}
-    flags = {"require_wake": request.require_wake, "record": request.record}
+    flags = {"require_wake": bool(request.require_wake), "record": request.record}
     return {**own, **flags, **paths, "commands": json.dumps(request.commands), "out": str(request.out)}
 
 

@@ -85,7 +85,9 @@ def kinds(tree: NodeView) -> list[tuple[str, str]]:
 def test_of_what_ran_only_nodes_with_something_to_show_are_left():
     drive = node("recover", "go to the bench", node("skill", "navigate"), node("skill", "back_off", state=IDLE))
     search = node("selector", "find cube", node("only if known", "again", state=IDLE), node("sequence", "look", drive))
-    tree = node("interrupts", "watched", node("monitor", "lease"), node("sequence", "m", search, node("skill", "grasp")))
+    tree = node(
+        "interrupts", "watched", node("monitor", "lease"), node("sequence", "m", search, node("skill", "grasp"))
+    )
     assert kinds(what_ran(tree)) == [("sequence", "m"), ("skill", "go to the bench"), ("skill", "grasp")]
 
 
@@ -104,6 +106,6 @@ def test_a_node_that_gives_another_reason_than_its_child_is_kept():
 
 def test_a_title_says_where_and_with_what(compiled, make):
     tree = compiled(*make.FETCH)
-    ran = what_ran(node_view(tree.root, {path_id: DONE for path_id in tree.path_ids}))
+    ran = what_ran(node_view(tree.root, dict.fromkeys(tree.path_ids, DONE)))
     titles = {each.name for _, each in ran.walk()}
     assert {"go to the counter", "hand over (Robin)"} <= titles, titles

@@ -10,13 +10,12 @@ from typing import Annotated, Final
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from executive.cli.durable import STORE, give_up_broken, kept, new_run, run_arguments
 from executive.cli.feasibility import refuse_impossible
 from executive.cli.listen_command import hear_request
 from executive.cli.mission_run import Finished
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Prepared, prepare
 from executive.cli.shown import control_for, show_files, show_run
@@ -128,10 +127,8 @@ def evaluate(
     with Progress(*columns, console=console) as bar:
         task = bar.add_task("seeds", total=len(chosen))
         reports = sweep(arguments, chosen, jobs=jobs, out=out, done=lambda report: bar.advance(task))
-    table = Table("seed", "tree", "referee", "collisions", "drops", "sim s", "x real", "message")
-    for row in rows(reports):
-        table.add_row(*row)
-    console.print(table)
+    header = ("seed", "tree", "referee", "collisions", "drops", "sim s", "x real", "message")
+    show_table(console, header, rows(reports))
     result = totals(reports)
     counts = ", ".join(f"{result[key]} {key.replace('_', ' ')}" for key in _COUNTS)
     console.print(f"{len(reports)} runs: {counts}")

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
 from executive.cli.durable import STORE
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.requests import prepare
 from executive.cli.stack_command import STACK
 from executive.mission.request import Request
@@ -19,7 +17,12 @@ from executive.store.missions import MissionState, MissionStore, StoredMission
 
 __all__ = ["queue"]
 
-queue = typer.Typer(name="queue", help="Missions kept in a store, to be run one after another.", no_args_is_help=True)
+queue = typer.Typer(
+    name="queue",
+    help="Missions kept in a store, to be run one after another.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
 
 Out = Annotated[Path, typer.Option(help="Folder for logs; each mission gets one of its own in it.")]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
@@ -65,13 +68,8 @@ def show(out: Out = Path("out"), store: Store = None, as_json: AsJson = False) -
     """Show all missions of the store and how far each is."""
     with refusals(), MissionStore(store or out / STORE, create=False) as missions:
         known = missions.missions()
-    table = Table("mission", "state", "name", "world", "seed", "commands", "message")
-    for each in known:
-        asked = each.request
-        commands = "\n".join(asked.commands)
-        row = (str(each.id), _state(each), asked.name, asked.world_name, str(asked.seed), commands, each.message)
-        table.add_row(*map(escape, row))
-    console_for(as_json).print(table)
+    header = ("mission", "state", "name", "world", "seed", "commands", "message")
+    show_table(console_for(as_json), header, map(_row, known))
     if as_json:
         print_json({"missions": [_told(each) for each in known]})
 
@@ -106,6 +104,11 @@ def run(
 
 def _state(mission: StoredMission) -> str:
     return "running or broken off" if mission.state is MissionState.RUNNING else mission.state.value
+
+
+def _row(mission: StoredMission) -> tuple[str, ...]:
+    asked, commands = mission.request, "\n".join(mission.request.commands)
+    return str(mission.id), _state(mission), asked.name, asked.world_name, str(asked.seed), commands, mission.message
 
 
 def _told(mission: StoredMission) -> dict[str, Any]:

@@ -17,10 +17,12 @@ from executive.language.questions import ClarifyingQuestion, RefusalError, Slot,
 from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.mission.command import Command, Task, Thing
-from executive.mission.errors import listing
+from executive.mission.errors import known_names, listing
 from executive.mission.knowledge import Knowledge
 
-__all__ = ["Grounded", "ground", "ground_noted", "known_line"]
+__all__ = ["ABLE", "Grounded", "ground", "ground_noted", "known_line"]
+
+ABLE: Final = "I can fetch, take, put and find things, and go to places"
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,9 @@ class Grounded:
 
 def known_line(knowledge: Knowledge | None) -> str:
     """What can be asked for and where one can be sent, in one line."""
-    able = "I can fetch, take, put and find things, and go to places"
     if knowledge is None:
-        return able
-    return f"{able}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
+        return ABLE
+    return f"{ABLE}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
 
 
 def ground(frames: Sequence[CommandFrame], knowledge: Knowledge) -> tuple[Command, ...]:
@@ -178,8 +179,7 @@ class _Grounder:
         candidates = tuple(dict.fromkeys([*ends, *near]))
         if candidates:
             return _asking(perhaps(slot, heard, candidates))
-        names = tuple(dict.fromkeys(known.values()))
-        return RefusalError(f"I know no {slot.value} {heard!r}; known {_PLURALS[slot]}: {listing(names)}", [heard])
+        return RefusalError(f"I know no {slot.value} {heard!r}; {known_names(heard, known.values())}", [heard])
 
 
 def _asking(question: ClarifyingQuestion) -> RefusalError:
@@ -222,6 +222,3 @@ def _around(location: Location) -> str | None:
         return location.within.text
     extra = () if location.phrase is None else location.phrase.extra
     return " ".join(extra[1:]) if extra[:1] == ("of",) else None
-
-
-_PLURALS: Final = {Slot.THING: "things", Slot.PLACE: "places", Slot.PERSON: "people", Slot.GOAL: "places"}

@@ -11,7 +11,7 @@ from executive.language.clauses import Clause, split_clauses, without_name
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
 from executive.language.disfluency import repair_disfluencies
 from executive.language.feasibility import check_feasible, not_understood
-from executive.language.grounding import ground_noted, known_line
+from executive.language.grounding import ABLE, ground_noted
 from executive.language.items import Item
 from executive.language.lexicon import lexicon
 from executive.language.names import name_table, parse_with_names
@@ -98,7 +98,7 @@ def _read(trace: Trace, _: _Context) -> Trace:
 def _split(trace: Trace, context: _Context) -> Trace:
     clauses = split_clauses(trace.items)
     if not clauses:
-        raise RefusalError(f"nothing was said; {known_line(context.knowledge)}")
+        raise RefusalError(f"nothing was said; {ABLE}")
     return replace(trace, clauses=clauses if context.knowledge else without_name(clauses))
 
 
@@ -120,7 +120,7 @@ def _check(trace: Trace, context: _Context) -> Trace:
     if not any(action.kind for action in trace.actions):
         told = [phrase.text for action in trace.actions for phrase in action.objects]
         of = f" of {listing(told)}" if told else ""
-        raise RefusalError(f"nothing to do was said{of}; {known_line(context.knowledge)}", told)
+        raise RefusalError(f"nothing to do was said{of}; {ABLE}", told)
     return trace
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
-from executive.mission.errors import InputError, listing, suggestion
+from executive.mission.errors import InputError, suggestion
 from executive.mission.yaml_source import YamlSource, read_yaml, validate
 from executive.testing.small_room import room_knowledge
 from executive.tree.port_values import PortValueError, gathered, port_value
@@ -178,7 +178,7 @@ def load_skill_tests(
     file = validate(SkillTestFile, source)
     file._source = source
     if file.skill not in skills:
-        hint = suggestion(file.skill, skills, f"registered are {listing(skills)}")
+        hint = suggestion(file.skill, skills)
         raise file.error(("skill",), f"there is no skill '{file.skill}'", hint)
     for index, test in enumerate(file.tests):
         file.inputs(index, skills[file.skill])

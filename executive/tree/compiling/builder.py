@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from executive.mission.command import Command
-from executive.mission.errors import InputError, SourceLine, listing, suggestion
+from executive.mission.errors import InputError, SourceLine, suggestion
 from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
 from executive.tree.behaviours.recovery import Recovery, Trigger
@@ -80,7 +80,7 @@ class PlanBuilder:
         Raises InputError: no skill of that name is registered.
         """
         if name not in self.registry:
-            raise self.error(f"there is no skill '{name}'", f"registered are {listing(sorted(self.registry))}")
+            raise self.error(f"there is no skill '{name}'", suggestion(name, self.registry))
         bound = {port: _binding(value) for port, value in (inputs or {}).items()}
         return skill_spec(self.registry[name], name, f"{self.path_id}/{slug(name)}", self.source, bound, outputs or {})
 

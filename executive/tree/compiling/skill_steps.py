@@ -40,7 +40,7 @@ def skill_plan(
 
 def _registered(call: SkillCall, registry: Registry) -> type[Skill[Any]]:
     if call.skill not in registry:
-        hint = suggestion(call.skill, registry, f"registered are {listing(sorted(registry))}")
+        hint = suggestion(call.skill, registry)
         raise call.error(("skill",), f"there is no skill '{call.skill}'", hint)
     return registry[call.skill]
 

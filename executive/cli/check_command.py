@@ -68,7 +68,10 @@ class Checker:
 
 
 def check(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Mission files.", show_default=False)],
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="MISSION...", help="Files, or names of `errand missions`.", show_default=False),
+    ],
     world: Annotated[str | None, typer.Option(help="World by name or folder, in place of the files' own.")] = None,
     stack: STACK = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,

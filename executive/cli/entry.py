@@ -34,6 +34,8 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "check": _Command(
         "check_command", "check", "Check mission files without running them: commands, tree, paths, time and battery."
     ),
+    "missions": _Command("missions_command", "missions", "List the missions that come with Errand."),
+    "init": _Command("missions_command", "init", "Copy the missions that come with Errand into a folder."),
     "parse": _Command("parse_command", "parse", "Show the commands that a sentence means."),
     "tree": _Command("tree_command", "tree", "Show the tree of a sentence, a mission file or a log."),
     "listen": _Command(

@@ -29,7 +29,9 @@ from executive.store.missions import MissionStore
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]
-MissionFile = Annotated[Path | None, typer.Argument(metavar="FILE", help="A mission file.", show_default=False)]
+MissionFile = Annotated[
+    Path | None, typer.Argument(metavar="MISSION", help="A file, or a name of `errand missions`.", show_default=False)
+]
 Wake = Annotated[
     bool | None,
     typer.Option("--wake/--no-wake", help="Must the robot's name be said? If spoken, or where the world asks for it."),

@@ -32,7 +32,10 @@ AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard 
 
 @queue.command()
 def add(
-    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A mission file.", show_default=False)] = None,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="MISSION", help="A file, or a name of `errand missions`.", show_default=False),
+    ] = None,
     say: Annotated[str | None, typer.Option(help="What is said.")] = None,
     world: Annotated[str | None, typer.Option(help="World by name or folder.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,

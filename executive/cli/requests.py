@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from executive.cli.answers import answerer, ask_at_terminal
+from executive.cli.missions_command import mission_file
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Understanding, load_parser
 from executive.language.questions import Answerer
@@ -59,7 +60,8 @@ def prepare(
     if not request.only_commands and (request.file is None) == (request.sentence is None):
         raise InputError("a mission file or --say is needed, and not both", hint='try: --say "Hey Alice, ..."')
     if request.file is not None:
-        return _filed(request, request.file, ask)
+        file = mission_file(request.file)
+        return _filed(replace(request, file=file), file, ask)
     world = open_world(request.world or request.world_name or DEFAULT_WORLD)
     knowledge = knowledge_of(world)
     if request.sentence is None:

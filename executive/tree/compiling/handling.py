@@ -38,7 +38,7 @@ def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> Nod
     """Drive to a pose, called `to`, or, when there is no path to it, to one nearby in the same room."""
     direct = builder.navigate(pose, to)
     nearby = enumerate(_nearby(builder, pose), start=1)
-    others = [builder.at(f"nearby-{n}").navigate(other, f"near {to}") for n, other in nearby]
+    others = [builder.at(f"nearby-{n}").navigate(other, f"a place near {to}") for n, other in nearby]
     return builder.node("selector", f"go to {to}, or near it", direct, *others, part="or-near") if others else direct
 
 

@@ -5,6 +5,7 @@ Help and start-up would otherwise import the plant, the sentence parser and the 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -14,8 +15,8 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from executive.cli.output import refusals
 from executive.cli.wake_check import refuse_unaddressed
+from executive.mission.errors import InputError
 
 __all__ = ["app", "loaded", "main"]
 
@@ -78,9 +79,6 @@ class _LazyGroup(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first argument names, imported."""
         if args and args[0] in COMMANDS:
-            if any(arg.startswith("--say") for arg in args):
-                with refusals():
-                    refuse_unaddressed(args[1:])
             self.add_command(loaded(args[0]), args[0])
         return super().resolve_command(ctx, args)
 
@@ -104,6 +102,12 @@ def _errand() -> None:
 
 def main() -> None:
     """The entry point of the console script."""
+    if any(argument.startswith("--say") for argument in sys.argv):
+        try:
+            refuse_unaddressed(sys.argv[2:])
+        except InputError as error:
+            typer.echo(f"errand: {error}", err=True)
+            sys.exit(2)
     app()
 
 

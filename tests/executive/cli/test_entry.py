@@ -31,14 +31,14 @@ IMPORTS = [
 ]
 
 
-def test_a_missing_wake_phrase_is_told_before_the_plant_or_the_parser_is_imported():
-    asked = ["run", "--wake", "--say", "fetch me a beer"]
+@pytest.mark.parametrize("asked", [["run", "--wake", "--say", "get a beer"], ["queue", "add", "--wake", "--say=go"]])
+def test_a_missing_wake_phrase_is_refused_before_anything_heavy_is_imported(asked):
     program = (
         "import sys; from executive.cli.entry import main\n"
         f"sys.argv = ['errand', *{asked!r}]\n"
         "try: main()\n"
         "except SystemExit as end: assert end.code == 2, end.code\n"
-        f"print(sorted({{name.split('.')[0] for name in sys.modules}} & {HEAVY | {'numpy'}!r}))"
+        f"print(sorted({{name.split('.')[0] for name in sys.modules}} & {HEAVY | {'numpy', 'pydantic', 'rich'}!r}))"
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert (run.stdout.strip(), "--no-wake" in run.stderr) == ("[]", True)

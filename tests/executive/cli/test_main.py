@@ -86,7 +86,7 @@ def test_parse_jsonl_answers_line_by_line_in_order(tmp_path: Path):
         (("tree", "go to the kitchen", "--world", "falt"), "flat"),
         (("tree", "absent.yaml"), "absent.yaml"),
         (("run", "--wake", "--say", "go to the kitchen"), "Hey Alice"),
-        (("queue", "add", "--wake", "--say=go to the kitchen"), "--no-wake"),
+        (("queue", "add", "--wake", "--say=go to the kitchen"), "Hey Alice"),
         (("run", "--wake", "--say", "tell Alice to go to the kitchen"), "Hey Alice"),
         (("run",), "--say"),
         (("evaluate", "--say", FETCH, "--seeds", "many"), "no range of seeds"),

@@ -1,5 +1,7 @@
 """Large trees are folded where nothing is to be seen, and never where something happens."""
 
+import re
+
 import pytest
 from py_trees.common import Status
 
@@ -109,3 +111,10 @@ def test_a_title_says_where_and_with_what(compiled, make):
     ran = what_ran(node_view(tree.root, dict.fromkeys(tree.path_ids, DONE)))
     titles = {each.name for _, each in ran.walk()}
     assert {"go to the counter", "hand over (Robin)"} <= titles, titles
+
+
+def test_the_legend_fits_beside_a_single_node():
+    svg = to_svg(node("skill", "go to the bench"))
+    width = float(svg.split('width="', 1)[1].split('"', 1)[0])
+    rightmost = max(map(float, re.findall(r'<text x="([0-9.]+)"', svg)))
+    assert width - rightmost > 60

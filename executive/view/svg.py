@@ -141,7 +141,7 @@ def _symbol(style: NodeStyle, x: float, y: float) -> str:
 def _legend(y: float) -> str:
     entries = [style.value for style in Styles]
     return "".join(
-        f'{_symbol(style, MARGIN + 8 + n * LEGEND_W, y - 4)}<text x="{MARGIN + 22 + n * LEGEND_W}" y="{y:g}" font-size="11" '
-        f'fill="#57606a">{style.word}</text>'
+        f'{_symbol(style, MARGIN + 8 + n * LEGEND_W, y - 4)}<text x="{MARGIN + 22 + n * LEGEND_W}" y="{y:g}" '
+        f'font-size="11" fill="#57606a">{style.word}</text>'
         for n, style in enumerate(entries)
     )

@@ -29,7 +29,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt | debian
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
 	  || { echo "Errand needs Python 3.11; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,view,speech,test,browser,bench,dev]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,test,browser,bench,dev]'
 	@touch $@
 
 train: $(VENV)/.train

@@ -73,11 +73,14 @@ class Checker:
 
 
 def check(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Mission files.", show_default=False)],
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="MISSION...", help="Files, or names of `errand missions`.", show_default=False),
+    ],
     world: Annotated[str | None, typer.Option(help="World by name or folder, in place of the files' own.")] = None,
     stack: STACK = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No commands and no trees.")] = False,
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show commands and trees, too.")] = False,
 ) -> None:
     """Check mission files without running them: commands, tree, paths on the map, time and battery."""
     checker = Checker(world, stack)
@@ -87,7 +90,7 @@ def check(
     else:
         console = console_for(as_json=False)
         for one in checked:
-            _show(one, console, quiet=quiet)
+            _show(one, console, verbose=verbose)
     if not all(one.ok for one in checked):
         raise typer.Exit(BAD_INPUT)
 
@@ -118,28 +121,24 @@ def _placed(file: Path, errors: Sequence[InputError]) -> tuple[InputError, ...]:
     return tuple(sorted(placed, key=lambda error: (str(error.file) != str(file), str(error.file), error.line or 0)))
 
 
-def _show(one: CheckedFile, console: Console, *, quiet: bool) -> None:
-    """What was found, for people."""
-    mark = "[green]✓[/green]" if one.ok else "[red]✗[/red]"
-    console.print(f"{mark} [bold]{escape(str(one.file))}[/bold]")
+def _show(one: CheckedFile, console: Console, *, verbose: bool) -> None:
+    """One line on the file; its errors, and with `verbose` its commands and its tree, below."""
+    mark, count = ("[green]✓[/green]" if one.ok else "[red]✗[/red]"), len(one.errors)
+    found = _in_words(one.estimate) if one.ok else f"{count} error{'s' if count > 1 else ''}"
+    console.print(f"{mark} [bold]{escape(str(one.file))}[/bold]: {found}")
     for error in one.errors:
         typer.echo(f"errand: {error}", err=True)
     for warning in one.warnings:
         typer.echo(f"errand: warning: {warning}", err=True)
-    if one.tree is None:
-        return
-    if not quiet:
+    if verbose and one.tree is not None:
         for command in one.tree.commands:
             console.print(f"  {command}", markup=False)
         console.print(to_rich(folded_to(node_view(one.tree.root), SHOWN_NODES), collapsed=False))
-    if one.ok:
-        console.print(f"  {_in_words(one.tree, one.estimate)}")
 
 
-def _in_words(tree: CompiledTree, estimate: Estimate) -> str:
+def _in_words(estimate: Estimate) -> str:
     minutes, seconds = divmod(round(estimate.duration_s), 60)
     charge = f"{estimate.charge:.1%} of the battery" if estimate.charge <= 1.0 else "more than one charge"
     return (
-        f"{len(tree.path_ids)} nodes; about {minutes} min {seconds:02d} s, {estimate.distance_m:.0f} m of driving and "
-        f"{charge} when all goes well"
+        f"about {minutes} min {seconds:02d} s, {estimate.distance_m:.0f} m of driving and {charge} when all goes well"
     )

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
 
-from executive.cli.output import console_for, print_json, refusals
+from executive.cli.output import console_for, print_json, refusals, show_table
 from executive.cli.refine_command import refine_command
 from executive.cli.score_command import score_command
 from executive.cli.train_command import train_command
@@ -25,7 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = ["dataset"]
 
-dataset = typer.Typer(name="dataset", help="Pictures with labels, made in the plant.", no_args_is_help=True)
+dataset = typer.Typer(
+    name="dataset", help="Pictures with labels, made in the plant.", no_args_is_help=True, rich_markup_mode=None
+)
 
 
 @dataset.callback()
@@ -79,12 +80,10 @@ def _rendered(out: Path, images: int, seed: int, jobs: int, console: Console) ->
 
 
 def _show(console: Console, out: Path, summary: Summary, seconds: float) -> None:
-    table = Table("class", *summary.images)
-    for name in next(iter(summary.labels.values())):
-        table.add_row(name, *(str(found[name]) for found in summary.labels.values()))
-    table.add_section()
-    table.add_row("pictures", *(str(count) for count in summary.images.values()))
-    console.print(table)
+    names = next(iter(summary.labels.values()))
+    rows = [(name, *(str(found[name]) for found in summary.labels.values())) for name in names]
+    rows.append(("pictures", *map(str, summary.images.values())))
+    show_table(console, ("class", *summary.images), rows)
     console.print(
         f"{out}: {sum(summary.images.values())} pictures, {summary.empty_images} of them with nothing to find, "
         f"{summary.ignored} labels to ignore; {seconds:.0f} s"

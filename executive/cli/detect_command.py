@@ -12,10 +12,9 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from rich.console import Console
-from rich.table import Table
 
 from executive.cli.detector_choice import detector_of, drawn
-from executive.cli.output import BAD_INPUT, console_for, print_json, refusals
+from executive.cli.output import BAD_INPUT, console_for, print_json, refusals, show_table
 from executive.cli.picture_files import read_picture, write_picture
 from executive.mission.errors import InputError
 from skills.detection import Detection, Detector
@@ -127,13 +126,13 @@ def _drawing_names(images: Sequence[Path], folder: Path) -> dict[int, Path]:
 
 
 def _show(console: Console, looked: Sequence[Looked]) -> None:
-    table = Table("picture", "class", "score", "box (u0, v0, u1, v1)", "ms")
+    table = list[tuple[str, ...]]()
     for one in looked:
         values = [(d.class_name, f"{d.score:.2f}", ", ".join(f"{value:.0f}" for value in d.box)) for d in one.found]
         rows = values or [("cannot be read" if one.error else "nothing", "", "")]
         for k, row in enumerate(rows):
-            table.add_row(str(one.file) if k == 0 else "", *row, f"{one.ms:.1f}" if k == 0 and not one.error else "")
-    console.print(table, markup=False)
+            table.append((str(one.file) if k == 0 else "", *row, f"{one.ms:.1f}" if k == 0 and not one.error else ""))
+    show_table(console, ("picture", "class", "score", "box (u0, v0, u1, v1)", "ms"), table)
 
 
 def _rounded(box: tuple[float, float, float, float]) -> list[float]:

@@ -29,7 +29,7 @@ def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
     """
     arguments = ["--say", prepared.request.sentence or ""] if asked.file is None else [str(asked.file)]
     arguments += ["--world", asked.world] if asked.world else []
-    arguments += [] if asked.require_wake else ["--no-wake"]
+    arguments += [] if asked.require_wake is None else ["--wake" if asked.require_wake else "--no-wake"]
     arguments += ["--stack", str(asked.stack)] if asked.stack else []
     if asked.file is None:
         return arguments

@@ -5,6 +5,7 @@ Help and start-up would otherwise import the plant, the sentence parser and the 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -13,6 +14,9 @@ from typing import Any, Final
 import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
+
+from executive.cli.wake_check import refuse_unaddressed
+from executive.mission.errors import InputError
 
 __all__ = ["app", "loaded", "main"]
 
@@ -31,6 +35,8 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "check": _Command(
         "check_command", "check", "Check mission files without running them: commands, tree, paths, time and battery."
     ),
+    "missions": _Command("missions_command", "missions", "List the missions that come with Errand."),
+    "init": _Command("missions_command", "init", "Copy the missions that come with Errand into a folder."),
     "parse": _Command("parse_command", "parse", "Show the commands that a sentence means."),
     "tree": _Command("tree_command", "tree", "Show the tree of a sentence, a mission file or a log."),
     "listen": _Command(
@@ -57,7 +63,7 @@ def loaded(name: str) -> Any:
     found = getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute)
     if isinstance(found, typer.Typer):
         return get_command(found)
-    alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     alone.command(name=name)(found)
     return get_command(alone)
 
@@ -84,6 +90,8 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"max_content_width": 120},
 )
 
 
@@ -94,6 +102,12 @@ def _errand() -> None:
 
 def main() -> None:
     """The entry point of the console script."""
+    if any(argument.startswith("--say") for argument in sys.argv):
+        try:
+            refuse_unaddressed(sys.argv[2:])
+        except InputError as error:
+            typer.echo(f"errand: {error}", err=True)
+            sys.exit(2)
     app()
 
 

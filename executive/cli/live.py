@@ -1,4 +1,4 @@
-"""The live tree with its progress line, for as long as a mission runs."""
+"""The live tree with its progress line, for as long as a mission runs, and a line for each skill that has ended."""
 
 from __future__ import annotations
 
@@ -15,33 +15,41 @@ from executive.cli.keys import HELP, Keys, keys_pressed, prompt_lines
 from executive.run.control import Control
 from executive.run.runner import Observer, Progress
 from executive.tree.compiler import CompiledTree
-from executive.tree.node_view import node_view
+from executive.tree.node_view import NodeView, node_view
 from executive.tree.snapshot import NodeState, Snapshot
-from executive.view.styles import Styles
-from executive.view.text import to_rich
+from executive.view.styles import Styles, style_of
+from executive.view.text import printable, title_of, to_rich
 
 REFRESH_S = 0.2
 BAR_CELLS = 20
 FEWEST_ROWS = 5
+_UNDER_WAY = (Styles.IDLE.value, Styles.RUNNING.value)
 PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 
 
 @contextmanager
 def live_view(
-    tree: CompiledTree, console: Console, control: Control | None = None, *, say: Callable[[str], str] | None = None
+    console: Console, control: Control | None = None, *, say: Callable[[str], str] | None = None
 ) -> Iterator[Observer]:
-    """Show the tree while the mission runs; without a terminal, one line for each skill that ends.
+    """Show the tree while the mission runs, and write a line for each skill that ends.
 
     Where somebody sits at a terminal, keys control the run, and `say` answers the sentences that are typed.
     """
     hands = control or Control(pace=None)
     keys = Keys(hands, say)
     with keys_pressed(keys) if control is not None else nullcontext(False) as heard:
+        lines = _Lines(console)
         if not console.is_terminal:
-            yield _Lines(tree, console)
+            yield lines
             return
         with Live(console=console, auto_refresh=False, transient=True, vertical_overflow="crop") as live:
-            yield _Picture(live, lambda now_s: prompt_lines(hands.state, now_s, keys.typing) if heard else [])
+            picture = _Picture(live, lambda now_s: prompt_lines(hands.state, now_s, keys.typing) if heard else [])
+
+            def observe(progress: Progress) -> None:
+                lines(progress)
+                picture(progress)
+
+            yield observe
 
 
 class _Picture:
@@ -88,23 +96,44 @@ def _of_tree(tree: CompiledTree, states: Snapshot) -> Snapshot:
 class _Lines:
     """Writes a line whenever a skill has ended."""
 
-    def __init__(self, tree: CompiledTree, console: Console) -> None:
-        self._tree, self._console = tree, console
-        self._leaves = [node.path_id for node in tree.root.walk() if not node.children]
-        self._shown: dict[str, NodeState] = {}
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._leaves: dict[str, dict[str, str]] = {}
+        self._last: dict[str, NodeState] = {}
+        self._begun_s: dict[str, float] = {}
 
     def __call__(self, progress: Progress) -> None:
         """Write what ended since the last tick."""
-        states = progress.states[self._tree.robot_name]
-        for leaf in self._leaves:
-            state = states[leaf]
-            ended = state.status in (Status.SUCCESS, Status.FAILURE)
-            if ended and self._shown.get(leaf) != state:
-                cause = f" {state.cause.value}:" if state.cause else ""
-                self._console.print(
-                    f"{progress.now_s:7.2f} s  {leaf}  {state.status.value}{cause} {state.message}", markup=False
-                )
-            self._shown[leaf] = state
+        for robot, tree in progress.trees.items():
+            if tree.root.path_id not in self._leaves:
+                self._leaves[tree.root.path_id] = _skill_titles(node_view(tree.root))
+            for path_id, title in self._leaves[tree.root.path_id].items():
+                self._tell(path_id, title, progress.states[robot][path_id], progress.now_s)
+
+    def _tell(self, path_id: str, title: str, state: NodeState, now_s: float) -> None:
+        before = self._last.get(path_id, NodeState())
+        if state is before:
+            return
+        self._last[path_id] = state
+        if before.status is not Status.RUNNING:
+            self._begun_s[path_id] = now_s
+        if style_of(state) not in _UNDER_WAY and before != state:
+            self._console.print(skill_line(title, state, now_s - self._begun_s[path_id]))
+
+
+def _skill_titles(node: NodeView, above: NodeView | None = None) -> dict[str, str]:
+    """What the skills below do, by path id."""
+    if node.kind == "skill":
+        return {node.path_id: title_of(node, above)}
+    return {path_id: title for child in node.children for path_id, title in _skill_titles(child, node).items()}
+
+
+def skill_line(title: str, state: NodeState, took_s: float) -> Text:
+    """A skill that has ended: its mark, how long it took, what it did, and what came of it."""
+    style = style_of(state)
+    cause = state.cause.value if state.cause else ""
+    what = printable(": ".join(filter(None, (title, cause, state.message))))
+    return Text.assemble((style.symbol, style.rich), f" {took_s:6.1f} s  {what}")
 
 
 def progress_line(states: Snapshot, now_s: float) -> Text:

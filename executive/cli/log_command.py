@@ -10,12 +10,12 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
-from executive.cli.output import refusals
+from executive.cli.output import console_for, refusals, show_table
 from executive.record.history import History, read_history
 from executive.record.ros2 import write_ros2
+from executive.record.schemas import ERRORS
 from executive.record.timeline import Entry, timeline
 from executive.view.styles import style_of
 from executive.view.text import printable
@@ -27,7 +27,7 @@ def log(
     ros2: Annotated[Path | None, typer.Option(help="Write it anew as a ROS 2 bag (MCAP), and end.")] = None,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
 ) -> None:
-    """Print what happened in a run: what each node did and why, commands, detections, overruns, the outcome."""
+    """Print what happened in a run: what each node did and why, detections, the outcome, tracebacks of defects."""
     with refusals():
         history = read_history(file)
         if ros2 is not None:
@@ -36,19 +36,19 @@ def log(
         if as_json:
             sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
             return
-        Console(highlight=False).print(_table(history, every_node))
+        _show(history, console_for(as_json=False), every_node=every_node)
 
 
-def _table(history: History, every_node: bool) -> Table:
-    table = Table("t (s)", "", "node or topic", "what", title=printable(str(history.file)), title_style="bold")
-    table.columns[0].justify = "right"
-    for column, share in ((2, 2), (3, 3)):
-        table.columns[column].ratio, table.columns[column].overflow = share, "fold"
+def _show(history: History, console: Console, *, every_node: bool) -> None:
+    """The timeline as a table, and the traceback of each defect below it."""
     entries = list(timeline(history.events, leaves_only=not every_node))
     prefix = _common([entry.about for entry in entries if entry.state is not None])
-    for entry in entries:
-        table.add_row(*_row(entry, prefix))
-    return table
+    show_table(console, ("t (s)", "", "node or topic", "what"), (_row(entry, prefix) for entry in entries))
+    for event in history.events:
+        if event.topic == ERRORS:
+            head = f"{event.stamp_s:.2f} s, {event.data.get('node')}:"
+            lines = str(event.data.get("traceback", "")).splitlines()
+            console.print("", *map(printable, (head, *lines)), sep="\n", markup=False)
 
 
 def _common(path_ids: Sequence[str]) -> str:

@@ -10,13 +10,12 @@ from typing import Annotated, Final
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from executive.cli.durable import STORE, give_up_broken, kept, new_run, run_arguments
 from executive.cli.feasibility import refuse_impossible
 from executive.cli.listen_command import hear_request
 from executive.cli.mission_run import Finished
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Prepared, prepare
 from executive.cli.shown import control_for, show_files, show_run
@@ -30,8 +29,13 @@ from executive.store.missions import MissionStore
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
 Say = Annotated[str | None, typer.Option(help='What is said, as in "Hey Alice, fetch me a drink".')]
-MissionFile = Annotated[Path | None, typer.Argument(metavar="FILE", help="A mission file.", show_default=False)]
-NoWake = Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")]
+MissionFile = Annotated[
+    Path | None, typer.Argument(metavar="MISSION", help="A file, or a name of `errand missions`.", show_default=False)
+]
+Wake = Annotated[
+    bool | None,
+    typer.Option("--wake/--no-wake", help="Must the robot's name be said? If spoken, or where the world asks for it."),
+]
 Answer = Annotated[list[str] | None, typer.Option(help="An answer to a question that is asked back; in their order.")]
 Questions = Annotated[
     QuestionPolicy | None,
@@ -49,12 +53,13 @@ def run(
     listen_to: Annotated[Path | None, typer.Option("--listen", help="A wav file that says it.")] = None,
     world: World = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
-    no_wake: NoWake = False,
+    wake: Wake = None,
     answer: Answer = None,
     questions: Questions = None,
     out: Annotated[Path, typer.Option(help="Folder for log, tree, recording and pictures.")] = Path("out"),
     as_json: AsJson = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")] = False,
+    whole_tree: Annotated[bool, typer.Option("--tree", help="Show the whole tree in the end.")] = False,
     no_record: Annotated[bool, typer.Option("--no-record", help="No recording and no pictures.")] = False,
     profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: Store = None,
@@ -76,10 +81,17 @@ def run(
 
     with refusals():
         if listen_to is not None:
-            say = hear_request(listen_to, file or say, world=world, require_wake=not no_wake, console=console)
-        asked = Request(say, file, world, not no_wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
+            say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
+        asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
         finished, page = _run_kept(
-            asked, kept_in, anyway=anyway, quiet=quiet, console=console, page=page_of, profile=timing
+            asked,
+            kept_in,
+            anyway=anyway,
+            quiet=quiet,
+            whole_tree=whole_tree,
+            console=console,
+            page=page_of,
+            profile=timing,
         )
     if timing is not None:
         for line in lines(timing.table()):
@@ -98,7 +110,7 @@ def evaluate(
     world: World = None,
     seeds: Annotated[str, typer.Option(help="Such as 1-20 or 1,4,7.")] = "1-20",
     jobs: Annotated[int, typer.Option(min=1, help="How many runs at a time.")] = 2,
-    no_wake: NoWake = False,
+    wake: Wake = None,
     answer: Answer = None,
     questions: Questions = None,
     stack: STACK = None,
@@ -109,7 +121,7 @@ def evaluate(
     """Run a mission at many seeds and count what the trees claim and what the referee saw."""
     with refusals():
         chosen = seed_range(seeds)
-        asked = Request(say, file, world, not no_wake, tuple(answer or ()), questions, stack=stack)
+        asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack)
         prepared = _prepared(asked, anyway=anyway)
         arguments = run_arguments(asked, prepared)
     console = console_for(as_json)
@@ -117,10 +129,8 @@ def evaluate(
     with Progress(*columns, console=console) as bar:
         task = bar.add_task("seeds", total=len(chosen))
         reports = sweep(arguments, chosen, jobs=jobs, out=out, done=lambda report: bar.advance(task))
-    table = Table("seed", "tree", "referee", "collisions", "drops", "sim s", "x real", "message")
-    for row in rows(reports):
-        table.add_row(*row)
-    console.print(table)
+    header = ("seed", "tree", "referee", "collisions", "drops", "sim s", "x real", "message")
+    show_table(console, header, rows(reports))
     result = totals(reports)
     counts = ", ".join(f"{result[key]} {key.replace('_', ' ')}" for key in _COUNTS)
     console.print(f"{len(reports)} runs: {counts}")
@@ -139,7 +149,15 @@ def _prepared(asked: Request, *, anyway: bool) -> Prepared:
 
 
 def _run_kept(
-    asked: Request, store: Path, *, anyway: bool, quiet: bool, console: Console, page: PageOf, profile: Profile | None
+    asked: Request,
+    store: Path,
+    *,
+    anyway: bool,
+    quiet: bool,
+    whole_tree: bool,
+    console: Console,
+    page: PageOf,
+    profile: Profile | None,
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
     prepared = _prepared(asked, anyway=anyway)
@@ -155,7 +173,9 @@ def _run_kept(
             durable = new_run(missions, mission)
             start = partial(run_simulated, prepared, page=shown, durable=durable, profile=profile)
             talk = None if shown is None else shown.conversation
-            finished = show_run(start, prepared, console, control=control, quiet=quiet, conversation=talk)
+            finished = show_run(
+                start, prepared, console, control=control, quiet=quiet, whole_tree=whole_tree, conversation=talk
+            )
             ended(finished.report)
     show_files(asked.out, console)
     return finished, shown

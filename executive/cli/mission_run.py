@@ -25,7 +25,7 @@ from executive.run.worker import LockStepWorker
 from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView, node_view
-from executive.view.collapse import DRAWN_NODES, folded_to
+from executive.view.collapse import DRAWN_NODES, folded_to, what_ran
 from executive.view.svg import to_svg
 
 
@@ -107,7 +107,7 @@ def _judged(prepared: Prepared, backend: Backend, result: RunResult, log: EventL
     """The report of a run with what the referee saw; the tree as it ended is drawn."""
     tree = result.trees.get(prepared.tree.robot_name, prepared.tree)
     view = node_view(tree.root, result.worst.states)
-    picture = to_svg(folded_to(view, DRAWN_NODES), title=prepared.mission.name)
+    picture = to_svg(folded_to(what_ran(view), DRAWN_NODES), title=prepared.mission.name)
     (prepared.request.out / "tree.svg").write_text(picture, encoding="utf-8")
     referee = backend.judge(tree, result.worst)
     return Finished(_report(prepared, tree, result, referee, log=str(log.path)), view)

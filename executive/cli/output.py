@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import typer
 from rich.console import Console
+from rich.table import Column, Table
+from rich.text import Text
 
 from executive.mission.errors import InputError
 
@@ -26,6 +28,21 @@ def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:
     """One JSON object or array on one line of standard output."""
     sys.stdout.write(json.dumps(value, ensure_ascii=False, allow_nan=False) + "\n")
     sys.stdout.flush()
+
+
+def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:
+    """A table: in a box at a terminal, else one line for each row, the columns two spaces apart."""
+    if console.is_terminal:
+        table = Table(*(Column(name, overflow="fold") for name in header))
+        for row in rows:
+            table.add_row(*(cell if isinstance(cell, Text) else Text(cell) for cell in row))
+        console.print(table)
+        return
+    plain = [[str(cell).replace("\n", "; ") for cell in row] for row in (header, *rows)]
+    widths = [max(map(len, column)) for column in zip(*plain, strict=True)]
+    for cells in plain:
+        line = "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True))
+        console.print(line.rstrip(), markup=False)
 
 
 @contextmanager

@@ -42,7 +42,8 @@ def parse(
         knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))
         parser = load_parser()
         lines = [sentence] if sentence is not None else _lines_of(file)
-        told = parse_lines(lines, parser=parser, knowledge=knowledge)
+        wake = knowledge is not None and knowledge.robot.require_wake
+        told = parse_lines(lines, parser=parser, knowledge=knowledge, require_wake=wake)
         if jsonl:
             for meaning in told:
                 print(json.dumps(_values(meaning, explained), ensure_ascii=False), flush=True)

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.markup import escape
-from rich.table import Table
 
 from executive.cli.durable import STORE
-from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.requests import prepare
 from executive.cli.stack_command import STACK
 from executive.mission.request import Request
@@ -19,7 +17,12 @@ from executive.store.missions import MissionState, MissionStore, StoredMission
 
 __all__ = ["queue"]
 
-queue = typer.Typer(name="queue", help="Missions kept in a store, to be run one after another.", no_args_is_help=True)
+queue = typer.Typer(
+    name="queue",
+    help="Missions kept in a store, to be run one after another.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
 
 Out = Annotated[Path, typer.Option(help="Folder for logs; each mission gets one of its own in it.")]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
@@ -29,11 +32,16 @@ AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard 
 
 @queue.command()
 def add(
-    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="A mission file.", show_default=False)] = None,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="MISSION", help="A file, or a name of `errand missions`.", show_default=False),
+    ] = None,
     say: Annotated[str | None, typer.Option(help="What is said.")] = None,
     world: Annotated[str | None, typer.Option(help="World by name or folder.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
-    no_wake: Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")] = False,
+    wake: Annotated[
+        bool | None, typer.Option("--wake/--no-wake", help="Must the robot's name be said? If the world asks for it.")
+    ] = None,
     stack: STACK = None,
     out: Out = Path("out"),
     store: Store = None,
@@ -44,9 +52,7 @@ def add(
     """Queue a sentence or a mission file, checked."""
     with refusals():
         load_stack(stack)
-        asked = Request(
-            say, file, world, require_wake=not no_wake, seed=seed, out=out, record=not no_record, stack=stack
-        )
+        asked = Request(say, file, world, wake, seed=seed, out=out, record=not no_record, stack=stack)
         prepared = prepare(asked)
         if not anyway:
             from executive.cli.feasibility import refuse_impossible
@@ -65,13 +71,8 @@ def show(out: Out = Path("out"), store: Store = None, as_json: AsJson = False) -
     """Show all missions of the store and how far each is."""
     with refusals(), MissionStore(store or out / STORE, create=False) as missions:
         known = missions.missions()
-    table = Table("mission", "state", "name", "world", "seed", "commands", "message")
-    for each in known:
-        asked = each.request
-        commands = "\n".join(asked.commands)
-        row = (str(each.id), _state(each), asked.name, asked.world_name, str(asked.seed), commands, each.message)
-        table.add_row(*map(escape, row))
-    console_for(as_json).print(table)
+    header = ("mission", "state", "name", "world", "seed", "commands", "message")
+    show_table(console_for(as_json), header, map(_row, known))
     if as_json:
         print_json({"missions": [_told(each) for each in known]})
 
@@ -88,7 +89,7 @@ def remove(number: Number, out: Out = Path("out"), store: Store = None) -> None:
 def run(
     out: Out = Path("out"),
     store: Store = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Run all that is queued, each mission in the world as the one before has left it."""
@@ -106,6 +107,11 @@ def run(
 
 def _state(mission: StoredMission) -> str:
     return "running or broken off" if mission.state is MissionState.RUNNING else mission.state.value
+
+
+def _row(mission: StoredMission) -> tuple[str, ...]:
+    asked, commands = mission.request, "\n".join(mission.request.commands)
+    return str(mission.id), _state(mission), asked.name, asked.world_name, str(asked.seed), commands, mission.message
 
 
 def _told(mission: StoredMission) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from executive.cli.answers import answerer, ask_at_terminal
+from executive.cli.missions_command import mission_file
 from executive.cli.plugins import usable_skills
 from executive.cli.worlds import knowledge_of, open_world
 from executive.language import Understanding, load_parser
@@ -59,20 +60,23 @@ def prepare(
     if not request.only_commands and (request.file is None) == (request.sentence is None):
         raise InputError("a mission file or --say is needed, and not both", hint='try: --say "Hey Alice, ..."')
     if request.file is not None:
-        return _filed(request, request.file, ask)
+        file = mission_file(request.file)
+        return _filed(replace(request, file=file), file, ask)
     world = open_world(request.world or request.world_name or DEFAULT_WORLD)
     knowledge = knowledge_of(world)
     if request.sentence is None:
         return _prepared(request, _commanded(request, world), world, knowledge)
+    robot = knowledge.robot
+    wake = robot.require_wake if request.require_wake is None else request.require_wake
     meant = understood(
         request.sentence,
         parser=load_parser(),
         knowledge=knowledge,
-        require_wake=request.require_wake,
+        require_wake=wake,
         answer=answerer(request.answers, request.questions, ask),
     )
-    mission = mission_from_meaning(meant, world=world.name, robot_name=knowledge.robot.name)
-    return _prepared(replace(request, sentence=meant.text), mission, world, knowledge, meant)
+    mission = mission_from_meaning(meant, world=world.name, robot_name=robot.name)
+    return _prepared(replace(request, sentence=meant.text, require_wake=wake), mission, world, knowledge, meant)
 
 
 def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:

@@ -24,7 +24,7 @@ def resume(
     store: Annotated[Path, typer.Option(help="Where the missions are kept.")] = Path("out") / STORE,
     mission: Annotated[int | None, typer.Option(help="Its number, where it is not the one broken off.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No live tree.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")] = False,
 ) -> None:
     """Go on with the mission that was broken off, from its last finished step; then with its queue."""
     console = console_for(as_json)

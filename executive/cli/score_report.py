@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
+from executive.cli.output import show_table
 from skills.perception.training.scoring import Bin, ClassScore, Score
 
 __all__ = ["scores_json", "show_scores"]
@@ -71,15 +71,11 @@ def _show(console: Console, camera: str, score: Score) -> None:
     """Print tables and a line on the rest."""
     if camera != "all":
         console.print(f"{camera} camera" if camera == "hand" else f"{camera} cameras")
-    table = Table("class", "labels", "AP50", "AP50-95", "precision", "recall")
-    for one in score.classes:
-        figures = (one.ap50, one.ap50_95, one.precision, one.recall)
-        table.add_row(one.name, str(one.labels), *(_shown(value) for value in figures))
-    table.add_section()
+    figures = [(one.name, one.labels, one.ap50, one.ap50_95, one.precision, one.recall) for one in score.classes]
     labels = sum(one.labels for one in score.classes)
-    figures = (score.map50, score.map50_95, score.precision, score.recall)
-    table.add_row("all", str(labels), *(_shown(value) for value in figures))
-    console.print(table)
+    figures.append(("all", labels, score.map50, score.map50_95, score.precision, score.recall))
+    rows = [(name, str(count), *map(_shown, values)) for name, count, *values in figures]
+    show_table(console, ("class", "labels", "AP50", "AP50-95", "precision", "recall"), rows)
     for name, bins in (
         ("longer side, px", score.by_size_px),
         ("distance, m", score.by_distance_m),
@@ -96,10 +92,8 @@ def _show(console: Console, camera: str, score: Score) -> None:
 def _show_bins(console: Console, name: str, bins: Sequence[Bin]) -> None:
     filled = [one for one in bins if one.labels]
     if filled:
-        table = Table(name, *(_range(one) for one in filled))
-        table.add_row("labels", *(str(one.labels) for one in filled))
-        table.add_row("recall", *(_shown(one.recall) for one in filled))
-        console.print(table)
+        rows = ("labels", *(str(one.labels) for one in filled)), ("recall", *(_shown(one.recall) for one in filled))
+        show_table(console, (name, *map(_range, filled)), rows)
 
 
 def _range(one: Bin) -> str:

@@ -1,4 +1,4 @@
-"""A run as people see it: the commands before, the tree while it runs, the verdicts after."""
+"""A run as people see it: the commands before, a line for each skill that ended, the verdicts after."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Protocol
 
 from rich.console import Console
 
+from executive.cli.durable import STORE
 from executive.cli.live import live_view
 from executive.cli.mission_run import Finished, both
 from executive.cli.requests import Prepared
@@ -39,9 +40,13 @@ def show_run(
     *,
     control: Control,
     quiet: bool,
+    whole_tree: bool = False,
     conversation: Conversation | None = None,
 ) -> Finished:
-    """Run it, shown on the console and controlled from there; `conversation` is one that goes on elsewhere, too."""
+    """Run it, shown on the console and controlled from there; `conversation` is one that goes on elsewhere, too.
+
+    With `whole_tree` all its nodes are shown in the end.
+    """
     for told in prepared.mission.notes:
         console.print(f"{told}.", markup=False)
     for command in prepared.mission.commands:
@@ -53,10 +58,11 @@ def show_run(
             load_parser().release()  # nobody speaks to the run
         finished = start(control=control, observer=None if conversation is None else talk.observe)
     else:
-        with live_view(prepared.tree, console, control, say=lambda text: talk.hear(text).text) as observer:
+        with live_view(console, control, say=lambda text: talk.hear(text).text) as observer:
             if control.attended and conversation is None:
                 load_ahead()
             finished = start(control=control, observer=both(observer, talk.observe))
+    if whole_tree:
         console.print(to_rich(finished.tree, collapsed=False))
     for line in finished.report.lines():
         console.print(line)
@@ -64,5 +70,6 @@ def show_run(
 
 
 def show_files(out: Path, console: Console) -> None:
-    """Name what was left in a folder."""
-    console.print(f"Written to {out}: {', '.join(sorted(path.name for path in out.iterdir()))}", markup=False)
+    """Name what was left in a folder, but for what the store keeps there."""
+    names = sorted(path.name for path in out.iterdir() if not path.name.startswith(Path(STORE).stem))
+    console.print(f"Written to {out}: {', '.join(names)}", markup=False)

@@ -19,7 +19,9 @@ STACK = Annotated[
     typer.Option("--stack", help="A stack file: localiser, planners, detector and so on; see errand stack show."),
 ]
 
-stack = typer.Typer(name="stack", help="What a robot uses: localiser, planners, controller, detector.")
+stack = typer.Typer(
+    name="stack", help="What a robot uses: localiser, planners, controller, detector.", rich_markup_mode=None
+)
 
 
 @stack.callback()

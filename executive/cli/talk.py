@@ -25,7 +25,7 @@ def load_ahead() -> None:
     threading.Thread(target=lambda: load_parser().parse("go"), name="errand-parser", daemon=True).start()
 
 
-def conversation_of(prepared: Prepared, control: Control, *, require_wake: bool = False) -> Conversation:
+def conversation_of(prepared: Prepared, control: Control) -> Conversation:
     """A conversation with the robot of a request, in its world."""
     speech = Speech(
         knowledge=prepared.knowledge,
@@ -33,7 +33,8 @@ def conversation_of(prepared: Prepared, control: Control, *, require_wake: bool 
         understand=lambda text, memory: _understood(text, memory, prepared),
         compile=lambda commands, taken: _compiled(commands, taken, prepared),
     )
-    return Conversation(speech, control, require_wake=require_wake, others=prepared.knowledge.robot.others)
+    robot = prepared.knowledge.robot
+    return Conversation(speech, control, require_wake=robot.require_wake, others=robot.others)
 
 
 def _understood(text: str, memory: Memory | None, prepared: Prepared) -> Understanding:

@@ -12,6 +12,7 @@ from typing import Annotated, Final
 
 import typer
 
+from executive.cli.missions_command import shipped_missions
 from executive.cli.output import refusals
 from executive.cli.requests import prepare
 from executive.mission.errors import InputError
@@ -77,7 +78,7 @@ def tree(
 
 
 def _view(text: str | None, say: str | None, world: str | None, at_s: float | None) -> NodeView:
-    """What ends in .mcap is a log, what ends in .yaml or exists a mission file, and all else a sentence."""
+    """What ends in .mcap is a log, what ends in .yaml, exists or is shipped a mission file, and all else a sentence."""
     if text is not None and text.endswith(LOG_SUFFIX):
         return read_history(Path(text)).trees(at_s)[-1]
     if at_s is not None:
@@ -91,7 +92,7 @@ def _view(text: str | None, say: str | None, world: str | None, at_s: float | No
 def _request(text: str | None, say: str | None, world: str | None) -> Request:
     if text is not None and say is not None:
         raise InputError("a sentence and --say were given", hint="leave one of them out")
-    if text is not None and (text.endswith((".yaml", ".yml")) or _is_file(text)):
+    if text is not None and (text.endswith((".yaml", ".yml")) or text in shipped_missions() or _is_file(text)):
         return Request(file=Path(text), world=world)
     sentence = say if text is None else text
     if sentence is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.mission.errors import InputError, suggestion
+from executive.mission.errors import InputError, known_names, suggestion
 from executive.mission.knowledge import Knowledge, load_knowledge
 from plant.worlds.world import World, WorldError, known_worlds, load_world
 
@@ -19,7 +19,7 @@ def _world_error(name: str, error: Exception) -> InputError:
     """Of a world that is not there its name and what there is; else what its files say."""
     if not isinstance(error, OSError) and not str(error).startswith("unknown world"):
         return InputError(str(error))
-    known = f"known are {', '.join(known_worlds())}, and folders with a world.dmd.yaml"
+    known = f"{known_names(name, known_worlds())}, and folders with a world.dmd.yaml"
     return InputError(f"unknown world '{name[:60]}'", hint=suggestion(name, known_worlds(), known))
 
 

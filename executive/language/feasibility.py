@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from executive.language.grounding import known_line
+from executive.language.grounding import ABLE
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
@@ -35,7 +35,7 @@ def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | Non
         raise RefusalError(f"I bring things to one person at a time, not to {', '.join(shared)}; name one", shared)
     people = [f"{d.verb} {d.target.text}" for d in actions if _carries(d) and d.target is not None and d.target.person]
     if people:
-        raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {known_line(knowledge)}", people)
+        raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {ABLE}", people)
     finds = (d.target for d in actions if d.kind is VerbKind.FIND and d.target is not None)
     sought = [phrase.spoken for phrase in finds if _anyone(phrase)]
     if sought and knowledge is not None:
@@ -50,7 +50,7 @@ def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None
     """The refusal that names the parts which lie outside the mission, each with the whole clause that it stands in."""
     within = {clause: [part for part, other in parts if other == clause] for _, clause in parts}
     named = (_named(tuple(dict.fromkeys(words)), clause) for clause, words in within.items())
-    return RefusalError(f"I do not understand {', '.join(named)}; {known_line(knowledge)}", [part for part, _ in parts])
+    return RefusalError(f"I do not understand {', '.join(named)}; {ABLE}", [part for part, _ in parts])
 
 
 def _named(words: Sequence[str], clause: str) -> str:

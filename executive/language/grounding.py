@@ -18,10 +18,12 @@ from executive.language.relations import check_relation
 from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.mission.command import Command, Task, Thing
-from executive.mission.errors import listing
+from executive.mission.errors import known_names, listing
 from executive.mission.knowledge import ANYTHING, Knowledge
 
-__all__ = ["Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
+__all__ = ["ABLE", "Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
+
+ABLE: Final = "I can fetch, take, put and find things, go to places, wait and charge"
 
 
 @dataclass(frozen=True)
@@ -34,10 +36,9 @@ class Grounded:
 
 def known_line(knowledge: Knowledge | None) -> str:
     """What can be asked for and where one can be sent, in one line."""
-    able = "I can fetch, take, put and find things, go to places, wait and charge"
     if knowledge is None:
-        return able
-    return f"{able}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
+        return ABLE
+    return f"{ABLE}; known things: {listing(knowledge.thing_names())}; known places: {listing(knowledge.place_names())}"
 
 
 def ground(frames: Sequence[CommandFrame], knowledge: Knowledge) -> tuple[Command, ...]:
@@ -230,8 +231,7 @@ class _Grounder:
         candidates = tuple(dict.fromkeys([*ends, *near]))
         if candidates:
             return _asking(perhaps(slot, heard, candidates))
-        names = tuple(dict.fromkeys(known.values()))
-        return RefusalError(f"I know no {slot.value} {heard!r}; known {_PLURALS[slot]}: {listing(names)}", [heard])
+        return RefusalError(f"I know no {slot.value} {heard!r}; {known_names(heard, known.values())}", [heard])
 
 
 def _asking(question: ClarifyingQuestion) -> RefusalError:

@@ -11,7 +11,7 @@ from executive.language.clauses import Clause, split_clauses, without_name
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
 from executive.language.disfluency import repair_disfluencies, unwanted_things
 from executive.language.feasibility import check_feasible, not_understood
-from executive.language.grounding import check_unwanted, ground_noted, known_line
+from executive.language.grounding import ABLE, check_unwanted, ground_noted
 from executive.language.harm import refuse_harm
 from executive.language.items import Item
 from executive.language.lexicon import VerbKind, lexicon
@@ -103,7 +103,7 @@ def _read(trace: Trace, _: _Context) -> Trace:
 def _split(trace: Trace, context: _Context) -> Trace:
     clauses = split_clauses(trace.items)
     if not clauses:
-        raise RefusalError(f"nothing was said; {known_line(context.knowledge)}")
+        raise RefusalError(f"nothing was said; {ABLE}")
     refuse_harm(clauses)
     return replace(trace, clauses=clauses if context.knowledge else without_name(clauses))
 
@@ -129,7 +129,7 @@ def _check(trace: Trace, context: _Context) -> Trace:
     if not any(action.kind for action in trace.actions):
         told = [phrase.text for action in trace.actions for phrase in action.objects]
         of = f" of {listing(told)}" if told else ""
-        raise RefusalError(f"nothing to do was said{of}; {known_line(context.knowledge)}", told)
+        raise RefusalError(f"nothing to do was said{of}; {ABLE}", told)
     return trace
 
 

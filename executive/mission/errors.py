@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-import difflib
 import errno
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-__all__ = ["InputError", "Problems", "SourceLine", "did_you_mean", "disk_is_full", "listing", "suggestion"]
+from rapidfuzz import fuzz, process
 
+__all__ = [
+    "InputError",
+    "Problems",
+    "SourceLine",
+    "did_you_mean",
+    "disk_is_full",
+    "known_names",
+    "listing",
+    "suggestion",
+]
 
+NEAREST: Final = 3
+FEW: Final = 5
 _USED_BY: Final = "used by"
 _MOST_USERS: Final = 3
 
@@ -108,15 +119,27 @@ class Problems:
 def did_you_mean(word: str, known: Iterable[str]) -> str | None:
     """The known word that is spelled most like `word`, or None when none is near."""
     by_lower = {name.lower(): name for name in known}
-    near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.7)
+    near = process.extractOne(word.lower(), by_lower.keys(), scorer=fuzz.ratio, score_cutoff=70.0)
     return by_lower[near[0]] if near else None
 
 
-def suggestion(word: str, known: Iterable[str], otherwise: str | None = None) -> str:
-    """The hint for a word that is not known: the one that was probably meant, else `otherwise`, else all there are."""
+def suggestion(word: str, known: Iterable[str], otherwise: str | None = None, *, shown: Iterable[str] = ()) -> str:
+    """The hint for a word that is not known: the one that was probably meant, else `otherwise`, else the nearest.
+
+    `shown` are the names to choose the nearest from where `known` holds other spellings, too.
+    """
     names = list(known)
     near = did_you_mean(word, names)
-    return f"did you mean '{near}'?" if near else f"known are {listing(names)}" if otherwise is None else otherwise
+    return f"did you mean '{near}'?" if near else otherwise or known_names(word, list(shown) or names)
+
+
+def known_names(word: str, known: Iterable[str]) -> str:
+    """All that is known where that is little, else those that are spelled most like `word`."""
+    names = list(dict.fromkeys(known))
+    if len(names) <= FEW:
+        return f"known are {listing(names)}"
+    near = process.extract(word.lower(), {name: name.lower() for name in names}, scorer=fuzz.WRatio, limit=NEAREST)
+    return f"known are {', '.join(name for _, _, name in near)} and {len(names) - len(near)} more"
 
 
 def listing(words: Iterable[str], *, last: str = "and") -> str:

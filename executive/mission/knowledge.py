@@ -48,10 +48,11 @@ class Pose(_Facts):
 
 
 class RobotFacts(_Facts):
-    """The robot: the name by which it is spoken to, and the names of other robots that listen, too."""
+    """The robot: its name, the names of other robots that listen, and whether it must be called by name in writing."""
 
     name: Name = Field(description='as in "Hey Alice"')
     others: tuple[Name, ...] = Field(default=(), description="other robots: what is said to them is not for this one")
+    require_wake: bool = Field(default=False, description="typed sentences, too, begin with the wake phrase")
 
 
 class BatteryFacts(_Facts):

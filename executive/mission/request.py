@@ -14,9 +14,9 @@ __all__ = ["Request"]
 class Request:
     """A sentence, or a mission file, or neither where a conversation left only commands.
 
-    `world` is as it was said, if it was; `answers` are to the questions that it leaves open, in their order, and
-    `questions` says what becomes of further ones. `out` is the folder for the run's files,
-    `stack` the file that says what the robot uses.
+    `world` is as it was said, if it was; `require_wake` tells whether the robot's name must be said (None: the world
+    decides); `answers` are to the questions that it leaves open, in their order, and `questions` says what becomes of
+    further ones. `out` is the folder for the run's files, `stack` the file that says what the robot uses.
 
     What stands below `stack` is filled once it is understood. Then another process can take it up: a sentence has the
     answers in their places, and `text` is that of the file.
@@ -25,7 +25,7 @@ class Request:
     sentence: str | None = None
     file: Path | None = None
     world: str | None = None
-    require_wake: bool = False
+    require_wake: bool | None = None
     answers: tuple[str, ...] = ()
     questions: QuestionPolicy | None = None
     seed: int = 1

@@ -40,6 +40,8 @@ class Memory:
     pose: Pose2D | None
 
 
+_WORLD: Final = -1
+"""The world decides whether the robot's name must be said; the column takes no NULL."""
 _AS_THEY_ARE: Final = ("name", "world_name", "robot", "seed", "fingerprint", "sentence", "text", "world")
 
 
@@ -47,7 +49,7 @@ def row_of(request: Request) -> dict[str, Any]:
     """A request that was understood as columns; its answers stand in its sentence."""
     own = {name: getattr(request, name) for name in _AS_THEY_ARE}
     paths = {name: None if (path := getattr(request, name)) is None else str(path) for name in ("file", "stack")}
-    flags = {"require_wake": request.require_wake, "record": request.record}
+    flags = {"require_wake": _WORLD if request.require_wake is None else request.require_wake, "record": request.record}
     return {**own, **flags, **paths, "commands": json.dumps(request.commands), "out": str(request.out)}
 
 
@@ -59,6 +61,6 @@ def request_of(row: Mapping[str, Any]) -> Request:
         file=None if row["file"] is None else Path(row["file"]),
         stack=None if row["stack"] is None else Path(row["stack"]),
         out=Path(row["out"]),
-        require_wake=bool(row["require_wake"]),
+        require_wake=None if row["require_wake"] == _WORLD else bool(row["require_wake"]),
         record=bool(row["record"]),
     )

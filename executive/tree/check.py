@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from executive.mission.command import Task
-from executive.mission.errors import InputError, listing
+from executive.mission.errors import InputError, listing, suggestion
 from executive.mission.gripper import UNNAMED, InGripper, after_command, cannot_take, objection
 from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree, StepPart
@@ -122,7 +122,7 @@ def _impossible(part: StepPart, tree: CompiledTree, knowledge: Knowledge, abilit
     unseen += [word for word in thing.attributes if word not in abilities.attributes]
     if command.task is Task.GRASP and not masses:
         known = [one for one in knowledge.things if one in abilities.masses_kg]
-        yield _at(part, tree, f"there is no '{thing.name}' that could be picked up", f"known are {listing(known)}")
+        yield _at(part, tree, f"there is no '{thing.name}' that could be picked up", suggestion(thing.name, known))
     elif command.task is Task.GRASP and min(masses) > abilities.lift_kg:
         message = f"'{thing.name}' is too heavy: {min(masses):g} kg, and the arm lifts {abilities.lift_kg:g} kg"
         yield _at(part, tree, message, "ask for something lighter")

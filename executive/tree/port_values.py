@@ -251,7 +251,7 @@ def _refusal(value: Any, wanted: str, path: Path) -> PortValueError:
 
 
 def _unknown(kind: str, name: str, known: tuple[str, ...], knowledge: Knowledge, path: Path) -> PortValueError:
-    hint = suggestion(name, knowledge.spellings(known), f"known are {listing(known)}")
+    hint = suggestion(name, knowledge.spellings(known), shown=known)
     return PortValueError(path, f"unknown {kind} '{name}'", hint)
 
 

@@ -8,10 +8,11 @@ from dataclasses import replace
 from py_trees.common import Status
 
 from executive.tree.node_view import NodeView
-from executive.view.text import closed
+from executive.view.text import closed, title_of
 
 MANY_NODES = 80
 DRAWN_NODES = 40
+_PLUMBING = frozenset({"monitor", "remember"})
 
 
 def folded_below(root: NodeView, depth: int) -> NodeView:
@@ -40,6 +41,25 @@ def folded_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
                 return shown
             shown = _folded(shown, foldable, level, 0)
     return shown
+
+
+def what_ran(root: NodeView) -> NodeView:
+    """The nodes that ran, with what they did in their names. Nodes that pass on what their one child says are left out.
+
+    So are watches that held and notes of where the robot stood; what failed or was cancelled never is.
+    """
+    return _ran(root, None)
+
+
+def _ran(node: NodeView, above: NodeView | None) -> NodeView:
+    below = tuple(_ran(child, node) for child in node.children if not _unseen(child))
+    if len(below) == 1 and (node.state.cause is None or node.state.message == below[0].state.message):
+        return below[0]
+    return replace(node, name=title_of(node, above), children=below)
+
+
+def _unseen(node: NodeView) -> bool:
+    return node.state.cause is None and (node.state.status is Status.INVALID or node.kind in _PLUMBING)
 
 
 def _folded(node: NodeView, foldable: Callable[[NodeView], bool], level: int, depth: int) -> NodeView:

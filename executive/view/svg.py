@@ -20,6 +20,7 @@ ROW_GAP: Final = 10
 MARGIN: Final = 20
 TITLE_H: Final = 34
 LEGEND_H: Final = 34
+LEGEND_W: Final = 105
 NOTE_CHARS: Final = 33
 NOTE_LINES: Final = 3
 NAME_CHARS: Final = 30
@@ -58,7 +59,7 @@ def to_svg(root: NodeView, *, title: str = "") -> str:
     """The tree as a whole SVG document, with a legend; notes are cut to three lines and stand whole in the tooltip."""
     box, bottom = _laid_out(root, MARGIN, MARGIN + TITLE_H)
     boxes = list(box.walk())
-    width = max(b.x for b in boxes) + BOX_W + MARGIN
+    width = max(MARGIN + len(Styles) * LEGEND_W, *(b.x + BOX_W + MARGIN for b in boxes))
     height = bottom + LEGEND_H + MARGIN
     body = [*(edge for b in boxes for edge in _edges(b)), *map(_drawn, boxes)]
     head = (
@@ -140,7 +141,7 @@ def _symbol(style: NodeStyle, x: float, y: float) -> str:
 def _legend(y: float) -> str:
     entries = [style.value for style in Styles]
     return "".join(
-        f'{_symbol(style, MARGIN + 8 + n * 105, y - 4)}<text x="{MARGIN + 22 + n * 105}" y="{y:g}" font-size="11" '
-        f'fill="#57606a">{style.word}</text>'
+        f'{_symbol(style, MARGIN + 8 + n * LEGEND_W, y - 4)}<text x="{MARGIN + 22 + n * LEGEND_W}" y="{y:g}" '
+        f'font-size="11" fill="#57606a">{style.word}</text>'
         for n, style in enumerate(entries)
     )

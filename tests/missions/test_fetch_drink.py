@@ -16,35 +16,44 @@ SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
 ARTIFACTS = {"tree.svg", "log.mcap", "recording.html", "map.png", "detection.png", "grasp.png", "hand_over.png"}
 
 
-def errand_run(out: Path, *arguments: str) -> dict:
-    command = [sys.executable, "-m", "executive.cli", "run", "--say", SENTENCE, "--seed", "1", "--quiet", "--json"]
+def errand_run(out: Path, *arguments: str) -> tuple[dict, list[str]]:
+    """The report, and the lines that people read."""
+    command = [sys.executable, "-m", "executive.cli", "run", "--say", SENTENCE, "--seed", "1", "--json"]
     done = subprocess.run([*command, "--out", str(out), *arguments], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    return json.loads(done.stdout.splitlines()[-1]), done.stderr.splitlines()
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """A run with recording: its folder and report."""
+    """A run with recording: its folder, its report and what it printed."""
     out = tmp_path_factory.mktemp("recorded")
-    return out, errand_run(out)
+    return out, *errand_run(out)
 
 
 def test_tree_and_referee_agree_that_the_drink_was_brought(recorded):
-    _, report = recorded
+    _, report, _ = recorded
     assert report["outcome"] == "success"
     assert report["referee"] == {**report["referee"], "success": True, "collisions": 0, "drops": 0}
 
 
+def test_the_run_is_told_in_a_line_for_each_skill(recorded):
+    _, _, lines = recorded
+    done = [line.split("  ", 1)[1].lstrip() for line in lines if line.startswith("✓")]
+    kinds = ("go to the kitchen counter", "detect", "approach", "grasp", "stow", "go to the start", "hand over (Robin)")
+    assert [kind for kind in kinds if not any(kind in each for each in done)] == []
+    assert len(lines) <= 20
+
+
 def test_the_run_leaves_tree_log_recording_and_pictures(recorded):
-    out, _ = recorded
+    out, _, _ = recorded
     assert {path.name for path in out.iterdir()} >= ARTIFACTS
     assert all((out / name).stat().st_size > 1000 for name in ARTIFACTS)
 
 
 def test_the_same_seed_gives_the_same_events(recorded, tmp_path):
-    out, _ = recorded
-    errand_run(tmp_path, "--no-record")
+    out, _, _ = recorded
+    errand_run(tmp_path, "--no-record", "--quiet")
     logs = (read_events(out / "log.mcap"), read_events(tmp_path / "log.mcap"))
     first, second = ([event for event in log if event.topic != WALL] for log in logs)
     assert len(first) > 100

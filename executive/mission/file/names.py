@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from executive.mission.command import START, TIME_UNITS_S, Command, Task, Thing, parse_command
-from executive.mission.errors import InputError, Problems, listing, suggestion
+from executive.mission.errors import InputError, Problems, suggestion
 from executive.mission.file.model import KeyPath
 from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge
@@ -51,7 +51,7 @@ def _unknown_names(file: MissionFile, path: KeyPath, command: Command, knowledge
 def _unknown(
     file: MissionFile, path: KeyPath, kind: str, name: str, known: Sequence[str], knowledge: Knowledge
 ) -> InputError:
-    hint = suggestion(name, knowledge.spellings(known), f"known are {listing(known)}")
+    hint = suggestion(name, knowledge.spellings(known), shown=known)
     return file.error(path, f"unknown {kind} {name!r}", hint)
 
 

@@ -103,8 +103,8 @@ class PlanBuilder:
         """A leaf that waits on the robot's clock."""
         return self.node("pause", name, part=part, duration_s=duration_s)
 
-    def navigate(self, pose: Pose2D | FromBoard, *, exactly: bool = False) -> NodeSpec:
-        """Drive to a pose; where the path is blocked, see anew what stands there, then back off a little.
+    def navigate(self, pose: Pose2D | FromBoard, to: str, *, exactly: bool = False) -> NodeSpec:
+        """Drive to a pose, called `to`; where the path is blocked, see anew what stands there, then back off a little.
 
         With `exactly`, within 8 cm.
         """
@@ -112,7 +112,7 @@ class PlanBuilder:
         drive, below = self.skill("navigate", ports), self.at("way")
         blocked = Recovery((after(Cause.PLANNING, Cause.EXECUTION, of=drive),))
         recoveries = ((below.skill("clear_costmap"), blocked), (below.skill("back_off"), blocked))
-        return below.recover("go there", drive, *recoveries, attempts=3)
+        return below.recover(f"go to {to}", drive, *recoveries, attempts=3)
 
     def has_ports(self, skill: str, inputs: tuple[str, ...] = (), outputs: tuple[str, ...] = ()) -> bool:
         """Whether a registered skill has these ports; a skill of others may lack what is not essential."""

@@ -34,11 +34,12 @@ NEARBY_M: Final = ((-0.5, 0.0), (0.0, 0.6), (0.0, -0.6))
 _NOT_PLANNING: Final = (Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION)
 
 
-def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard) -> NodeSpec:
-    """Drive to a pose or, when there is no path to it, to one nearby in the same room."""
-    direct = builder.navigate(pose)
-    others = [builder.at(f"nearby-{n}").navigate(other) for n, other in enumerate(_nearby(builder, pose), start=1)]
-    return builder.node("selector", "go there or near it", direct, *others, part="or-near") if others else direct
+def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> NodeSpec:
+    """Drive to a pose, called `to`, or, when there is no path to it, to one nearby in the same room."""
+    direct = builder.navigate(pose, to)
+    nearby = enumerate(_nearby(builder, pose), start=1)
+    others = [builder.at(f"nearby-{n}").navigate(other, f"a place near {to}") for n, other in nearby]
+    return builder.node("selector", f"go to {to}, or near it", direct, *others, part="or-near") if others else direct
 
 
 def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> list[Pose2D | FromBoard]:

@@ -46,7 +46,7 @@ def _battery_plan(builder: PlanBuilder) -> NodeSpec:
         builder.node("remember", "where it was", part="remember", key=key),
         builder.skill("stow"),
         dock_plan(builder.at("dock"), dock, facts.charged),
-        builder.at("back").navigate(FromBoard(key)),
+        builder.at("back").navigate(FromBoard(key), "where it was"),
     )
     return builder.node(
         "interrupt",
@@ -62,7 +62,9 @@ def _battery_plan(builder: PlanBuilder) -> NodeSpec:
 def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
     """Stand on the dock and charge; where it does not charge, back off and dock again."""
     charge = builder.skill("charge", {"level": level})
-    attempt = builder.at("attempt").sequence("dock and charge", builder.navigate(dock, exactly=True), charge)
+    attempt = builder.at("attempt").sequence(
+        "dock and charge", builder.navigate(dock, "the dock", exactly=True), charge
+    )
     again = Recovery((after(Cause.POSTCONDITION, of=charge),), uses=2)
     return builder.recover("charge at the dock", attempt, (builder.at("again").skill("back_off"), again), attempts=3)
 

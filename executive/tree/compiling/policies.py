@@ -85,7 +85,9 @@ def _ask(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:
 
 def _go_back(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:
     builder = frame.builder.at("return")
-    return builder.node("go back", "go back if it fails", below, builder.navigate(FromBoard(builder.start_key)))
+    return builder.node(
+        "go back", "go back if it fails", below, builder.navigate(FromBoard(builder.start_key), "the start")
+    )
 
 
 def _stop(below: NodeSpec, policy: StepPolicy, frame: PolicyFrame) -> NodeSpec:

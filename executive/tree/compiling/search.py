@@ -68,7 +68,7 @@ def _look_plan(
     view = builder.knowledge.surfaces[surface].viewpoints[number - 1]
     return builder.sequence(
         f"look at {surface}" + (f" ({number})" if number > 1 else ""),
-        builder.navigate(pose_2d(view)),
+        builder.navigate(pose_2d(view), f"the {surface}"),
         detect_plan(builder, thing, (surface,), key, extra, tallied=tallied),
     )
 
@@ -134,7 +134,7 @@ def _looks_from_aside(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, .
         if aside is not None:
             below = builder.at(f"{name}-aside")
             look = detect_plan(below, thing, (name,), key)
-            yield below.sequence(f"look at {name} from aside", below.navigate(aside), look)
+            yield below.sequence(f"look at {name} from aside", below.navigate(aside, f"the side of the {name}"), look)
 
 
 def required_surfaces(builder: PlanBuilder, thing: Thing, place: str | None) -> tuple[str, ...]:

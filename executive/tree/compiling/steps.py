@@ -121,7 +121,13 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
         return carry_plan(builder)
     if command.goal is None:
         raise builder.error("the command asks for nothing", "name a place to go to, or an object")
-    return builder.sequence(f"go to {command.goal}", go_near_plan(builder, _goal_pose(builder, command.goal)))
+    to = _called(builder, command.goal)
+    return builder.sequence(f"go to {to}", go_near_plan(builder, _goal_pose(builder, command.goal), to))
+
+
+def _called(builder: PlanBuilder, goal: str) -> str:
+    """A goal as it is called in a sentence."""
+    return goal if builder.knowledge.person(goal) else f"the {goal}"
 
 
 def wait_plan(builder: PlanBuilder) -> NodeSpec:
@@ -139,8 +145,8 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
     pause = builder.pause("wait", f"wait {duration_s:g} s", duration_s)
     if command.goal is None:
         return builder.sequence("wait here", pause)
-    goal = _goal_pose(builder, command.goal)
-    return builder.sequence(f"wait at {command.goal}", go_near_plan(builder, goal), pause)
+    goal, to = _goal_pose(builder, command.goal), _called(builder, command.goal)
+    return builder.sequence(f"wait at {to}", go_near_plan(builder, goal, to), pause)
 
 
 def charge_plan(builder: PlanBuilder) -> NodeSpec:
@@ -172,7 +178,9 @@ def _goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
 
 def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
     way = builder.at("bring").sequence(
-        f"bring it to {person}", go_near_plan(builder, pose), builder.skill("hand_over", {"person": person})
+        f"bring it to {person}",
+        go_near_plan(builder, pose, "the start" if isinstance(pose, FromBoard) else person),
+        builder.skill("hand_over", {"person": person}),
     )
     guard = _holding(builder, item, way)
     return unless_dropped(builder.at("carry-on"), item, guard, (guard,))
@@ -193,7 +201,7 @@ def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
 
 def _carry_to_plan(builder: PlanBuilder, item: Thing, surface: str) -> NodeSpec:
     view = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0])
-    return _holding(builder, item, builder.navigate(view))
+    return _holding(builder, item, builder.navigate(view, f"the {surface}"))
 
 
 def _put_on_plan(builder: PlanBuilder, surface: str, carry: NodeSpec) -> NodeSpec:

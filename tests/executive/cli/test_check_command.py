@@ -28,12 +28,20 @@ def write(tmp_path):
     return to_file
 
 
-def test_a_good_file_is_told_with_commands_tree_and_estimate():
-    result = invoke(GOOD)
+def test_each_file_is_one_line_and_the_errors_stand_apart(write):
+    bad = write("name: x\nsteps:\n  - {to: kichen}\n  - say: sing\n")
+    result = invoke(GOOD, bad)
+    good, broken = result.stdout.splitlines()
+    assert (good[0], str(GOOD) in good, "of the battery" in good) == ("✓", True, True)
+    assert broken == f"✗ {bad}: 2 errors"
+    assert len(result.stderr.splitlines()) == 2
+
+
+def test_the_plan_is_shown_on_demand():
+    result = invoke(GOOD, "-v")
     assert result.exit_code == 0
     assert "Take [Nothing] to [living room] and do [Nothing] to [Nothing]" in result.stdout
     assert "navigate" in result.stdout
-    assert "of the battery when all goes well" in result.stdout
 
 
 def test_json_is_one_object_for_all_files(write):

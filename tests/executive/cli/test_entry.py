@@ -31,6 +31,19 @@ IMPORTS = [
 ]
 
 
+@pytest.mark.parametrize("asked", [["run", "--wake", "--say", "get a beer"], ["queue", "add", "--wake", "--say=go"]])
+def test_a_missing_wake_phrase_is_refused_before_anything_heavy_is_imported(asked):
+    program = (
+        "import sys; from executive.cli.entry import main\n"
+        f"sys.argv = ['errand', *{asked!r}]\n"
+        "try: main()\n"
+        "except SystemExit as end: assert end.code == 2, end.code\n"
+        f"print(sorted({{name.split('.')[0] for name in sys.modules}} & {HEAVY | {'numpy', 'pydantic', 'rich'}!r}))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert (run.stdout.strip(), "--no-wake" in run.stderr) == ("[]", True)
+
+
 @pytest.mark.parametrize(("arguments", "expected"), IMPORTS)
 def test_a_command_imports_no_heavy_library_that_it_does_not_use(arguments, expected, tmp_path):
     program = (

@@ -1,6 +1,7 @@
 """The live tree: what runs stays in sight however small the terminal, and the prompt below it."""
 
 import io
+import re
 
 import pytest
 from py_trees.common import Status
@@ -11,6 +12,7 @@ from executive.cli.live import fitted, live_view
 from executive.run.control import Control
 from executive.run.runner import Progress
 from executive.tree.snapshot import NodeState
+from skills.api import Cause
 
 
 def tree_of(count, running):
@@ -38,19 +40,27 @@ def test_the_tree_under_way_is_drawn_on_a_small_terminal(compiled, make):
     states = {path_id: NodeState(Status.RUNNING, message="at it") for path_id in (*first.path_ids, *aside.path_ids)}
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=True, width=80, height=14)
-    with live_view(first, console, Control()) as observe:
+    with live_view(console, Control()) as observe:
         observe(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": aside}))
     assert "at it" in screen.getvalue()
     assert "fetch drink" not in screen.getvalue()
 
 
-def test_without_a_terminal_each_end_is_a_line(compiled, make):
+def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(compiled, make):
     tree = compiled(*make.FETCH)
-    leaf = next(node for node in tree.root.walk() if not node.children)
-    states = {path_id: NodeState() for path_id in tree.path_ids}
-    states[leaf.path_id] = NodeState(Status.SUCCESS, message="well done")
+    drive = next(node.path_id for node in tree.root.walk() if node.path_id.endswith("counter-1/navigate"))
+    detect = drive.replace("navigate", "detect")
+    idle = {path_id: NodeState() for path_id in tree.path_ids}
     told = io.StringIO()
-    with live_view(tree, Console(file=told, width=200)) as observe:
-        observe(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": tree}))
-        observe(Progress(1.1, 21, 0, {"Alice": states}, {"Alice": tree}))
-    assert told.getvalue().count("well done") == 1
+    with live_view(Console(file=told, width=200)) as observe:
+        for now_s, changes in (
+            (1.0, {drive: NodeState(Status.RUNNING, message="on its way")}),
+            (3.5, {drive: NodeState(Status.SUCCESS, message="there")}),
+            (3.6, {drive: NodeState(Status.SUCCESS, message="there"), detect: NodeState(Status.RUNNING)}),
+            (4.0, {detect: NodeState(Status.FAILURE, Cause.PRECONDITION, "saw none")}),
+            (4.1, {detect: NodeState(Status.FAILURE, Cause.PRECONDITION, "saw none")}),
+        ):
+            observe(Progress(now_s, 20, 0, {"Alice": {**idle, **changes}}, {"Alice": tree}))
+    first, second = told.getvalue().splitlines()
+    assert re.match(r"✓ +2.5 s  go to the counter: there$", first)
+    assert re.match(r"✗ +0.4 s  detect \(coke, beer; counter\): PRECONDITION: saw none$", second)

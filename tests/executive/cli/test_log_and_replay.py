@@ -42,6 +42,34 @@ def test_log_prints_a_timeline(log_path):
     assert "no room to stand" in re.sub(r"\s+", " ", result.stdout)
 
 
+BOX = re.compile("[\u2500-\u257f]")
+
+
+def test_a_piped_log_has_no_boxes_and_breaks_no_names(log_path):
+    lines = invoke("log", log_path).stdout.splitlines()
+    assert not [line for line in lines if BOX.search(line)]
+    assert [line for line in lines if "approach" in line and "TIMEOUT: no room to stand" in line]
+
+
+def test_a_piped_error_of_usage_has_no_box():
+    result = invoke("run", "--wrold", "flat")
+    assert (result.exit_code, "--wrold" in result.stderr) == (2, True)
+    assert not BOX.search(result.stderr + invoke("queue", "add", "--nothing").stderr + invoke("nothing").stderr)
+
+
+def test_log_shows_the_traceback_of_a_defect(tmp_path, compiled, run_tree, make, script, clock):
+    def breaks(skill):
+        raise ZeroDivisionError("no metres")
+
+    script.ends["approach"] = breaks
+    log = EventLog(tmp_path / "log.mcap", clock)
+    run_tree(compiled(*make.FETCH), publish=log)
+    log.close()
+    told = invoke("log", log.path).stdout
+    assert "Traceback (most recent call last):" in told
+    assert 'raise ZeroDivisionError("no metres")' in told
+
+
 @pytest.mark.parametrize("verb", ["log", "replay", "tree"])
 @pytest.mark.parametrize(("name", "words"), [("absent.mcap", "cannot read"), ("text.mcap", "no event log")])
 def test_what_is_no_log_is_refused_in_one_line(tmp_path, verb, name, words):

@@ -1,6 +1,7 @@
 """The command line: what scripts rely on, and bad input."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from executive.cli import entry, main
 from executive.cli.mission_run import Finished
 from executive.cli.report import RefereeReport, RunReport
 from executive.tree.node_view import node_view
+from plant.worlds.world import WORLDS_FOLDER
 
 FETCH = "Hey Alice, can you fetch me a drink from the kitchen"
 
@@ -83,7 +85,9 @@ def test_parse_jsonl_answers_line_by_line_in_order(tmp_path: Path):
         (("parse", "--file", "absent.txt"), "absent.txt"),
         (("tree", "go to the kitchen", "--world", "falt"), "flat"),
         (("tree", "absent.yaml"), "absent.yaml"),
-        (("run", "--say", "go to the kitchen"), "Hey Alice"),
+        (("run", "--wake", "--say", "go to the kitchen"), "Hey Alice"),
+        (("queue", "add", "--wake", "--say=go to the kitchen"), "Hey Alice"),
+        (("run", "--wake", "--say", "tell Alice to go to the kitchen"), "Hey Alice"),
         (("run",), "--say"),
         (("evaluate", "--say", FETCH, "--seeds", "many"), "no range of seeds"),
         (("evaluate", "--say", "Hey Alice, dance"), "errand"),
@@ -157,8 +161,26 @@ def test_a_mission_that_is_not_achieved_exits_with_1(no_plant, tmp_path, changes
     assert invoke("run", "--no-wake", "--say", "go to the bedroom", "--out", str(tmp_path)).exit_code == 1
 
 
-def test_run_shows_commands_tree_and_both_verdicts(no_plant, tmp_path):
-    result = invoke("run", "--say", "Hey Alice, go to the bedroom", "--out", str(tmp_path))
+def test_a_world_may_ask_for_the_wake_phrase(no_plant, tmp_path):
+    world = tmp_path / "flat"
+    shutil.copytree(WORLDS_FOLDER / "flat", world)
+    facts = world / "knowledge.yaml"
+    facts.write_text(facts.read_text().replace("{name: Alice}", "{name: Alice, require_wake: true}"))
+    asked = ("run", "--world", str(world), "--out", str(tmp_path / "out"), "--say")
+    assert invoke(*asked, "go to the bedroom").exit_code == 2
+    assert invoke(*asked, "go to the bedroom", "--no-wake").exit_code == 0
+    assert invoke(*asked, "Hey Alice, go to the bedroom").exit_code == 0
+    assert invoke("parse", "--world", str(world), "go to the bedroom").exit_code == 2
+
+
+def test_the_whole_tree_is_shown_on_demand(no_plant, tmp_path):
+    asked = ("run", "--say", "go to the bedroom", "--out", str(tmp_path))
+    short, long = (invoke(*asked, *more).stdout.splitlines() for more in ((), ("--tree",)))
+    assert len(short) <= 5 < len(long)
+
+
+def test_run_shows_commands_and_both_verdicts(no_plant, tmp_path):
+    result = invoke("run", "--say", "go to the bedroom", "--out", str(tmp_path))
     lines = result.stdout.splitlines()
     assert lines[0] == "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
     assert any(line.startswith("The tree claims: ✓ success: done") for line in lines)

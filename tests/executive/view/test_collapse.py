@@ -1,11 +1,13 @@
 """Large trees are folded where nothing is to be seen, and never where something happens."""
 
+import re
+
 import pytest
 from py_trees.common import Status
 
-from executive.tree.node_view import NodeView
+from executive.tree.node_view import NodeView, node_view
 from executive.tree.snapshot import NodeState
-from executive.view.collapse import folded_below, folded_to
+from executive.view.collapse import folded_below, folded_to, what_ran
 from executive.view.svg import to_svg
 from executive.view.text import to_text
 from skills.api import Cause
@@ -72,3 +74,47 @@ def test_a_negative_depth_is_refused():
 
 def test_the_picture_tells_how_many_nodes_are_hidden():
     assert "+ 10 nodes" in to_svg(folded_to(mission(DONE, RUNS), 15))
+
+
+def node(kind: str, name: str, *children: NodeView, state: NodeState = DONE) -> NodeView:
+    return NodeView(name, kind, name, state, children=children)
+
+
+def kinds(tree: NodeView) -> list[tuple[str, str]]:
+    return [(each.kind, each.name) for _, each in tree.walk()]
+
+
+def test_of_what_ran_only_nodes_with_something_to_show_are_left():
+    drive = node("recover", "go to the bench", node("skill", "navigate"), node("skill", "back_off", state=IDLE))
+    search = node("selector", "find cube", node("only if known", "again", state=IDLE), node("sequence", "look", drive))
+    tree = node(
+        "interrupts", "watched", node("monitor", "lease"), node("sequence", "m", search, node("skill", "grasp"))
+    )
+    assert kinds(what_ran(tree)) == [("sequence", "m"), ("skill", "go to the bench"), ("skill", "grasp")]
+
+
+def test_of_what_ran_no_failure_is_left_out():
+    drive = node("recover", "go to the bench", node("skill", "navigate", state=FAILED), node("skill", "back_off"))
+    tree = node("sequence", "m", drive, node("monitor", "lease", state=FAILED), state=FAILED)
+    left = ["m", "go to the bench", "go to the bench", "back off", "lease"]
+    assert [name for _, name in kinds(what_ran(tree))] == left
+
+
+def test_a_node_that_gives_another_reason_than_its_child_is_kept():
+    gave_up = NodeState(Status.FAILURE, Cause.PLANNING, "given up after 3 attempts")
+    tree = node("retry", "thrice", node("skill", "stow", state=FAILED), state=gave_up)
+    assert kinds(what_ran(tree)) == [("retry", "thrice"), ("skill", "stow")]
+
+
+def test_a_title_says_where_and_with_what(compiled, make):
+    tree = compiled(*make.FETCH)
+    ran = what_ran(node_view(tree.root, dict.fromkeys(tree.path_ids, DONE)))
+    titles = {each.name for _, each in ran.walk()}
+    assert {"go to the counter", "hand over (Robin)"} <= titles, titles
+
+
+def test_the_legend_fits_beside_a_single_node():
+    svg = to_svg(node("skill", "go to the bench"))
+    width = float(svg.split('width="', 1)[1].split('"', 1)[0])
+    rightmost = max(map(float, re.findall(r'<text x="([0-9.]+)"', svg)))
+    assert width - rightmost > 60

@@ -1,0 +1,68 @@
+"""`errand missions` and `errand init`: the missions that come with Errand, by name, from any folder."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from executive.cli.output import console_for, refusals, show_table
+from executive.mission.errors import InputError, did_you_mean
+
+__all__ = ["init", "mission_file", "missions", "shipped_missions"]
+
+FOLDER: Final = Path(__file__).resolve().parents[2] / "missions"
+_FOR_EDITORS: Final = "# yaml-language-server"
+
+
+def shipped_missions() -> dict[str, Path]:
+    """The files of the missions that come with Errand, by name."""
+    return {file.stem: file for file in sorted(FOLDER.glob("*.yaml"))}
+
+
+def mission_file(named: Path) -> Path:
+    """The file itself where it is there, else the shipped mission of that name.
+
+    Raises:
+        InputError: a bare name that is neither.
+    """
+    if named.exists() or named.parent not in (Path(), Path(FOLDER.name)):
+        return named
+    known = shipped_missions()
+    if named.stem in known and named.suffix in ("", ".yaml"):
+        return known[named.stem]
+    if named.suffix:
+        return named
+    near = did_you_mean(named.name, known)
+    hint = f"did you mean '{near}'?" if near else "`errand missions` lists those that come with Errand"
+    raise InputError("there is no such mission", hint=hint, file=named)
+
+
+def missions() -> None:
+    """List the missions that come with Errand."""
+    rows = [(name, _first_words(file)) for name, file in shipped_missions().items()]
+    show_table(console_for(as_json=False), ("mission", "what it shows"), rows)
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to put them.", show_default=False)],
+) -> None:
+    """Copy the missions that come with Errand into a folder, to be changed; files that are there stay."""
+    with refusals():
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            new = [file for file in sorted(FOLDER.glob("*.[yj]*")) if not (folder / file.name).exists()]
+            for file in new:
+                shutil.copyfile(file, folder / file.name)
+        except OSError as error:
+            raise InputError(f"cannot write it ({error.strerror})", hint="name another folder", file=folder) from error
+    first = folder / next(iter(shipped_missions().values())).name
+    console_for(as_json=False).print(f"{len(new)} files in {folder}; try: errand run {first}", markup=False)
+
+
+def _first_words(file: Path) -> str:
+    """The first line of comment that is meant for people."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return next((line[1:].strip() for line in lines if line[:1] == "#" and not line.startswith(_FOR_EDITORS)), "")

@@ -1,4 +1,4 @@
-"""Writes `docs/reference/` from the schemas, the registered skills and the faults: run it after changing one of them.
+"""Writes `docs/reference/` from schemas, skills, faults and the public API: run it after changing one of them.
 
 python docs/make_reference.py
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,9 @@ from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.stack import SLOTS, components, skill_options, stack_schema
 from skills.testing.fault_kinds import STANDARD_FAULTS
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from make_api import api_page
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "reference"
@@ -77,7 +81,8 @@ SCHEMA_PAGES = (
 def pages() -> dict[str, str]:
     """The text of every page by file name."""
     written = {f"{page.name}.md": schema_page(page) for page in SCHEMA_PAGES}
-    return {**written, "skills.md": skills_page(), "stack.md": stack_page(), "faults.md": faults_page()}
+    more = {"skills.md": skills_page(), "stack.md": stack_page(), "faults.md": faults_page(), "api.md": api_page(NOTE)}
+    return {**written, **more}
 
 
 def schema_page(page: SchemaPage) -> str:

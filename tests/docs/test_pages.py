@@ -2,10 +2,12 @@
 
 import ast
 import re
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
 from documents import DOCS, ROOT, commands, links, unknown_command
@@ -90,3 +92,25 @@ def test_every_page_is_reached_from_the_index():
         reached.add(page)
         waiting += [(page.parent / target).resolve() for target, _ in links(page) if target]
     assert set(DOCS.rglob("*.md")) <= reached
+
+
+def nav_of(entry):
+    """All pages that an entry of the site's navigation names."""
+    if isinstance(entry, str):
+        return {entry}
+    return set().union(*map(nav_of, entry.values() if isinstance(entry, dict) else entry))
+
+
+def test_the_site_has_every_page_and_notebook():
+    site = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    pages = [*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]
+    assert nav_of(site["nav"]) == {str(page.relative_to(DOCS).with_suffix(".md")) for page in pages}
+
+
+def test_the_site_is_built_and_loads_nothing_from_elsewhere(tmp_path):
+    """The hook of the site refuses such a page; links and anchors are checked by `strict`."""
+    pytest.importorskip("mkdocs.commands.build", reason="needs the extra docs")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
+    built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert built.returncode == 0, built.stderr
+    assert (tmp_path / "notebooks" / "first_look.html").is_file()

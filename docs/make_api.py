@@ -16,15 +16,15 @@ LIST = Path(__file__).resolve().parent / "api.md"
 _ROW = re.compile(r"^\| `([\w.]+)` \| ((?:`\w+`(?:, )?)+) \|", re.MULTILINE)
 PORTS = """## Ports and units
 
-The fields of a skill's `Inputs` are its input ports; `outputs` names the output ports with their types. A type may be any
-class, a tuple or a union. The compiler checks every connection before a run, and the leaf every value during it; an `int`
-passes as a `float`. In a mission file `with` sets input ports by name.
+The fields of a skill's `Inputs` are its input ports; `outputs` names the output ports with their types. A type may be
+any class, a tuple or a union. The compiler checks every connection before a run, and the leaf every value during it; an
+`int` passes as a `float`. In a mission file `with` sets input ports by name.
 
-Quantities are in SI units: metres, radians, seconds, kilograms, newtons. A name says its unit where it has one (`_m`, `_rad`,
-`_s`, `_m_s`, `_n`, `_kg`). The charge of a battery is from 0 to 1. Times count the robot's clock.
+Quantities are in SI units: metres, radians, seconds, kilograms, newtons. A name says its unit where it has one (`_m`,
+`_rad`, `_s`, `_m_s`, `_n`, `_kg`). The charge of a battery is from 0 to 1. Times count the robot's clock.
 
-A name says its frame, too. `X_AB` is the pose of frame B in frame A; `points_W` are in the world frame. Frames: world `W`,
-odometry `O`, body `B` (x ahead, y left, z up), hand `H`, camera `C` (z ahead, x right, y down), lidar `L`.
+A name says its frame, too. `X_AB` is the pose of frame B in frame A; `points_W` are in the world frame. The frames are
+world `W`, odometry `O`, body `B` (x ahead, y left, z up), hand `H`, camera `C` (z ahead, x right, y down), lidar `L`.
 """
 
 

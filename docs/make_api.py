@@ -54,7 +54,7 @@ def _members(kind: type[Any]) -> Iterator[str]:
     if issubclass(kind, enum.Enum):
         yield "Values: " + ", ".join(f"`{member.name}`" for member in kind) + "."
     elif dataclasses.is_dataclass(kind):
-        yield "| field | type | unless given |\n|---|---|---|\n" + "\n".join(_fields(kind))
+        yield "| field | type | default |\n|---|---|---|\n" + "\n".join(_fields(kind))
     methods = list(_methods(kind))
     if methods:
         yield "\n".join(methods)
@@ -64,7 +64,7 @@ def _fields(kind: type[Any]) -> Iterator[str]:
     for field in dataclasses.fields(kind):
         default = "" if field.default is dataclasses.MISSING else f"`{_plain(field.default)}`"
         if field.default_factory is not dataclasses.MISSING:
-            default = "made anew"
+            default = "new object"
         yield f"| `{field.name}` | {_escaped(str(field.type))} | {_escaped(default)} |"
 
 

@@ -136,4 +136,12 @@ def _escaped(text: str) -> str:
 
 
 def _doc(thing: Any) -> str:
-    return inspect.cleandoc(thing.__doc__ or "")
+    """A docstring as Markdown: each entry below "Args:" and "Raises:" becomes an item of a list."""
+    text = re.sub(r"^(Args|Raises):\n(?= )", r"\1:\n\n", inspect.cleandoc(thing.__doc__ or ""), flags=re.MULTILINE)
+    lines = text.splitlines()
+    begun = False
+    for n, line in enumerate(lines):
+        begun = line in ("Args:", "Raises:") or (begun and (line == "" or line.startswith("    ")))
+        if begun and re.match(r"    \S", line):
+            lines[n] = f"- {line.strip()}"
+    return "\n".join(lines)

@@ -227,9 +227,9 @@ def stack_page() -> str:
     """The page on stack files: every slot with its components, every skill that has options."""
     words = (
         "The components that a robot uses, and their options: `errand run --stack FILE`, also `check`, `evaluate` and "
-        "`queue add`. What the file leaves out keeps its default; `errand stack show` prints all. "
-        "Unknown keys are refused with file and line. `skills/stack.schema.json` is the schema for editors. Each component is a frozen dataclass that an "
-        "installed distribution registers in the slot's entry-point group."
+        "`queue add`. What the file leaves out keeps its default; `errand stack show` prints all. Unknown keys are "
+        "refused with file and line. `skills/stack.schema.json` is the schema for editors. Each component is a frozen "
+        "dataclass that an installed distribution registers in the slot's entry-point group."
     )
     slots = "".join(_slot(slot, group) for slot, group in SLOTS.items())
     skills = "".join(_options(f"### {name}", kind) for name, kind in skill_options().items())

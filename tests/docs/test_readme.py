@@ -1,5 +1,6 @@
 """The commands of the README and of the page of commands that need no robot succeed as they stand."""
 
+import re
 import shlex
 import sys
 from pathlib import Path
@@ -31,3 +32,9 @@ def test_quick_commands_succeed_as_they_stand(line, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(app, shlex.split(line, comments=True)[1:])
     assert result.exit_code == 0, result.output
+
+
+def test_every_target_of_make_that_the_readme_names_is_there():
+    named = set(re.findall(r"^make (\w+)|`make (\w+)`", PAGES[0].read_text(encoding="utf-8"), re.MULTILINE))
+    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    assert {"demo", "test"} <= {one or other for one, other in named} <= targets

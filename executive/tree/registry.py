@@ -25,7 +25,7 @@ SkillClass = type[Skill[Any]]
 
 
 def installed_skills() -> dict[str, SkillClass]:
-    """All registered skills by name, shipped ones and those of other packages, in the order of their names.
+    """All registered skills by name, ours and others', in the order of their names.
 
     Raises InputError: a registered skill cannot be loaded, does not keep the rules for skills, or has the name of
     another; the message names the distribution that registers it. Or none of ours are registered.

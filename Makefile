@@ -4,6 +4,7 @@
 # make train  adds the extra `train`: torch, to train the detector and the speech adapter
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
+# make docs   the documentation as a site: open out/site/index.html
 
 PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV := .venv
@@ -21,7 +22,7 @@ define install
 	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $(1) >/dev/null; }
 endef
 
-.PHONY: env train demo test fast check bench format debian voices clean
+.PHONY: env train demo test fast check bench docs format debian voices clean
 
 env: $(VENV)/.ready
 
@@ -69,6 +70,14 @@ format: env
 
 bench: env
 	$(BIN)/pytest tests/benchmarks tests/executive/view/test_page.py -p no:xdist --benchmark-only
+
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "open out/site/index.html"
+
+$(VENV)/.docs: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	@touch $@
 
 clean:
 	rm -rf $(VENV) out build dist *.egg-info

@@ -1,4 +1,4 @@
-"""Writes `docs/reference/` from the schemas, the registered skills and the faults: run it after changing one of them.
+"""Writes `docs/reference/` from schemas, skills, faults and the public API: run it after changing one of them.
 
 python docs/make_reference.py
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,9 @@ from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.stack import SLOTS, components, skill_options, stack_schema
 from skills.testing.fault_kinds import STANDARD_FAULTS
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from make_api import api_page
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "reference"
@@ -45,7 +49,7 @@ SCHEMA_PAGES = (
     SchemaPage(
         "mission-file",
         "Mission files",
-        "What a robot is to do, as a short list of steps. `errand check FILE` refuses a wrong one with file and line; "
+        "A mission: a short list of steps. `errand check FILE` refuses a wrong one with file and line; "
         "`missions/mission.schema.json` is the same schema for editors.",
         MissionFile,
         "missions/guarded_delivery.yaml",
@@ -60,8 +64,8 @@ SCHEMA_PAGES = (
     SchemaPage(
         "world-objects",
         "World files",
-        "`objects.yaml` of a world: what the seed sets in it. The world itself is `world.dmd.yaml` (Drake's model "
-        "directives), what is known of it `knowledge.yaml`.",
+        "`objects.yaml` of a world: what the seed places. Rooms and furniture are in `world.dmd.yaml` (Drake's model "
+        "directives), names and places in `knowledge.yaml`. [Make your own world](../how-to/own-world.md) begins here.",
         SeedRules,
         "plant/worlds/flat/objects.yaml",
     ),
@@ -78,7 +82,8 @@ SCHEMA_PAGES = (
 def pages() -> dict[str, str]:
     """The text of every page by file name."""
     written = {f"{page.name}.md": schema_page(page) for page in SCHEMA_PAGES}
-    return {**written, "skills.md": skills_page(), "stack.md": stack_page(), "faults.md": faults_page()}
+    more = {"skills.md": skills_page(), "stack.md": stack_page(), "faults.md": faults_page(), "api.md": api_page(NOTE)}
+    return {**written, **more}
 
 
 def schema_page(page: SchemaPage) -> str:
@@ -136,12 +141,12 @@ def _heading(name: str) -> str:
 def _section(heading: str, part: Mapping[str, Any]) -> str:
     required = part.get("required", [])
     rows = [_row(key, facts, key in required) for key, facts in part["properties"].items()]
-    table = "\n".join(["| key | takes | unless said | meaning |", "|---|---|---|---|", *rows])
+    table = "\n".join(["| key | type | default | meaning |", "|---|---|---|---|", *rows])
     return f"## {heading}\n\n{part.get('description', '')}\n\n{table}\n\n"
 
 
 def _row(key: str, facts: Mapping[str, Any], needed: bool) -> str:
-    default = "needed" if needed else _default(facts.get("default"))
+    default = "required" if needed else _default(facts.get("default"))
     cells = (f"`{key}`", _takes(facts), default, facts.get("description", ""))
     return f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
 
@@ -187,7 +192,7 @@ def _limits(facts: Mapping[str, Any]) -> str:
 def skills_page() -> str:
     """The page on the skills that come with the project."""
     sections = "".join(_skill(name, skill) for name, skill in built_in_skills().items())
-    words = "Each is registered under its name in the group `errand.skills`, as skills of others are."
+    words = "Each is registered in the entry-point group `errand.skills`, as skills of other packages are."
     return f"{NOTE}# Skills\n\n{words}\n\n{sections}"
 
 
@@ -195,9 +200,9 @@ def _skill(name: str, skill: type[Skill[Any]]) -> str:
     ports = "".join(_ports(skill))
     causes = "\n".join(f"| {cause.value} | {why} |" for cause, why in skill.causes.items())
     ages = ", ".join(f"{source} {age_s:g} s" for source, age_s in skill.max_data_age_s.items())
-    limits = f"Time limit unless said: {skill.default_timeout_s:g} s." + (f" Oldest data: {ages}." if ages else "")
+    limits = f"Default time limit: {skill.default_timeout_s:g} s." + (f" Maximum age of data: {ages}." if ages else "")
     summary = " ".join((skill.__doc__ or "").split())
-    failures = f"| it fails with | when |\n|---|---|\n{causes}"
+    failures = f"| cause of failure | when |\n|---|---|\n{causes}"
     return f"## {name}\n\n{summary}\n\n{limits}\n\n{ports}{failures}\n\n"
 
 
@@ -205,11 +210,11 @@ def _ports(skill: type[Skill[Any]]) -> Iterator[str]:
     hints = field_types(skill.Inputs)
     rows = []
     for field in dataclasses.fields(skill.Inputs):
-        default = "needed" if field.default is dataclasses.MISSING else f"`{field.default}`"
+        default = "required" if field.default is dataclasses.MISSING else f"`{field.default}`"
         rows.append(f"| `{field.name}` | {_type(hints[field.name])} | {default} |")
     if rows:
         yield " ".join((skill.Inputs.__doc__ or "").split()) + "\n\n"
-        yield "| input | type | unless said |\n|---|---|---|\n" + "\n".join(rows) + "\n\n"
+        yield "| input | type | default |\n|---|---|---|\n" + "\n".join(rows) + "\n\n"
     if skill.outputs:
         given = "\n".join(f"| `{port}` | {_type(kind)} |" for port, kind in skill.outputs.items())
         yield f"| output | type |\n|---|---|\n{given}\n\n"
@@ -222,11 +227,10 @@ def _type(hint: Any) -> str:
 def stack_page() -> str:
     """The page on stack files: every slot with its components, every skill that has options."""
     words = (
-        "What a robot uses, and with which options: `errand run --stack FILE`, also `check`, `evaluate` and "
-        "`queue add`. A slot, a skill or an option that the file leaves out is as in the default; `errand stack show` "
-        "prints all. Unknown keys are refused with file and line. "
-        "`skills/stack.schema.json` is the schema for editors. Each component is a frozen dataclass that an "
-        "installed distribution registers in the slot's entry-point group."
+        "The components that a robot uses, and their options: `errand run --stack FILE`, also `check`, `evaluate` and "
+        "`queue add`. What the file leaves out keeps its default; `errand stack show` prints all. Unknown keys are "
+        "refused with file and line. `skills/stack.schema.json` is the schema for editors. Each component is a frozen "
+        "dataclass that an installed distribution registers in the slot's entry-point group."
     )
     slots = "".join(_slot(slot, group) for slot, group in SLOTS.items())
     skills = "".join(_options(f"### {name}", kind) for name, kind in skill_options().items())
@@ -250,7 +254,7 @@ def _options(heading: str, kind: type[Any]) -> str:
             inner.append(_options(f"{heading}.{field.name}", type(value)))
         else:
             rows.append(f"| `{field.name}` | {_type(hints[field.name])} | `{value}` |")
-    table = "| option | type | unless said |\n|---|---|---|\n" + "\n".join(rows) + "\n\n" if rows else ""
+    table = "| option | type | default |\n|---|---|---|\n" + "\n".join(rows) + "\n\n" if rows else ""
     return f"{heading}\n\n{_paragraph(kind)}\n\n{table}{''.join(inner)}"
 
 
@@ -262,11 +266,11 @@ def faults_page() -> str:
     """The page on the faults that can be injected by name."""
     rows = "\n".join(f"| `{kind.example}` | {kind.meaning} |" for kind in STANDARD_FAULTS)
     words = (
-        "A fault is the words of its kind and, perhaps, when it is on: `at 3 s` or `from 3 s` (and ever after), "
-        "`from 3 s to 5 s`, `after 4 calls`, or nothing (always). Verbs go by their names in `skills/robot.py` or as "
-        "camera, lidar, arm, gripper, base and body."
+        "A fault is the words of its kind and, if it is not always on, a time: `at 3 s` or `from 3 s` (from then on), "
+        "`from 3 s to 5 s`, or `after 4 calls`. Verbs have their names in `skills/robot.py`, or camera, lidar, arm, "
+        "gripper, base and body."
     )
-    return f"{NOTE}# Faults by name\n\n{words}\n\n| for instance | what happens |\n|---|---|\n{rows}\n"
+    return f"{NOTE}# Faults by name\n\n{words}\n\n| example | effect |\n|---|---|\n{rows}\n"
 
 
 def stack_schema_text() -> str:

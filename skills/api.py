@@ -35,12 +35,12 @@ InputsT = TypeVar("InputsT")
 
 
 class Cause(enum.Enum):
-    """Why something did not succeed. Recovery is chosen by it."""
+    """Why something failed. The cause selects the recovery."""
 
     PRECONDITION = "PRECONDITION"  # it could not begin in the present state
-    PLANNING = "PLANNING"  # no way was found
+    PLANNING = "PLANNING"  # no path, grasp or plan was found
     EXECUTION = "EXECUTION"  # the motion did not go as planned
-    POSTCONDITION = "POSTCONDITION"  # it was done, and the look afterwards says no
+    POSTCONDITION = "POSTCONDITION"  # it was done, and the check afterwards says no
     TIMEOUT = "TIMEOUT"  # the robot's clock ran past the limit
     CANCELLED = "CANCELLED"  # somebody stopped it
     ERROR = "ERROR"  # a defect: an exception, a hung verb
@@ -52,7 +52,7 @@ class PlanningError(Exception):
 
 @dataclass(frozen=True)
 class Running:
-    """Not finished; one plain sentence on what goes on, and progress from 0 to 1 where known."""
+    """Not finished: one plain sentence on the present activity, and progress from 0 to 1 where known."""
 
     message: str
     progress: float | None = None
@@ -60,7 +60,7 @@ class Running:
 
 @dataclass(frozen=True)
 class Succeeded:
-    """Finished well. `outputs` are the skill's output ports by name."""
+    """Success. `outputs` are the skill's output ports by name."""
 
     message: str
     outputs: Mapping[str, Any] = field(default_factory=dict)
@@ -68,9 +68,9 @@ class Succeeded:
 
 @dataclass(frozen=True)
 class Failed:
-    """Finished badly: the cause and one plain sentence.
+    """Failure: the cause and one plain sentence.
 
-    `outputs` may fill some of the skill's output ports with what was learnt for the next attempt.
+    `outputs` may fill some of the skill's output ports, for the next attempt.
     """
 
     cause: Cause
@@ -103,7 +103,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class ObjectObservation:
-    """An object seen: where, how large, how sure.
+    """An object that was seen: position, size and score.
 
     `position_W` is the centre of what was seen, in the world frame (m); `size_m` the extents of its points along the
     axes of a box that is turned by `yaw_rad` about the vertical; `surface` the name of the surface that it rests on.
@@ -120,7 +120,7 @@ class ObjectObservation:
 
 @dataclass(frozen=True)
 class LocalisationEstimate:
-    """Where the robot is: X_WO corrects odometry, so that X_WB = X_WO @ X_OB. Covariance over x, y (m), yaw (rad)."""
+    """The robot's pose: X_WO corrects odometry, so that X_WB = X_WO @ X_OB. Covariance over x, y (m), yaw (rad)."""
 
     stamp_s: float
     X_WO: RigidTransform
@@ -129,31 +129,31 @@ class LocalisationEstimate:
 
 
 class Localiser(Protocol):
-    """Gives the robot's place in the world."""
+    """Estimates the robot's pose in the world."""
 
     def estimate(self) -> LocalisationEstimate:
         """The latest estimate."""
 
     def update(self, robot: Robot) -> None:
-        """Take in the robot's newest sensor readings; called by the runner before each tick."""
+        """Update from the robot's newest sensor readings; the runner calls this before each tick."""
 
 
 @runtime_checkable
 class SearchingLocaliser(Protocol):
-    """A localiser that can look for the robot's place on a whole map, as recovery does when the place was lost."""
+    """A localiser that can search a whole map for the robot's pose, as the recovery from lost localisation does."""
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
-        """Where the scan fits, within radius_m of the belief or anywhere (None); None where nowhere.
+        """The pose where the scan fits, within radius_m of the belief or anywhere (None); None when it fits nowhere.
 
-        Changes nothing, rests on nothing that `update` changes, and may take long: call it inside a Worker job.
+        Changes nothing, reads nothing that `update` changes, and may take long: call it inside a Worker job.
         """
 
     def accept(self, estimate: LocalisationEstimate) -> None:
-        """Believe an estimate from now on."""
+        """Use this estimate from now on."""
 
 
 class Costmap(Protocol):
-    """Where the body can go: the surveyed keep-out grid plus what the sensors see now."""
+    """Free space for the body: the surveyed keep-out grid plus obstacles that the sensors see."""
 
     def clearance_m(self, points_W: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance from each (x, y) row to the nearest obstacle, surveyed or seen."""
@@ -182,22 +182,22 @@ class LayeredView(Protocol):
 
 
 class Job(Protocol[ResultT_co]):
-    """Work under way in the Worker."""
+    """A job of the Worker."""
 
     def done(self) -> bool:
         """True once the result may be read."""
 
     def result(self) -> ResultT_co:
-        """The result; raises what the work raised, or RuntimeError before it is done."""
+        """The result. Raises what the job raised, or RuntimeError before it is done."""
 
     def withdraw(self) -> None:
-        """Nobody waits for the result any more; idempotent."""
+        """Drop the job: nobody waits for its result. Idempotent."""
 
 
 class Worker(Protocol):
-    """Does long work beside the ticks, one piece after the other, in the order in which it is submitted.
+    """Runs long jobs beside the ticks, one after the other, in the order in which they are submitted.
 
-    Work may use only what was read before: it sees no robot, clock, estimator or costmap, and changes nothing that a
+    A job may use only inputs that were read before: no robot, clock, estimator or costmap. It changes nothing that a
     tick uses. In lock-step the result appears after `latency_s` on the robot's clock.
     """
 
@@ -207,7 +207,7 @@ class Worker(Protocol):
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Start `work` on what `read` gives, which may block, as `Robot.image` may. In lock-step it is read at once."""
+        """Start `work` on what `read` returns. `read` may block, as `Robot.image` may; in lock-step it runs at once."""
 
 
 class WorkCounter(Protocol):
@@ -289,7 +289,7 @@ class Publish(Protocol):
 
 @dataclass(frozen=True)
 class SkillContext:
-    """All that a skill may touch. `seed` is made of the run's seed and the leaf's path id."""
+    """All that a skill may use. `seed` derives from the run's seed and the leaf's path id."""
 
     robot: Robot
     lease: Lease
@@ -322,9 +322,9 @@ class Skill(ABC, Generic[InputsT]):
     """Base of all skills.
 
     `Inputs` is a frozen dataclass whose fields are the input ports (defaults allowed); `outputs` names the output
-    ports and their types; `causes` documents which failures it gives and when. `default_timeout_s` counts the
+    ports and their types; `causes` documents the causes of its failures. `default_timeout_s` counts the
     robot's clock. `checkpoint` holds what a later `resume` needs beyond the inputs, as JSON values; it is kept durably.
-    `changes_world` marks what must not be done twice: after a restart such a skill is told to `resume` and looks first.
+    `changes_world` marks a skill that must not run twice: after a restart it gets `resume`, and checks first.
     `gripper_before` says whether the gripper has to hold something (False: to be empty) when it begins, `gripper_after`
     whether it does when it has succeeded; None: it does not matter, and nothing changes.
     `Options` is a frozen dataclass of what a stack file may set of the skill, all with defaults.
@@ -350,33 +350,33 @@ class Skill(ABC, Generic[InputsT]):
 
     @abstractmethod
     def begin(self, inputs: InputsT) -> None:
-        """Start anew: forget all of an earlier attempt. May not command motion that outlives `end`."""
+        """Start, and forget any earlier attempt. May not command motion that outlives `end`."""
 
     @abstractmethod
     def step(self) -> Step:
-        """One tick's work, without blocking."""
+        """Do one tick's work without blocking."""
 
     def end(self) -> None:
-        """Clean up on any way out; idempotent. Stops only this skill's own commands (`Robot.stop(only=...)`)."""
+        """Clean up on every exit; idempotent. Stops only this skill's own commands (`Robot.stop(only=...)`)."""
 
     def suspend(self) -> None:
-        """Stop this skill's motion for a while and keep what is worth keeping. `resume` or `end` follows.
+        """Stop this skill's motion for a while and keep its state. `resume` or `end` follows.
 
-        By default the attempt is ended.
+        By default this ends the attempt.
         """
         self.end()
 
     def resume(self, inputs: InputsT) -> None:
-        """Go on after `suspend`. Time has passed, and the robot may have been elsewhere in between.
+        """Continue after `suspend`. Time has passed, and the robot may have moved.
 
-        After a restart of the executive a new object is told this in place of `begin`, with the last `checkpoint` set.
-        By default the attempt begins anew. Override it where that would undo or repeat what is done already.
+        After a restart of the executive this is called on a new object in place of `begin`, with the last `checkpoint`
+        set. By default the attempt starts again. Override it where that would undo or repeat what is done already.
         """
         self.begin(inputs)
 
     def undone(self, inputs: InputsT) -> str | None:
-        """After a restart: why what an earlier success brought about is no longer so; None when it is, or is not seen.
+        """After a restart: why the effect of an earlier success no longer holds; None when it holds, or is unknown.
 
-        Looks at what the sensors tell at once; moves nothing. Half a sentence, such as "the gripper is empty".
+        Reads sensors and moves nothing. Returns half a sentence, such as "the gripper is empty".
         """
         return None

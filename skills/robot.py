@@ -53,10 +53,10 @@ class Pose2D:
 
 
 class BaseKind(enum.Enum):
-    """How a base goes about."""
+    """How a base moves."""
 
-    OMNIDIRECTIONAL = "omnidirectional"  # moves and turns in any direction: legs, mecanum wheels
-    DIFFERENTIAL = "differential"  # goes only where it heads, ahead or back, and turns on the spot: two driven wheels
+    OMNIDIRECTIONAL = "omnidirectional"  # moves in any direction and turns: legs, mecanum wheels
+    DIFFERENTIAL = "differential"  # drives ahead or back, and turns on the spot: two driven wheels
 
 
 InverseKinematics = Callable[["RigidTransform"], Sequence[FloatArray]]
@@ -104,7 +104,7 @@ class GripperCapabilities:
 
 @dataclass(frozen=True)
 class CameraCapabilities:
-    """One camera: the source that `image` takes, what carries it, the body or the hand, and its pose X_FC there."""
+    """One camera: its source for `image`, its frame F (body or hand), and its pose X_FC in it."""
 
     source: str
     X_FC: RigidTransform
@@ -112,12 +112,12 @@ class CameraCapabilities:
 
     @property
     def heading_rad(self) -> float:
-        """How far to the left of ahead its optical axis points in the frame that carries it."""
+        """Direction of the optical axis in its frame, counter-clockwise from ahead."""
         axis = self.X_FC.rotation().matrix()[:, 2]
         return math.atan2(axis[1], axis[0])
 
     def looks_towards(self, heading_rad: float, within_rad: float = math.pi / 4) -> bool:
-        """Whether the optical axis lies so near to a direction in the body frame."""
+        """Whether the optical axis is within an angle of a direction in the body frame."""
         return abs(math.remainder(self.heading_rad - heading_rad, math.tau)) < within_rad
 
 
@@ -143,7 +143,7 @@ class Capabilities:
 
     @property
     def body_cameras(self) -> tuple[CameraCapabilities, ...]:
-        """The cameras on the body, which look for people and for what lies in the way."""
+        """The cameras on the body. They look for people and obstacles."""
         return tuple(camera for camera in self.cameras if not camera.on_hand)
 
     @property

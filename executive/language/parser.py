@@ -1,4 +1,4 @@
-"""The seam to the dependency parser, and the one parser behind it."""
+"""The interface to the dependency parser, and its one implementation."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ __all__ = ["Status", "Understanding", "parse_lines", "understand", "understand_a
 
 
 class Status(enum.Enum):
-    """What became of a sentence."""
+    """How understanding a sentence ended."""
 
     OK = "ok"  # it became commands
     REFUSED = "refused"  # it, or a part of it, is nothing that the robot does

@@ -83,7 +83,7 @@ class EventLog:
             listener(topic, now_s, plain)
 
     def flush(self) -> None:
-        """Bring everything to the file."""
+        """Write everything to the file."""
         self._flushed_s = self._clock.now()
         self._writer.flush()
 

@@ -21,7 +21,7 @@ TRANSITION_KEYS = ("t", "node", "from", "to", "cause", "message")
 
 @dataclass(frozen=True)
 class History:
-    """The events of one log, and where it came from."""
+    """The events of one log, and its file."""
 
     file: Path
     events: tuple[Event, ...]

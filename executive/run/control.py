@@ -128,7 +128,7 @@ class Control:
     @property
     @_locked
     def state(self) -> ControlState:
-        """What can be seen now."""
+        """The present state."""
         (mode, reason), asked = self._mode(), self._requests
         return ControlState(
             self._version, mode, reason, self._at, self._questions.open, asked.breakpoints, self._missions
@@ -142,7 +142,7 @@ class Control:
 
     @_locked
     def pause(self, reason: str = "paused by the operator") -> None:
-        """Hold the robot still and keep the place of everything. Pausing twice is pausing once."""
+        """Hold the robot still; the tree keeps its state. Idempotent."""
         self._stride = None
         if self._paused is None:
             self._paused = reason
@@ -150,7 +150,7 @@ class Control:
 
     @_locked
     def resume(self) -> None:
-        """Go on after a pause, a breakpoint or steps; a pressed stop button stays pressed."""
+        """Continue after a pause, a breakpoint or steps; a pressed stop button stays pressed."""
         if self._paused is not None:
             self._paused = self._at = self._stride = None
             self._note("resume", "the mission goes on")
@@ -192,7 +192,7 @@ class Control:
 
     @_locked
     def release_stop_button(self) -> None:
-        """Let the run go on as it was when the button was pressed."""
+        """Continue as it was when the button was pressed."""
         if self._pressed is not None:
             self._pressed = None
             self._note("stop button released", "the stop button is released")
@@ -200,7 +200,7 @@ class Control:
     @property
     @_locked
     def stop_pressed(self) -> str | None:
-        """Why nothing may move while the stop button is pressed; None when it is not."""
+        """Why the stop button is pressed; None when it is not."""
         return self._pressed
 
     @_locked
@@ -212,7 +212,7 @@ class Control:
 
     @_locked
     def clear_breakpoint(self, path_id: str) -> None:
-        """Pause there no more; does nothing when there is none."""
+        """Remove a breakpoint; does nothing when there is none."""
         if path_id in self._requests.breakpoints:
             self._ask_for(breakpoints=self._requests.breakpoints - {path_id})
             self._note("breakpoint cleared", path_id)

@@ -50,7 +50,7 @@ class RobotStatus:
 class RunResult:
     """How a run ended. Times in seconds: `sim_time_s` on the robots' clock, `wall_time_s` on the wall's.
 
-    `overruns` counts the ticks that took longer on the wall's clock than the tick period. `trees` are the missions
+    `overruns` counts the ticks that took longer on the wall clock than the tick period. `trees` are the missions
     that the robots began with, or those that took their place, by robot; `work` is what was computed, by name.
     """
 

@@ -37,7 +37,7 @@ HOLDER = "errand"
 
 @dataclass(frozen=True)
 class RunEntry:
-    """One robot with its tree, its estimators and detector, the rest of its stack, and its mission's journal."""
+    """One robot with its tree, estimators, detector, stack, and the journal of its mission."""
 
     tree: CompiledTree
     robot: Robot
@@ -50,9 +50,9 @@ class RunEntry:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """`time_limit_s` counts the robots' clock for the whole run, without pauses.
+    """Seed, tick period and limits. `time_limit_s` counts the robots' clock for the whole run, without pauses.
 
-    The other limits are the watchdog's, on the wall's clock: for one verb, for taking a picture, for one robot's tick.
+    The other limits are the watchdog's, on the wall clock: for one verb, for taking a picture, for one robot's tick.
     """
 
     seed: int = 0
@@ -65,7 +65,7 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class Progress:
-    """What an observer is told after each tick: by robot, the states of all nodes, the mission, and its status."""
+    """The state of a run after each tick, for observers: node states, mission and status of each robot."""
 
     now_s: float
     ticks: int
@@ -102,8 +102,8 @@ def run(
 
     Each tick: poll `control`, advance the clock by the tick period, update each robot's estimators, tick each tree, log
     what changed. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree is not
-    ticked, and what passes does not count against any limit. Whatever happens, all trees and robots are stopped and all
-    leases returned before this returns. Without control, equal seeds give equal logs. `work` counts what is computed,
+    ticked, and that time counts against no limit. In every case all trees and robots are stopped and all leases
+    returned before this returns. Without control, equal seeds give equal logs. `work` counts what is computed,
     `profile` times the skills. Raises ValueError: no entries, two robots of one name, or a breakpoint at a node that
     there is not. Raises OSError, when all is stopped: the disk is full.
     """

@@ -36,7 +36,7 @@ def write_small_room(folder: Path, *, can: bool = True) -> Path:
 
 
 def room_knowledge() -> Knowledge:
-    """What the robot is told of the room."""
+    """The knowledge of the small room."""
     return Knowledge.model_validate(_facts()["knowledge"])
 
 

@@ -23,7 +23,7 @@ __all__ = ["CompiledTree", "StepPart", "compile_mission", "step_name"]
 
 @dataclass(frozen=True)
 class CompiledTree:
-    """A mission's tree for one robot, as data; `parts` are what it is to bring about, in order.
+    """A mission's tree for one robot, as data; `parts` are its steps with their goal conditions, in order.
 
     Its root watches over the mission itself: see `executive.tree.compiling.interrupts`.
     """

@@ -1,4 +1,4 @@
-"""What the simulated Spot is and can do, from the facts."""
+"""What the simulated Spot is and can do."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def nominal_footholds() -> FloatArray:
 
 @cache
 def spot_capabilities() -> Capabilities:
-    """Spot's capabilities, from the facts."""
+    """The capabilities of Spot with its arm."""
     facts = spot_facts()
     body, gripper = facts["capabilities"], facts["gripper"]
     arm_names = tuple(part["link"] for part in facts["arm"][:-1])

@@ -37,16 +37,16 @@ class _Strict(BaseModel):
 
 
 class Rules(_Strict):
-    """How things lie on surfaces, in metres; see `objects.yaml`."""
+    """How objects lie on surfaces, in metres; see `objects.yaml`."""
 
-    from_edge_m: Span = Field(description="least and greatest distance of a thing's centre from the front edge")
-    clear_m: float = Field(description="between things, and between a thing and what it must keep clear of")
-    rim_m: float = Field(description="between a thing's outline and the surface's own outline")
-    drop_m: float = Field(description="things start this high above the surface")
+    from_edge_m: Span = Field(description="least and greatest distance of an object's centre from the front edge")
+    clear_m: float = Field(description="between objects, and from an object to a keep-clear outline")
+    rim_m: float = Field(description="between an object's outline and the surface's own outline")
+    drop_m: float = Field(description="objects start this high above the surface")
 
 
 class ObjectRule(_Strict):
-    """A loose thing, its class, and the surfaces on which it may lie."""
+    """A loose object, its class, and the surfaces on which it may lie."""
 
     name: str = Field(description="its name in this world")
     model: str = Field(description="a class of `plant/models/catalogue.yaml`")
@@ -66,12 +66,12 @@ class PersonRule(_Strict):
 class SeedRules(_Strict):
     """The schema of `objects.yaml`."""
 
-    rules: Rules = Field(description="distances that hold for all things")
+    rules: Rules = Field(description="distances for all objects")
     fronts: dict[str, tuple[tuple[Point, Point], ...]] = Field(
         description="for each surface, the edges (from and to, x and y) that the robot can stand before"
     )
-    keep_clear: tuple[Polygon, ...] = Field(default=(), description="outlines on which nothing may lie, corners (x, y)")
-    objects: tuple[ObjectRule, ...] = Field(description="the loose things")
+    keep_clear: tuple[Polygon, ...] = Field(default=(), description="outlines where no object may lie, corners (x, y)")
+    objects: tuple[ObjectRule, ...] = Field(description="the loose objects")
     people: tuple[PersonRule, ...] = Field(default=(), description="the people")
 
 

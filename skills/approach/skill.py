@@ -28,7 +28,7 @@ _STILL_BEFORE_M = 1.3
 
 @dataclass(frozen=True)
 class ApproachInputs:
-    """The object as it was seen, and the surfaces around (at least the one that it lies on)."""
+    """The object as it was seen, and the surfaces near it, including the one that it lies on."""
 
     observation: ObjectObservation
     surfaces: tuple[Surface, ...]
@@ -50,7 +50,7 @@ class ApproachOptions:
 
 
 class Approach(ArmSkill[ApproachInputs]):
-    """Drives with the arm stowed, at low speed; the observation that comes out is fresh."""
+    """Drives slowly, arm stowed, to where the arm can grasp an object, and looks at the object again."""
 
     name = "approach"
     Inputs = ApproachInputs
@@ -59,7 +59,7 @@ class Approach(ArmSkill[ApproachInputs]):
     outputs: ClassVar[Mapping[str, type]] = {"observation": ObjectObservation}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PLANNING: "no free place to stand is near enough to the object, or no path leads there",
-        Cause.EXECUTION: "the robot did not get to where it should stand",
+        Cause.EXECUTION: "the robot did not reach the place to stand",
         Cause.POSTCONDITION: "the object is not seen again from there",
     }
     default_timeout_s = 150.0

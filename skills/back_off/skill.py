@@ -23,7 +23,7 @@ _STEP_M = 0.05
 
 @dataclass(frozen=True)
 class BackOffInputs:
-    """How far (m) to go, and how far at least for it to count."""
+    """The distance (m), and the least distance (m) that counts as success."""
 
     distance_m: Length = 0.4
     least_m: Length = 0.15
@@ -39,7 +39,7 @@ class BackOffOptions:
 
 
 class BackOff(Skill[BackOffInputs]):
-    """Goes straight and slowly, without turning, in the first direction with enough clearance that the costmap has."""
+    """Moves a short way out of a tight place: straight, slowly, in the first direction with enough clearance."""
 
     name: ClassVar[str] = "back_off"
     Inputs: ClassVar[type] = BackOffInputs
@@ -47,7 +47,7 @@ class BackOff(Skill[BackOffInputs]):
     options: BackOffOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PLANNING: "there is no clearance in any direction",
-        Cause.EXECUTION: "the robot refuses to drive or does not get on",
+        Cause.EXECUTION: "the robot refuses to drive or makes no progress",
     }
     default_timeout_s: ClassVar[float] = 15.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}

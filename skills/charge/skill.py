@@ -26,7 +26,7 @@ class ChargeOptions:
 
 
 class Charge(Skill[ChargeInputs]):
-    """The robot stands on its dock already. It moves nothing; it waits, and looks whether the charge really rises."""
+    """Waits on the dock until the battery is charged, and checks that the charge rises. Moves nothing."""
 
     name: ClassVar[str] = "charge"
     Inputs: ClassVar[type] = ChargeInputs

@@ -12,13 +12,13 @@ from skills.quantities import Delay
 
 @dataclass(frozen=True)
 class ClearCostmapInputs:
-    """How long (s) to look anew before going on; two scans must agree on what they see."""
+    """How long (s) to sense again before success; two scans must agree on an obstacle."""
 
     look_s: Delay = 1.0
 
 
 class ClearCostmap(Skill[ClearCostmapInputs]):
-    """What stands there still is seen again within `look_s`; what was only a passer-by, or noise, is gone."""
+    """Clears the obstacle layer of the costmap and waits until the sensors have filled it again."""
 
     name: ClassVar[str] = "clear_costmap"
     Inputs: ClassVar[type] = ClearCostmapInputs

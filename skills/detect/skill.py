@@ -44,9 +44,9 @@ _LOOKED_AT_M = 0.08
 class DetectInputs:
     """What to look for (any of `classes`, with all `attributes`) and on which surfaces.
 
-    The look ends with the first `count` objects; with a count of 0 all surfaces are looked at and all objects counted.
-    With `expected_W` only that place is looked at, and only what is within 0.35 m of it counts. With `floor` an object
-    on the floor beside the surfaces counts as well, where it comes into view.
+    The search ends with the first `count` objects; a count of 0 searches all surfaces and counts all objects. With
+    `expected_W` it searches that place only, and only objects within 0.35 m of it count. With `floor`, objects on the
+    floor beside the surfaces count where they come into view.
     """
 
     classes: tuple[str, ...]
@@ -91,7 +91,7 @@ class DetectOptions:
 
 
 class Detect(ArmSkill[DetectInputs]):
-    """Looks from where the robot stands; the arm stays raised on success and is stowed when nothing was found."""
+    """Searches surfaces for objects from where the robot stands. Stows the arm when it finds nothing."""
 
     name = "detect"
     Inputs = DetectInputs
@@ -102,9 +102,9 @@ class Detect(ArmSkill[DetectInputs]):
         "observations": tuple[ObjectObservation, ...],
     }
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "a class, attribute or surface cannot be looked for from here, or there is no arm",
-        Cause.PLANNING: "the arm finds no pose to look from",
-        Cause.EXECUTION: "the arm did not get to where it looks from, or the camera shows nothing",
+        Cause.PRECONDITION: "a class, attribute or surface cannot be searched for from here, or there is no arm",
+        Cause.PLANNING: "the arm reaches no viewpoint",
+        Cause.EXECUTION: "the arm did not reach its viewpoint, or the camera shows nothing",
         Cause.POSTCONDITION: "no such object is seen, or fewer than asked for",
     }
     default_timeout_s = 90.0

@@ -35,7 +35,7 @@ _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 @dataclass(frozen=True)
 class GraspInputs:
-    """The object to take, as it was seen; grasps like those in `avoid` are chosen only when there are no others."""
+    """The object as it was seen; grasps like those in `avoid` are the last choice."""
 
     observation: ObjectObservation
     avoid: tuple[TriedGrasp, ...] = ()
@@ -66,9 +66,9 @@ class GraspOptions:
 
 
 class Grasp(ArmSkill[GraspInputs]):
-    """Ends with the object held near the body; on failure the gripper is opened and the arm stowed.
+    """Grasps an object and holds it near the body. On failure it opens the gripper and stows the arm.
 
-    The output `tried` is `avoid` and the grasp of this attempt, also after a failure in which one was tried.
+    The output `tried` is `avoid` and the grasp of this attempt, after a failure, too.
     """
 
     name = "grasp"
@@ -79,7 +79,7 @@ class Grasp(ArmSkill[GraspInputs]):
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the object is not where it was seen, the gripper is full, or there is no arm",
         Cause.PLANNING: "no grasp is within reach and free",
-        Cause.EXECUTION: "the arm or the gripper did not get to where it was sent",
+        Cause.EXECUTION: "the arm or the gripper did not reach its goal",
         Cause.POSTCONDITION: "the gripper closed on nothing, or the object slipped out",
     }
     default_timeout_s = 120.0

@@ -31,7 +31,7 @@ _PERSON_SIZE_M = (0.6, 0.6, 1.8)
 
 @dataclass(frozen=True)
 class HandOverInputs:
-    """The person's name, for messages; the nearest person in sight is meant."""
+    """The person's name, for messages; the skill takes the nearest person in sight."""
 
     person: str
 
@@ -52,7 +52,7 @@ class HandOverOptions:
 
 
 class HandOver(ArmSkill[HandOverInputs]):
-    """Finds the person by LiDAR, goes before them, stretches out the arm; the object stays in the gripper."""
+    """Finds a person by LiDAR, goes there and holds the object out to them; the gripper stays closed."""
 
     name = "hand_over"
     Inputs = HandOverInputs
@@ -61,7 +61,7 @@ class HandOver(ArmSkill[HandOverInputs]):
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free path for the arm",
-        Cause.EXECUTION: "the robot or its arm did not get there",
+        Cause.EXECUTION: "the robot or its arm did not reach its goal",
         Cause.POSTCONDITION: "the object is no longer held, or not near the person",
     }
     default_timeout_s = 120.0

@@ -24,7 +24,7 @@ _STILL_THERE_M = 1.0
 
 @dataclass(frozen=True)
 class NavigateInputs:
-    """Where to go: `goal` is the body's pose in the world; how exactly, and how fast at most."""
+    """The goal (the body's pose in the world), tolerances and the maximum speed."""
 
     goal: Pose2D
     position_tolerance_m: Length = 0.10
@@ -57,17 +57,17 @@ class NavigateOptions:
 
 
 class Navigate(Skill[NavigateInputs]):
-    """Plan a way for the whole footprint, follow it with checks, and be there at the end, standing still."""
+    """Drives to a pose: plans a path for the whole footprint, follows it, and stands still at the goal."""
 
     name: ClassVar[str] = "navigate"
     Inputs: ClassVar[type] = NavigateInputs
     Options: ClassVar[type] = NavigateOptions
     outputs: ClassVar[Mapping[str, type]] = {}
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "The robot does not know where it is, or refuses to drive from the start on.",
-        Cause.PLANNING: "The goal is blocked or there is no way, also after waiting for what stands in it to go.",
-        Cause.EXECUTION: "The robot does not get on, loses its place on the way, or refuses to drive on.",
-        Cause.POSTCONDITION: "It stands still, but not where it should.",
+        Cause.PRECONDITION: "localisation is lost, or the robot refuses to drive",
+        Cause.PLANNING: "the goal is blocked or there is no path, even after waiting for obstacles to move",
+        Cause.EXECUTION: "the robot makes no progress, loses localisation, or refuses to drive on",
+        Cause.POSTCONDITION: "it stands still, but not at the goal",
     }
     default_timeout_s: ClassVar[float] = 180.0
     options: NavigateOptions

@@ -38,7 +38,7 @@ _TIPS_BEYOND_M = 0.03
 
 @dataclass(frozen=True)
 class PlaceInputs:
-    """Where to put the object down."""
+    """The surface to put the object on."""
 
     surface: Surface
 
@@ -56,7 +56,7 @@ class PlaceOptions:
 
 
 class Place(ArmSkill[PlaceInputs]):
-    """Goes nearer when no spot is within reach. Ends with the gripper empty and the arm stowed."""
+    """Puts the held object down on a surface and stows the arm. Goes nearer when no free spot is in reach."""
 
     name = "place"
     Inputs = PlaceInputs
@@ -65,7 +65,7 @@ class Place(ArmSkill[PlaceInputs]):
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held",
         Cause.PLANNING: "no free spot is seen within reach, or the arm finds no path to it",
-        Cause.EXECUTION: "the robot or its arm did not get there",
+        Cause.EXECUTION: "the robot or its arm did not reach its goal",
         Cause.POSTCONDITION: "the object is not seen where it was put down, or is still in the gripper",
     }
     default_timeout_s = 150.0

@@ -18,7 +18,7 @@ _SCAN_PATIENCE_S = 2.0
 
 @dataclass(frozen=True)
 class RelocaliseInputs:
-    """`turns`: in how many headings it searches at most, an eighth of a turn apart."""
+    """`turns`: the most headings to search in, an eighth of a turn apart."""
 
     turns: Tries = 8
 
@@ -34,7 +34,7 @@ class RelocaliseOptions:
 
 
 class Relocalise(RoutineSkill[RelocaliseInputs]):
-    """A place counts as found once new scans have agreed with it for a second."""
+    """Finds the robot's pose on the map again. A pose counts once new scans agree with it for a second."""
 
     name: ClassVar[str] = "relocalise"
     Inputs: ClassVar[type] = RelocaliseInputs
@@ -43,7 +43,7 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "there are no new scans, or this robot's localiser cannot search",
         Cause.EXECUTION: "the robot refuses to turn",
-        Cause.POSTCONDITION: "no place on the map fits what the robot sees",
+        Cause.POSTCONDITION: "no pose on the map fits what the robot sees",
     }
     default_timeout_s: ClassVar[float] = 120.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}

@@ -23,13 +23,13 @@ class StowInputs:
 
 
 class Stow(ArmSkill[StowInputs]):
-    """Leaves the arm where it is when it is near the body already; the body stands at its usual height."""
+    """Brings the arm near the body, and the body to its usual height. An arm that is near the body stays there."""
 
     name = "stow"
     Inputs = StowInputs
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PLANNING: "the arm finds no free path",
-        Cause.EXECUTION: "the arm did not get there",
+        Cause.EXECUTION: "the arm did not reach its goal",
     }
     default_timeout_s = 30.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}

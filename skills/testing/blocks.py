@@ -50,7 +50,7 @@ class Block:
 
 
 def can_at(x: float, y: float, z: float, colour: Colour = (200, 20, 25)) -> Block:
-    """A can, 66 mm across and 115 mm high, that stands at (x, y) on a top at height z; red unless said."""
+    """A can, 66 mm across and 115 mm high, that stands at (x, y) on a surface at height z; red by default."""
     return Block(x - 0.033, y - 0.033, x + 0.033, y + 0.033, z, z + 0.115, colour, loose=True)
 
 

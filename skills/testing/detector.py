@@ -18,7 +18,7 @@ _FEWEST_PIXELS = 6
 
 @dataclass(frozen=True)
 class PlainColours:
-    """Takes every patch of just the colour of a class for an object of that class; red cans for cokes, unless said."""
+    """Detects an object of a class in every patch of exactly the class's colour; by default red cans are cokes."""
 
     colours: Mapping[str, Colour] = field(default_factory=lambda: MappingProxyType({"coke": TABLE_CAN.colour}))
     score: float = 0.9

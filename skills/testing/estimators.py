@@ -15,7 +15,7 @@ OPEN_M = 9.0
 
 
 class KnownPlace:
-    """A localiser that was told where odometry begins and trusts it. Implements `skills.api.SearchingLocaliser` too.
+    """A localiser that knows where odometry starts and trusts it. Implements `skills.api.SearchingLocaliser` too.
 
     Set `localised` to False to be lost. Its stamp is that of the odometry it last took in.
     """

@@ -63,7 +63,7 @@ BASE_ONLY = Capabilities(
 
 @dataclass(frozen=True)
 class Start:
-    """How the robot begins: its true pose in the world, arm angles (stowed unless said), gripper, charge.
+    """The initial state: the true pose in the world, arm angles (default: stowed), gripper, charge.
 
     `in_gripper_rad` is the opening at which a closing gripper meets what lies between its fingers (None: nothing).
     `holding` begins with the gripper closed about it. A `docked` robot charges.
@@ -78,7 +78,7 @@ class Start:
 
 
 class ScriptedRobot:
-    """Moves exactly as it is told, at once where a real robot would take care; `calls` remembers the verbs used.
+    """Moves exactly as commanded, and skips a real robot's precautions; `calls` records the verbs used.
 
     It stands in a world of `blocks`; it drives through them, but takes loose ones between its fingers and puts them
     down. Odometry is the truth unless `odometry_scale` and `yaw_drift_rad_per_m` say otherwise. Time passes by its

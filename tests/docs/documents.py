@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 _COMMANDS = {name: loaded(name) for name in COMMANDS}
 _BLOCK = re.compile(r"(?:^<!-- (?P<mark>[^>]*) -->\n+)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
+_LINK = re.compile(r"\]\((?!https?:)([^)#]*)(#[^)]*)?\)")
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,17 @@ def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
     found = _BLOCK.finditer(text)
     return [Block(m["kind"], m["text"], m["mark"] or "", text[: m.start()].count("\n") + 1) for m in found]
+
+
+def commands(page: Path) -> list[str]:
+    """The lines of a page's shell blocks that call `errand`."""
+    lines = [line for block in blocks(page) if block.kind == "sh" for line in block.text.splitlines()]
+    return [line for line in lines if line.startswith("errand ")]
+
+
+def links(page: Path) -> list[tuple[str, str]]:
+    """The links of a page that stay with us: file and anchor, each empty when it is not said."""
+    return _LINK.findall(page.read_text(encoding="utf-8"))
 
 
 def unknown_command(line: str) -> str | None:

@@ -2,23 +2,24 @@
 
 import ast
 import re
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 sys.path.insert(0, str(Path(__file__).parent))
-from documents import DOCS, ROOT, blocks, unknown_command
+from documents import DOCS, ROOT, commands, links, unknown_command
 
-PAGES = sorted(DOCS.rglob("*.md"))
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 _TEST = re.compile(r"`(tests/[\w/.]+\.py)(?:::(\w+))?`")
-_LINK = re.compile(r"\]\((?!https?:)([^)#]*)(#[^)]*)?\)")
 _FILE = re.compile(r"`((?:executive|skills|plant|missions|docs)/[\w/.]+\.(?:py|yaml|json|md))`")
 _ERRAND = re.compile(r"`(errand [^`]+)`")
 
 
 def page_id(page):
-    return str(page.relative_to(DOCS))
+    return str(page.relative_to(ROOT))
 
 
 def names_in(path):
@@ -45,7 +46,7 @@ def test_every_test_that_a_page_names_exists(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
 def test_every_link_leads_somewhere(page):
-    for target, anchor in _LINK.findall(page.read_text()):
+    for target, anchor in links(page):
         there = (page.parent / target).resolve() if target else page
         assert there.is_file(), target
         assert not anchor or anchor[1:] in anchors(there), f"{target}{anchor}"
@@ -59,8 +60,7 @@ def test_every_file_that_a_page_names_exists(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=page_id)
 def test_every_command_that_a_page_shows_exists(page):
-    lines = [line for block in blocks(page) if block.kind == "sh" for line in block.text.splitlines()]
-    shown = [line for line in lines if line.startswith("errand ")] + _ERRAND.findall(page.read_text())
+    shown = commands(page) + _ERRAND.findall(page.read_text())
     assert [fault for line in shown if (fault := unknown_command(line))] == []
 
 
@@ -90,5 +90,27 @@ def test_every_page_is_reached_from_the_index():
         if page in reached or page.suffix != ".md":
             continue
         reached.add(page)
-        waiting += [(page.parent / target).resolve() for target, _ in _LINK.findall(page.read_text()) if target]
-    assert set(PAGES) <= reached
+        waiting += [(page.parent / target).resolve() for target, _ in links(page) if target]
+    assert set(DOCS.rglob("*.md")) <= reached
+
+
+def nav_of(entry):
+    """All pages that an entry of the site's navigation names."""
+    if isinstance(entry, str):
+        return {entry}
+    return set().union(*map(nav_of, entry.values() if isinstance(entry, dict) else entry))
+
+
+def test_the_site_has_every_page_and_notebook():
+    site = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    pages = [*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]
+    assert nav_of(site["nav"]) == {str(page.relative_to(DOCS).with_suffix(".md")) for page in pages}
+
+
+def test_the_site_is_built_and_loads_nothing_from_elsewhere(tmp_path):
+    """The hook of the site refuses such a page; links and anchors are checked by `strict`."""
+    pytest.importorskip("mkdocs.commands.build", reason="needs the extra docs")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
+    built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert built.returncode == 0, built.stderr
+    assert (tmp_path / "notebooks" / "first_look.html").is_file()

@@ -1,4 +1,4 @@
-"""The tutorials do what they say: files are written, commands run, and the shown output comes."""
+"""The tutorials and two how-to pages do what they say: files are written, commands run, the shown output comes."""
 
 import os
 import re
@@ -15,8 +15,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from documents import DOCS, Block, blocks
 
 TUTORIALS = sorted((DOCS / "tutorials").glob("[0-9]*.md"))
+HOW_TO = [DOCS / "how-to" / name for name in ("own-world.md", "own-object.md")]
 SLOW = [page for page in TUTORIALS if any(block.mark == "slow" for block in blocks(page))]
-FAST = [page for page in TUTORIALS if page not in SLOW]
+FAST = [*(page for page in TUTORIALS if page not in SLOW), *HOW_TO]
 
 
 def name_of(page):

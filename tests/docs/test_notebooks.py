@@ -1,0 +1,54 @@
+"""The notebooks run from top to bottom, and show what comes."""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from documents import DOCS
+
+SPEC = importlib.util.spec_from_file_location("run_notebook", DOCS / "run_notebook.py")
+assert SPEC is not None
+run_notebook = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(run_notebook)
+NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
+
+
+def printed(notebook):
+    """What each code cell prints."""
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    return ["".join(text for out in cell["outputs"] for text in out.get("text", ())) for cell in cells]
+
+
+def pictures(notebook):
+    return sum("image/png" in out.get("data", {}) for cell in notebook["cells"] for out in cell.get("outputs", ()))
+
+
+def notebook_of(*sources):
+    return {"cells": [{"cell_type": "code", "source": [source], "outputs": []} for source in sources]}
+
+
+def test_there_is_a_notebook():
+    assert NOTEBOOKS
+
+
+@pytest.mark.mission
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs_and_shows_what_comes(path):
+    """Run `python docs/run_notebook.py` when this fails although all is well."""
+    stored = json.loads(path.read_text(encoding="utf-8"))
+    come = run_notebook.executed(stored)
+    assert printed(come) == printed(stored)
+    assert pictures(come) == pictures(stored) > 0
+
+
+def test_cells_share_their_names_and_keep_what_they_print():
+    assert printed(run_notebook.executed(notebook_of("a = 1\nprint('one')", "print(a + 1)"))) == ["one\n", "2\n"]
+
+
+def test_a_cell_that_raises_is_noticed():
+    with pytest.raises(ZeroDivisionError):
+        run_notebook.executed(notebook_of("1 / 0"))

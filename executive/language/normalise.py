@@ -13,8 +13,10 @@ MAX_CHARACTERS: Final = 800
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")
 _AND: Final = re.compile(r"(?<=\s)[&+](?=\s)")
-_SIGNS: Final = r"[$€£%#@&+=|\\/^~_{}<>\[\]]"
-_PLACEHOLDER: Final = re.compile(rf"\$?(?:\{{+[^{{}}]*\}}+|<[^<>]*>|\[[^\[\]]*\])|\S*{_SIGNS}\S*")
+_SIGNS: Final = r"$€£%#@&+=|\\/^~_{}<>\[\]"
+_PLACEHOLDER: Final = re.compile(
+    rf"\$?(?:(?<!\{{)\{{++[^{{}}]*+\}}+|<[^<>]*+>|\[[^\[\]]*+\])|(?<!\S)[^\s{_SIGNS}]*+[{_SIGNS}]\S*"
+)  # possessive, so that the time grows with the length of a sentence and not with its square
 
 
 def clean(text: str) -> str:

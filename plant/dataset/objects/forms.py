@@ -18,7 +18,7 @@ FORMS: Final[Mapping[tuple[str, str], int]] = MappingProxyType(
         ("coke", "cola_can"): 6,
         ("coke", "glass_bottle"): 9,
         ("beer", "green_bottle"): 11,
-        ("beer", "stubby_bottle"): 10,
+        ("beer", "stubby_bottle"): 18,
         ("hammer", "red_claw"): 11,
         ("hammer", "ball_peen"): 13,
         ("cube", "wooden"): 4,

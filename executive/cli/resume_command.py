@@ -1,4 +1,4 @@
-"""`errand resume`: takes up the mission that a crash or a kill broke off, and then the rest of its queue."""
+"""`errand resume`: takes up the mission that a crash, a kill or a cancel broke off, and then the rest of its queue."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _MAY_GO_ON: Final = (MissionState.RUNNING, MissionState.CANCELLED, MissionState.
 
 def resume(
     store: Annotated[Path, typer.Option(help="Where the missions are kept.")] = Path("out") / STORE,
-    mission: Annotated[int | None, typer.Option(help="Its number, where it is not the one broken off.")] = None,
+    mission: Annotated[int | None, typer.Option(help="Its number; by default the one that was broken off or cancelled last.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")] = False,
 ) -> None:
-    """Go on with the mission that was broken off, from its last finished step; then with its queue."""
+    """Go on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
     console = console_for(as_json)
     with refusals(), MissionStore(store, create=False) as missions, missions.claimed():
         chosen = _broken_off(missions, mission)
@@ -40,11 +40,16 @@ def resume(
 
 
 def _broken_off(missions: MissionStore, number: int | None) -> StoredMission:
-    """The mission to go on with. Raises InputError when there is none."""
+    """The mission to go on with: the one named, the one that no process ended, or the newest where it was cancelled.
+
+    Raises InputError when there is none.
+    """
     if number is None:
-        broken = missions.missions(MissionState.RUNNING)
+        begun = [each for each in missions.missions() if each.starts]
+        broken = [each for each in begun if each.state is MissionState.RUNNING]
+        broken += [each for each in begun[-1:] if each.state in _MAY_GO_ON]
         if broken:
-            return broken[-1]
+            return broken[0]
         queued = missions.missions(MissionState.QUEUED)
         hint = "`errand queue run` does what is queued" if queued else "`errand queue list` shows how missions ended"
         raise InputError("no mission was broken off", hint=hint, file=missions.path)

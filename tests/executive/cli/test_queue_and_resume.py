@@ -211,6 +211,23 @@ def test_a_killed_run_is_resumed_with_its_own_seed_and_folder(errand, mission, p
     assert [run[:3] for run in plant.runs] == [("alone", 9, "out")] * 2
 
 
+@pytest.mark.parametrize("ended", ["cancelled", "error"])
+def test_the_newest_mission_goes_on_where_it_was_cancelled(errand, mission, plant, states, ended):
+    plant.outcomes = [ended]
+    errand("run", mission("alone"), "--quiet", "--no-record")
+    assert states() == [ended]
+    assert errand("resume", "--quiet").exit_code == 0
+    assert states() == ["success"]
+
+
+def test_a_cancelled_mission_does_not_go_on_by_itself_once_another_ran(errand, mission, plant, states):
+    plant.outcomes = ["cancelled"]
+    errand("run", mission("alone"), "--quiet", "--no-record")
+    errand("run", mission("other"), "--quiet", "--no-record")
+    result = errand("resume", "--quiet")
+    assert (result.exit_code, states()) == (2, ["cancelled", "success"])
+
+
 def test_a_mission_file_that_was_changed_is_taken_as_it_was(errand, mission, plant, tmp_path):
     plant.outcomes = ["killed"]
     with pytest.raises(GoneError):

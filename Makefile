@@ -1,5 +1,5 @@
 # make env    the virtual environment .venv with all but the training extra
-# make demo   one mission, end to end; look into out/
+# make demo   one mission, end to end; look into out/ (sets up what missions need, and no more)
 # make test   all tests; those of training run when the extra `train` is there
 # make train  adds the extra `train`: torch, to train the detector and the speech adapter
 # make check  lint, format and strict types
@@ -26,11 +26,15 @@ endef
 
 env: $(VENV)/.ready
 
-$(VENV)/.ready: pyproject.toml constraints.txt | debian
+$(VENV)/.ready: $(VENV)/.run
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,test,browser,bench,dev]'
+	@touch $@
+
+$(VENV)/.run: pyproject.toml constraints.txt | debian
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
 	  || { echo "Errand needs Python 3.11; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,test,browser,bench,dev]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals]'
 	@touch $@
 
 train: $(VENV)/.train
@@ -50,7 +54,7 @@ voices:
 	if [ -z "$$missing" ]; then exit 0; fi; \
 	$(call install,$$missing) || echo "tests with synthetic voices will be skipped; as root: apt-get install$$missing"
 
-demo: env
+demo: $(VENV)/.run
 	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
 
 test: env voices

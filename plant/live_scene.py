@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram
-from plant.recording import View
+from plant.recording import View, prepare_view, set_camera
 
 HOST = "127.0.0.1"
 PERIOD_WALL_S = 0.1
@@ -23,13 +22,15 @@ class LiveScene:
     """
 
     def __init__(self, world: WorldDiagram, context: Context, view: View | None = None) -> None:
-        """Show the plant of `context`, seen from `view`. Raises RuntimeError when no port is free."""
-        self._plant, self._context = world.plant, context
+        """Show the plant of `context`, seen from `view`, with the camera behind the first robot where one is followed.
+
+        Raises RuntimeError when no port is free.
+        """
+        self._plant, self._context, self._view = world.plant, context, view
+        self._followed = next((robot.body for _, robot in sorted(world.robots.items())), None)
+        self._follows, self._camera_at = False, view
         self._meshcat = Meshcat(MeshcatParams(host=HOST, port=0, show_stats_plot=False))
-        for helper in ("/Grid", "/Axes"):
-            self._meshcat.SetProperty(helper, "visible", False)
-        if view is not None:
-            self._meshcat.SetCameraPose(np.array(view.p_WCamera), np.array(view.p_WTarget))
+        prepare_view(self._meshcat, view)
         self._shown = world.rebuild(self._meshcat)
         self._root_context = self._shown.diagram.CreateDefaultContext()
         self._shown_context = self._shown.plant.GetMyMutableContextFromRoot(self._root_context)
@@ -51,8 +52,21 @@ class LiveScene:
         """Refresh seldom, for a browser that draws without a graphics processor; from any thread."""
         self._period_s = EASY_PERIOD_WALL_S
 
+    def follow(self, wanted: bool) -> None:
+        """Let the camera go along with the first robot, or show the whole world again; from any thread."""
+        self._follows = wanted
+
     def publish(self) -> None:
         """Refresh the scene now."""
+        camera = self._camera()
+        if camera is not None and camera != self._camera_at:
+            set_camera(self._meshcat, camera)
+            self._camera_at = camera
         self._shown.plant.SetPositions(self._shown_context, self._plant.GetPositions(self._context))
         self._shown.diagram.ForcedPublish(self._root_context)
         self._published_s = time.perf_counter()
+
+    def _camera(self) -> View | None:
+        if self._follows and self._followed is not None:
+            return View.beside(self._followed.EvalPoseInWorld(self._context).translation())
+        return self._view

@@ -14,6 +14,8 @@ from plant.diagram import WorldDiagram
 from skills.robot import FloatArray
 
 FRAMES_PER_SECOND = 16.0
+BESIDE_M = (-0.7, -1.5, 3.0)
+"""Where a camera that goes along stands from the robot, in the world's axes."""
 
 
 @dataclass(frozen=True)
@@ -66,14 +68,32 @@ class View:
         size = float(np.linalg.norm(high - low))
         return View((x, y - 0.30 * size, 0.62 * size), (x, y, 0.0))
 
+    @staticmethod
+    def beside(p_W: FloatArray) -> View:
+        """Near a point, from where a robot of about a metre fills the picture."""
+        x, y, z = (float(value) for value in p_W)
+        dx, dy, dz = BESIDE_M
+        return View((x + dx, y + dy, z + dz), (x, y, z))
+
+
+def prepare_view(meshcat: Meshcat, view: View | None) -> None:
+    """Light without a grid and axes, and the camera on `view`."""
+    for helper in ("/Grid", "/Axes"):
+        meshcat.SetProperty(helper, "visible", False)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.6)
+    if view is not None:
+        set_camera(meshcat, view)
+
+
+def set_camera(meshcat: Meshcat, view: View) -> None:
+    """Put the camera of all browsers there."""
+    meshcat.SetCameraPose(np.array(view.p_WCamera), np.array(view.p_WTarget))
+
 
 def save_html(world: WorldDiagram, frames: Sequence[Frame], path: Path, view: View | None = None) -> None:
     """Write an animation of `frames` as one HTML file that needs no server and opens on `view`."""
     meshcat = Meshcat()
-    for helper in ("/Grid", "/Axes"):
-        meshcat.SetProperty(helper, "visible", False)
-    if view is not None:
-        meshcat.SetCameraPose(np.array(view.p_WCamera), np.array(view.p_WTarget))
+    prepare_view(meshcat, view)
     shown = world.rebuild(meshcat)
     root_context = shown.diagram.CreateDefaultContext()
     context = shown.plant.GetMyMutableContextFromRoot(root_context)

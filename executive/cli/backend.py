@@ -26,6 +26,9 @@ class Scene(Protocol):
     def go_easy(self) -> None:
         """Refresh it less often."""
 
+    def follow(self, wanted: bool) -> None:
+        """Let the camera go along with the robot, or show the whole world."""
+
 
 class Backend(Protocol):
     """A robot and its clock, and what there is besides: a referee, a recording, a live picture."""

@@ -18,7 +18,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.snapshot import NodeState, Snapshot
 from executive.view.styles import Styles, style_of
-from executive.view.text import printable, title_of, to_rich
+from executive.view.text import printable, to_rich
 
 REFRESH_S = 0.2
 BAR_CELLS = 20
@@ -124,7 +124,7 @@ class _Lines:
 def _skill_titles(node: NodeView, above: NodeView | None = None) -> dict[str, str]:
     """What the skills below do, by path id."""
     if node.kind == "skill":
-        return {node.path_id: title_of(node, above)}
+        return {node.path_id: node.title(above)}
     return {path_id: title for child in node.children for path_id, title in _skill_titles(child, node).items()}
 
 

@@ -50,7 +50,7 @@ class PageView:
         log.listen(self._feed)
         load_ahead()
         sentences = {"say": said(self._hear), **({} if self._later is None else {"queue": said(self._later)})}
-        actions = {**control_actions(self.control), **sentences, **({} if scene is None else {"ease": easing(scene)})}
+        actions = {**control_actions(self.control), **sentences, **({} if scene is None else scene_actions(scene))}
         content = PageContent(self._feed, actions, scene_url=None if scene is None else scene.url)
         self._server = served(content, self._port)
         self._watch = ControlWatch(self.control, self._feed)
@@ -120,14 +120,19 @@ def queueing(prepared: Prepared, *, store: Path, out: Path) -> Callable[[str], s
     return later
 
 
-def easing(scene: Scene) -> Action:
-    """An action for a browser that draws slowly: the scene is refreshed less often."""
+def scene_actions(scene: Scene) -> Mapping[str, Action]:
+    """What a page asks of the scene: fewer pictures for a browser that draws slowly, and where the camera stands."""
 
     def ease(_: Mapping[str, Any]) -> str:
         scene.go_easy()
         return "the scene is refreshed less often"
 
-    return ease
+    def follow(values: Mapping[str, Any]) -> str:
+        wanted = values.get("wanted") is True
+        scene.follow(wanted)
+        return "the camera follows the robot" if wanted else "the camera shows the whole world"
+
+    return {"ease": ease, "follow": follow}
 
 
 def log_map(log: EventLog, prepared: Prepared) -> None:

@@ -22,7 +22,9 @@ _MAY_GO_ON: Final = (MissionState.RUNNING, MissionState.CANCELLED, MissionState.
 
 def resume(
     store: Annotated[Path, typer.Option(help="Where the missions are kept.")] = Path("out") / STORE,
-    mission: Annotated[int | None, typer.Option(help="Its number; by default the one that was broken off or cancelled last.")] = None,
+    mission: Annotated[
+        int | None, typer.Option(help="Its number; by default the one that was broken off or cancelled last.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")] = False,
 ) -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from executive.record.drawable import stamp
 from executive.record.profile import Profile
-from executive.record.schemas import OUTCOME, POSE
+from executive.record.schemas import OUTCOME, POSE, STATE
 from executive.run.control import Control
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
@@ -22,7 +22,7 @@ from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
 from executive.tree.compiling.builder import slug, start_key
 from executive.tree.snapshot import NodeState, Snapshot
-from skills.api import Cause
+from skills.api import Cause, LocalisationEstimate
 from skills.robot import Pose2D
 
 POSE_PERIOD_S = 0.5
@@ -95,7 +95,7 @@ class Session:
         return self._top.waiting_at
 
     def sense(self) -> None:
-        """Bring the estimators up to date, and log the pose twice a second."""
+        """Bring the estimators up to date, and log pose and state twice a second."""
         context = self.context
         context.localiser.update(context.robot)
         estimate = context.localiser.estimate()
@@ -107,6 +107,7 @@ class Session:
         if context.clock.now() >= self._pose_due_s - _EPSILON_S:
             self._pose_due_s += POSE_PERIOD_S
             self._publish_pose()
+            self._publish_state(estimate)
 
     def may_move(self) -> bool:
         """Whether the lease counts. A lost one suspends the mission until it can be had again.
@@ -256,6 +257,21 @@ class Session:
                     "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
                 },
                 "yaw_rad": flat.yaw_rad,
+            },
+        )
+
+    def _publish_state(self, estimate: LocalisationEstimate) -> None:
+        """What an operator looks at: the gripper, the battery, the speed, and how well the place is known."""
+        robot = self.context.robot
+        self.context.publish(
+            STATE,
+            {
+                "robot": self.name,
+                "holding": robot.gripper().holding,
+                "charge": round(robot.battery().charge, 4),
+                "speed_m_s": round(math.hypot(*robot.odometry().velocity[:2]), 3),
+                "localised": estimate.localised,
+                "position_sigma_m": round(math.sqrt(estimate.covariance[0, 0] + estimate.covariance[1, 1]), 4),
             },
         )
 

@@ -37,15 +37,31 @@ class NodeView:
         for child in self.children:
             yield from child.walk(depth + 1)
 
-    def structure(self) -> dict[str, Any]:
-        """The tree without states, as it is logged."""
+    def title(self, above: NodeView | None = None) -> str:
+        """What the node does, and where or with what: a skill's texts and surfaces, the goal of a drive.
+
+        `above` is its parent, which knows what the goal of a drive is called.
+        """
+        if self.kind != "skill":
+            return self.name
+        if self.name == "navigate" and above is not None and above.name.startswith("go "):
+            return above.name
+        given = (port for port in self.ports if not (port.output or port.on_board) and port.value)
+        texts = [
+            port.value for port in given if "str" in port.type or ("Surface" in port.type and "," not in port.value)
+        ]
+        return self.name.replace("_", " ") + (f" ({'; '.join(texts)})" if texts else "")
+
+    def structure(self, above: NodeView | None = None) -> dict[str, Any]:
+        """The tree without states, as it is logged; `above` is its parent."""
         return {
             "id": self.path_id,
             "type": self.kind,
             "name": self.name,
+            "title": self.title(above),
             "source": _place(self.source),
             "ports": [asdict(port) for port in self.ports],
-            "children": [child.structure() for child in self.children],
+            "children": [child.structure(self) for child in self.children],
         }
 
 

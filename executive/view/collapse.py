@@ -8,7 +8,7 @@ from dataclasses import replace
 from py_trees.common import Status
 
 from executive.tree.node_view import NodeView
-from executive.view.text import closed, title_of
+from executive.view.text import closed
 
 MANY_NODES = 80
 DRAWN_NODES = 40
@@ -55,7 +55,7 @@ def _ran(node: NodeView, above: NodeView | None) -> NodeView:
     below = tuple(_ran(child, node) for child in node.children if not _unseen(child))
     if len(below) == 1 and (node.state.cause is None or node.state.message == below[0].state.message):
         return below[0]
-    return replace(node, name=title_of(node, above), children=below)
+    return replace(node, name=node.title(above), children=below)
 
 
 def _unseen(node: NodeView) -> bool:

@@ -73,20 +73,6 @@ def note_of(node: NodeView) -> str:
     return ": ".join(filter(None, (state.cause.value if state.cause else "", sentence)))
 
 
-def title_of(node: NodeView, above: NodeView | None = None) -> str:
-    """What a node does, and where or with what: a skill's texts and surfaces, the goal of a drive.
-
-    `above` is its parent, which knows what the goal of a drive is called.
-    """
-    if node.kind != "skill":
-        return node.name
-    if node.name == "navigate" and above is not None and above.name.startswith("go "):
-        return above.name
-    given = (port for port in node.ports if not (port.output or port.on_board) and port.value)
-    texts = [port.value for port in given if "str" in port.type or ("Surface" in port.type and "," not in port.value)]
-    return node.name.replace("_", " ") + (f" ({'; '.join(texts)})" if texts else "")
-
-
 def closed(node: NodeView) -> bool:
     """True of a node that is done well or not begun: what lies below it can be left out of sight."""
     return node.state.status in (Status.SUCCESS, Status.INVALID) and node.state.cause is None

@@ -22,10 +22,10 @@ def surface_names(surfaces: Sequence[Surface]) -> str:
 
 
 def describe(seen: ObjectObservation) -> str:
-    """ "a red coke on the kitchen table at (1.00, 2.00, 0.80), score 0.90"."""
+    """ "a red coke on the kitchen table, score 0.90"; where no surface is known, its position in the world (m)."""
     x, y, z = seen.position_W
-    place = f" on the {seen.surface}" if seen.surface else ""
-    return f"a {seen.thing}{place} at ({x:.2f}, {y:.2f}, {z:.2f}), score {seen.score:.2f}"
+    place = f"on the {seen.surface}" if seen.surface else f"at ({x:.2f}, {y:.2f}, {z:.2f})"
+    return f"a {seen.thing} {place}, score {seen.score:.2f}"
 
 
 def counted(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> str:

@@ -168,7 +168,7 @@ class Navigate(Skill[NavigateInputs]):
             if self._now() < self._wait_until_s:
                 return Running(self._waiting_sentence())
             self._ask_for_plan()
-        return self._take_plan() or Running(f"planning a way to {_place(self._inputs.goal)}")
+        return self._take_plan() or Running("planning a path")
 
     def _take_plan(self) -> Step | None:
         """Take over a plan that is done; a failure when planning failed for good."""
@@ -258,7 +258,7 @@ class Navigate(Skill[NavigateInputs]):
 
     def _progress(self, remaining_m: float) -> Running:
         done = 1.0 - remaining_m / max(self._whole_m or remaining_m, remaining_m, 1e-3)
-        return Running(f"going to {_place(self._inputs.goal)}, {remaining_m:.1f} m to go", min(1.0, max(0.0, done)))
+        return Running(f"on the way, {remaining_m:.1f} m to go", min(1.0, max(0.0, done)))
 
     def _note_block(self, blocked_at: tuple[float, float] | None) -> None:
         if blocked_at is None:
@@ -315,9 +315,7 @@ class Navigate(Skill[NavigateInputs]):
             return Running("stopping at the goal", 1.0)
         self._base.stop()
         off = relative(self._inputs.goal, self.context.pose())
-        sentence = (
-            f"{math.hypot(off.x_m, off.y_m):.2f} m and {abs(off.yaw_rad):.2f} rad from {_place(self._inputs.goal)}"
-        )
+        sentence = f"{math.hypot(off.x_m, off.y_m):.2f} m and {abs(off.yaw_rad):.2f} rad off the goal"
         if not still:
             return Failed(Cause.POSTCONDITION, f"The robot does not come to rest; it is {sentence}.")
         if not self._arrived(self.context.pose(), 1.0):

@@ -37,6 +37,20 @@ def test_it_is_refreshed_a_few_times_a_second_of_the_wall(simulation, monkeypatc
     assert len(shown) == pytest.approx(1.6 * refreshed, rel=0.4)
 
 
+def test_the_camera_goes_along_with_the_robot_where_that_is_wanted(simulation, monkeypatch):
+    # at first the whole world; following: beside the robot's body; no longer: the whole world again
+    scene = simulation.show_live()
+    cameras = []
+    monkeypatch.setattr(live_scene, "set_camera", lambda _, view: cameras.append(view.p_WTarget))
+    for wanted in (False, True, False):
+        scene.follow(wanted)
+        scene.publish()
+    start = load_world("flat").start
+    beside, whole = cameras
+    assert beside[:2] == pytest.approx((start.x_m, start.y_m), abs=0.05)
+    assert whole[2] == 0.0
+
+
 def test_it_shows_the_plant_as_it_is(simulation):
     scene = simulation.show_live()
     simulation.clock.advance(0.3)

@@ -4,11 +4,10 @@
   const { LOOKS, lookOf, element } = window.errand;
   const MOST = 600;
 
-  const metres = (value) => (value === null || value === undefined ? "?" : value.toFixed(2));
   const TEXTS = {
     run: (data) => ["run", `world ${data.world}, seed ${data.seed}: ${(data.commands || []).join(" · ")}`],
     object_to_detect: (data) => ["look for", data.class_name.join(", ")],
-    object_destination: (data) => ["found", `${data.class_name} at (${metres(data.goal_x)}, ${metres(data.goal_y)}, ${metres(data.goal_z)}) m`],
+    object_destination: (data) => ["found", data.class_name],
     errors: (data) => ["defect", (data.traceback || "").trim().split("\n").pop()],
     control: (data) => [data.what || "control", data.message || ""],
     question: (data) => ["question", data.text || data.message || ""],
@@ -45,9 +44,7 @@
       const failed = look === "failure" || look === "cancelled";
       if (this.choice.value === "failures" ? !failed : this.choice.value === "leaves" && !known.leaf) return null;
       if (look === "idle") return null;
-      const parts = data.node.split("/");
-      const what = known.leaf ? parts.slice(2).join(" / ") || data.node : known.name || data.node;
-      return { t, look, what, why: [data.cause, data.message].filter(Boolean).join(": ") };
+      return { t, look, what: known.name || data.node, why: [data.cause, data.message].filter(Boolean).join(": ") };
     }
 
     draw(t, following) {

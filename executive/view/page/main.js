@@ -1,7 +1,7 @@
 "use strict";
 // Puts the page together: messages come from the server while a run is under way, or stand in the page itself.
 (() => {
-  const { Store, TreePanel, MapPanel, Header, CameraPanel, ScenePanel, QuestionPanel, EventPanel, Timeline, ControlPanel, drawsSlowly, byId } = window.errand;
+  const { Store, TreePanel, MapPanel, Header, StatePanel, StepsPanel, decisive, CameraPanel, ScenePanel, QuestionPanel, EventPanel, Timeline, ControlPanel, drawsSlowly, byId } = window.errand;
   const recorded = byId("recorded") ? JSON.parse(byId("recorded").textContent) : null;
   const token = new URLSearchParams(location.search).get("token") || "";
   const store = new Store();
@@ -17,9 +17,11 @@
     follow: byId("follow"),
     onBreakpoint: (node, wanted) => control.do(wanted ? "break" : "unbreak", { node }),
   });
+  const state = new StatePanel(byId("state"));
+  const steps = new StepsPanel(byId("steps"), (node) => tree.goTo(node));
   const map = new MapPanel(byId("map"), byId("where"));
   const camera = new CameraPanel(byId("camera"), byId("seen"), addressOf);
-  const scene = new ScenePanel(byId("scene"));
+  const scene = new ScenePanel(byId("scene"), byId("beside"));
   const questions = new QuestionPanel(byId("questions"), (id, text) => (id === null ? control.answer(text) : control.do("answer", { id, text })));
   const timeline = new Timeline(store, () => schedule());
   const events = new EventPanel(byId("events"), byId("events-shown"), store, (t) => { timeline.hold(); timeline.go(t); });
@@ -46,14 +48,17 @@
   function draw() {
     const replaying = !timeline.following;
     const view = replaying ? store.at(timeline.t) : store.now;
-    const state = store.live.control || null;
+    const told = store.live.control || null;
     tree.progress = replaying ? null : store.live.progress;
-    tree.breakpoints = state && state.mode !== "ended" && control.actions.has("break") ? new Set(state.breakpoints) : null;
-    tree.at = state ? state.at : null;
-    tree.draw(view);
+    tree.breakpoints = told && told.mode !== "ended" && control.actions.has("break") ? new Set(told.breakpoints) : null;
+    tree.at = told ? told.at : null;
+    tree.decisive = decisive(store, view);
+    steps.draw(store, view, replaying ? view.t : store.end);
+    state.draw(view);
     header.draw(store, view, replaying);
-    control.draw(state, store.now.outcomes.length > 0);
-    questions.draw(state ? [...state.questions, ...askedBack(state)] : [], store.end);
+    tree.draw(view); // it scrolls, so all else has its place before
+    control.draw(told, store.now.outcomes.length > 0);
+    questions.draw(told ? [...told.questions, ...askedBack(told)] : [], store.end);
     measure();
     slowly(view);
   }
@@ -64,6 +69,16 @@
     const waits = asked && state.mode !== "ended" && control.actions.has("say") && asked.until_s > store.end;
     return waits ? [{ ...asked, id: null, default: null, options: asked.options.length ? [...asked.options, "never mind"] : [] }] : [];
   }
+
+  function seekScene() {
+    const [robot] = latest ? latest.robots.values() : [];
+    scene.seek(timeline.t, robot && robot.pose);
+  }
+
+  byId("beside").addEventListener("change", () => {
+    if (control.actions.has("follow")) control.do("follow", { wanted: byId("beside").checked });
+    seekScene();
+  });
 
   const SLOW_MS = 150;
   let drawn = 0, due = null, latest = null;
@@ -77,7 +92,7 @@
       camera.draw(latest);
       events.draw(timeline.t, timeline.following);
       timeline.drawMarks();
-      scene.seek(timeline.t);
+      seekScene();
     }, Math.max(20, SLOW_MS - (performance.now() - drawn)));
   }
 
@@ -87,7 +102,10 @@
       if (greeted && message.topic === "transitions") fresh.push(message.sent_ms);
       if (message.topic === "map") map.setMap(message.data, addressOf(message.data.picture)).catch(() => {});
       if (message.live === "hello") greet(message.data);
-      if (message.live === "recording" && message.data.address) scene.show(`${message.data.address}?token=${encodeURIComponent(token)}`, true);
+      if (message.live === "recording" && message.data.address) {
+        byId("camera-follows").hidden = false;
+        scene.show(`${message.data.address}?token=${encodeURIComponent(token)}`, true);
+      }
       if (message.live === "progress") store.end = Math.max(store.end, message.data.now_s);
     }
     timeline.grow();
@@ -99,6 +117,8 @@
     timeline.setLive(actions.length > 0);
     if (recording) scene.show(`${recording}?token=${encodeURIComponent(token)}`, true);
     else scene.show(address, false);
+    byId("camera-follows").hidden = !(address || recording);
+    if (control.actions.has("follow")) control.do("follow", { wanted: byId("beside").checked });
     if (control.actions.has("ease") && drawsSlowly()) control.do("ease");
   }
 
@@ -139,12 +159,13 @@
 
   if (recorded) {
     take(recorded.messages);
+    byId("camera-follows").hidden = !recorded.scene;
     if (recorded.scene) scene.showText(recorded.scene);
     timeline.go(timeline.store.end);
   } else {
     connect();
   }
   // A recording that loads when all else is drawn follows, too, and shows textures that come still later.
-  setInterval(() => scene.seek(timeline.t), 500);
+  setInterval(seekScene, 500);
   window.errand.page = { store, timeline, delays };
 })();

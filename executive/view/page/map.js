@@ -77,7 +77,7 @@
       this.drawParticles(brush, frame);
       this.drawThings(brush, frame);
       const said = [];
-      for (const [name, robot] of this.view.robots) if (robot.pose) said.push(this.drawRobot(brush, frame, name, robot.pose));
+      for (const [name, robot] of this.view.robots) if (robot.pose) said.push(this.drawRobot(brush, frame, name, robot));
       this.where.textContent = said.join("; ");
       this.canvas.setAttribute("aria-label", `Map. ${said.join("; ")}`);
     }
@@ -119,14 +119,19 @@
       const latest = new Map(this.view.destinations.map((each) => [each.name, each]));
       for (const { name, x, y } of latest.values()) {
         const [u, v] = at(x, y);
-        brush.beginPath();
-        brush.moveTo(u, v - 6); brush.lineTo(u + 6, v); brush.lineTo(u, v + 6); brush.lineTo(u - 6, v); brush.closePath();
-        brush.fillStyle = "#e69f00";
-        brush.strokeStyle = css("--text");
-        brush.lineWidth = 1;
-        brush.fill(); brush.stroke();
+        this.mark(brush, u, v);
         this.halo(brush, name, u + 9, v + 4);
       }
+    }
+
+    // An object.
+    mark(brush, u, v) {
+      brush.beginPath();
+      brush.moveTo(u, v - 6); brush.lineTo(u + 6, v); brush.lineTo(u, v + 6); brush.lineTo(u - 6, v); brush.closePath();
+      brush.fillStyle = "#e69f00";
+      brush.strokeStyle = css("--text");
+      brush.lineWidth = 1;
+      brush.fill(); brush.stroke();
     }
 
     halo(brush, text, u, v) {
@@ -137,7 +142,7 @@
       brush.fillText(text, u, v);
     }
 
-    drawRobot(brush, { at, scale }, name, { x, y, yaw }) {
+    drawRobot(brush, { at, scale }, name, { pose: { x, y, yaw }, held }) {
       const [u, v] = at(x, y), length = Math.max(LENGTH_M * scale, 16), width = Math.max(WIDTH_M * scale, 8);
       brush.save();
       brush.translate(u, v);
@@ -152,9 +157,10 @@
       brush.restore();
       brush.font = `600 11px ${css("--font")}`;
       brush.textAlign = "left";
-      this.halo(brush, name, u + 12, v - 10);
+      this.halo(brush, held ? `${name}, holding ${held}` : name, u + 12, v - 10);
+      if (held) this.mark(brush, ...at(x + (LENGTH_M / 2) * Math.cos(yaw), y + (LENGTH_M / 2) * Math.sin(yaw)));
       const degrees = Math.round((yaw * 180) / Math.PI);
-      return `${name} at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, ${degrees}°`;
+      return `${name} at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, ${degrees}°${held ? `, holding ${held}` : ""}`;
     }
   }
 

@@ -1,7 +1,8 @@
 "use strict";
 // The header, the hand camera, the 3D scene, and questions.
 (() => {
-  const { LOOKS, element } = window.errand;
+  const { LOOKS, lookOf, element } = window.errand;
+  const LOW_CHARGE = 0.2;
   const SVG = "http://www.w3.org/2000/svg";
   const byId = (id) => document.getElementById(id);
 
@@ -30,6 +31,81 @@
     return root.children.map(missionOf).find((node) => node.id.split("/").length === 2) || root;
   }
 
+  // The leaf that decided a failure: the one whose sentence the outcome tells, or the last that failed.
+  function decisive(store, view) {
+    const outcome = view.outcomes[view.outcomes.length - 1];
+    if (!outcome || outcome.outcome === "success" || outcome.outcome === "cancelled") return null;
+    const failed = [...view.states].filter(([id, state]) => state.status === "FAILURE" && (store.known.get(id) || {}).leaf);
+    const told = failed.filter(([, state]) => state.message && (outcome.message || "").includes(state.message));
+    const latest = (told.length ? told : failed).reduce((best, each) => (best && best[1].t > each[1].t ? best : each), null);
+    return latest && latest[0];
+  }
+
+  // What an operator looks at first: what is held, the battery, how well the place is known, the speed.
+  class StatePanel {
+    constructor(box) { Object.assign(this, { box, shown: "" }); }
+
+    draw(view) {
+      const robots = [...view.robots].filter(([, robot]) => robot.state);
+      const rows = robots.map(([name, robot]) => [name, this.facts(robot)]);
+      const key = JSON.stringify(rows);
+      if (key === this.shown) return;
+      this.shown = key;
+      this.box.replaceChildren(...rows.map(([name, facts]) => this.row(name, facts)));
+    }
+
+    facts({ held, state }) {
+      const { charge, localised, position_sigma_m: sigma_m, speed_m_s: speed } = state;
+      return [
+        ["holds", held || "nothing", false],
+        ["battery", `${Math.round(100 * charge)} %`, charge < LOW_CHARGE],
+        ["place", localised ? `known within ${Math.max(1, Math.round(200 * sigma_m))} cm` : "lost", !localised],
+        ["speed", `${speed.toFixed(1)} m/s`, false],
+      ];
+    }
+
+    row(name, facts) {
+      const list = element("dl", "facts");
+      for (const [term, text, bad] of [["robot", name, false], ...facts]) {
+        const pair = element("div", bad ? "bad" : "");
+        pair.append(element("dt", "", term), element("dd", "", text));
+        list.append(pair);
+      }
+      return list;
+    }
+  }
+
+  // The mission's own steps: done, under way, to come; a click shows one in the tree.
+  class StepsPanel {
+    constructor(box, onChoose) { Object.assign(this, { box, onChoose, shown: "" }); }
+
+    draw(store, view, now) {
+      const tree = view.trees[view.trees.length - 1], mission = tree && missionOf(tree.root);
+      const steps = !mission ? [] : mission.type === "sequence" ? mission.children : [mission];
+      const rows = steps.filter((step) => step.type !== "remember").map((step) => {
+        const span = view.spans.get(step.id), look = lookOf(view.states.get(step.id));
+        const took = span && look !== "idle" ? (span.over ? span.to : now) - span.from : null;
+        return { id: step.id, name: step.name, look, took: took === null ? "" : `${took.toFixed(0)} s` };
+      });
+      const key = JSON.stringify(rows);
+      if (key === this.shown) return;
+      this.shown = key;
+      this.box.replaceChildren(...rows.map((row) => this.item(row)));
+    }
+
+    item({ id, name, look, took }) {
+      const li = element("li"), button = element("button");
+      li.dataset.look = look;
+      button.type = "button";
+      button.title = `${name}: ${LOOKS[look].word}`;
+      button.setAttribute("aria-label", `${name}, ${LOOKS[look].word}`);
+      button.append(element("span", "symbol", LOOKS[look].symbol), element("span", "name", name), element("span", "t", took));
+      button.addEventListener("click", () => this.onChoose(id));
+      li.append(button);
+      return li;
+    }
+  }
+
   class Header {
     draw(store, view, replaying) {
       const tree = view.trees[view.trees.length - 1];
@@ -46,6 +122,9 @@
       const pill = byId("mode");
       pill.dataset.look = look;
       pill.title = why || "";
+      const failed = view.outcomes.length > 0 && look === "failure";
+      byId("why").hidden = !failed;
+      byId("why").textContent = failed ? why : "";
       pill.firstElementChild.textContent = symbol;
       if (byId("mode-text").textContent !== text) {
         byId("mode-text").textContent = text;
@@ -105,8 +184,12 @@
   }
 
   // The scene while it runs, or its recording, which follows the slider.
+  const BESIDE_M = [-0.7, 3.0, 1.5];
+
   class ScenePanel {
-    constructor(box) { this.box = box; this.address = null; this.recorded = false; }
+    constructor(box, follow) {
+      Object.assign(this, { box, follow, address: null, recorded: false, before: null });
+    }
 
     show(address, recorded) {
       if (!address || address === this.address) return;
@@ -123,20 +206,42 @@
     }
 
     put(properties) {
-      const frame = Object.assign(element("iframe"), properties);
-      this.box.replaceChildren(frame);
-      this.frame = frame;
+      const frame = Object.assign(element("iframe"), properties), loading = element("p", "nothing loading", "Loading the 3D scene …");
+      if (!this.recorded) frame.addEventListener("load", () => loading.remove());
+      this.box.replaceChildren(frame, loading);
+      Object.assign(this, { frame, loading, before: null });
     }
 
-    seek(t) {
+    // Show the recording at a time, with the camera beside a robot at a pose.
+    seek(t, pose) {
       if (!this.recorded || !this.frame) return;
       try {
         const viewer = this.frame.contentWindow.viewer;
         const animator = viewer && viewer.animator;
         if (!animator || !animator.duration) return;
+        this.loading.remove();
         animator.pause();
         animator.seek(Math.min(t, animator.duration));
+        this.goAlong(viewer, pose);
       } catch { /* the recording is not there yet */ }
+    }
+
+    // The camera keeps the side from which it was turned to look at the robot. The scene's y axis points up.
+    goAlong(viewer, pose) {
+      const { camera, controls } = viewer, wanted = this.follow.checked && pose;
+      if (!wanted && !this.before) return;
+      if (!wanted) {
+        camera.position.copy(this.before.camera);
+        controls.target.copy(this.before.target);
+        this.before = null;
+      } else {
+        const aside = this.before ? camera.position.clone().sub(controls.target) : camera.position.clone().set(...BESIDE_M);
+        this.before = this.before || { camera: camera.position.clone(), target: controls.target.clone() };
+        controls.target.set(pose.x, 0.5, -pose.y);
+        camera.position.copy(controls.target).add(aside);
+      }
+      controls.update();
+      viewer.set_dirty();
     }
   }
 
@@ -181,5 +286,5 @@
     }
   }
 
-  Object.assign(window.errand, { Header, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
+  Object.assign(window.errand, { Header, StatePanel, StepsPanel, decisive, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
 })();

@@ -16,11 +16,11 @@
   }
 
   function emptyView() {
-    return { t: 0, trees: [], states: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [], particles: null };
+    return { t: 0, trees: [], spans: new Map(), states: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [], particles: null };
   }
 
   function robotOf(view, name) {
-    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null });
+    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null });
     return view.robots.get(name);
   }
 
@@ -32,6 +32,9 @@
     },
     transitions(view, data, t) {
       view.states.set(data.node, { status: data.to, cause: data.cause, message: data.message, t });
+      const span = view.spans.get(data.node);
+      if (span && !span.over) Object.assign(span, { to: t, over: data.to !== "RUNNING" });
+      else view.spans.set(data.node, { from: span ? span.from : t, to: t, over: data.to !== "RUNNING" });
     },
     activity(view, data) {
       const state = view.states.get(data.node);
@@ -41,6 +44,14 @@
       const robot = robotOf(view, data.robot), { position, orientation } = data.pose;
       robot.pose = { x: position.x, y: position.y, yaw: 2 * Math.atan2(orientation.z, orientation.w) };
       robot.trail.push([position.x, position.y]);
+    },
+    // What is held is what was found last; it is no longer where it was found.
+    state(view, data) {
+      const robot = robotOf(view, data.robot), found = view.destinations[view.destinations.length - 1];
+      if (!data.holding) robot.held = null;
+      else if (!robot.held) robot.held = found ? found.name : "something";
+      if (robot.held) view.destinations = view.destinations.filter((each) => each.name !== robot.held);
+      robot.state = data;
     },
     path(view, data) {
       robotOf(view, data.robot).path = data.poses.map((pose) => [pose.position.x, pose.position.y]);
@@ -75,7 +86,7 @@
     }
 
     learn(node, depth) {
-      this.known.set(node.id, { name: node.name, kind: node.type, leaf: node.children.length === 0, depth });
+      this.known.set(node.id, { name: node.title || node.name, kind: node.type, leaf: node.children.length === 0, depth });
       node.children.forEach((child) => this.learn(child, depth + 1));
     }
 

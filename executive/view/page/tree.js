@@ -19,6 +19,7 @@
       this.nodes = new Map();
       this.drawn = [];
       this.breakpoints = null;
+      this.decisive = null;
       root.addEventListener("keydown", (event) => this.key(event));
       follow.addEventListener("change", () => { this.forgetFolds(); this.redraw(); });
     }
@@ -116,7 +117,7 @@
       const note = this.noteOf(entry, state, progress), cause = (state && state.cause) || "";
       const done = progress && typeof progress.progress === "number" ? progress.progress : null;
       const stops = this.breakpoints ? this.breakpoints.has(entry.node.id) : null;
-      const key = [look, cause, note, done, entry.open, stops, this.at === entry.node.id].join("\u0001");
+      const key = [look, cause, note, done, entry.open, stops, this.at === entry.node.id, this.decisive === entry.node.id].join("\u0001");
       if (entry.key === key) return;
       entry.key = key;
       entry.row.dataset.look = look;
@@ -137,6 +138,7 @@
       entry.dot.hidden = !this.breakpoints;
       entry.dot.setAttribute("aria-pressed", Boolean(stops));
       entry.row.classList.toggle("at", this.at === entry.node.id);
+      entry.row.classList.toggle("decisive", this.decisive === entry.node.id);
     }
 
     // The sentence, only where it is not a child's already.
@@ -149,11 +151,20 @@
 
     showRunning() {
       const running = [...this.nodes.values()].filter((entry) => entry.row.dataset.look === "running");
-      const last = running[running.length - 1];
+      const last = this.nodes.get(this.decisive) || running[running.length - 1];
       if (!last || this.followed === last || this.root.contains(document.activeElement)) return;
       this.followed = last;
       const box = this.root.getBoundingClientRect(), row = last.row.getBoundingClientRect();
       if (row.top < box.top + 20 || row.bottom > box.bottom - 20) this.root.scrollTop += row.top - box.top - box.height / 2;
+    }
+
+    // Unfold the way to a node and go there.
+    goTo(id) {
+      const entry = this.nodes.get(id);
+      if (!entry) return;
+      for (let up = entry; up; up = up.parent) up.chosen = true;
+      this.redraw();
+      this.focus(entry);
     }
 
     focus(entry) {

@@ -55,7 +55,7 @@ def test_log_and_tree_are_left_as_after_a_simulated_run(prepared):
     out = prepared.request.out
     assert sorted(path.name for path in out.iterdir()) == ["log.mcap", "tree.svg"]
     topics = {event.topic for event in read_events(out / "log.mcap")}
-    assert {"map", "run", "tree", "transitions", "pose", "outcome"} <= topics
+    assert {"map", "run", "tree", "transitions", "pose", "state", "outcome"} <= topics
 
 
 def test_a_run_whose_tree_fails_is_not_achieved(prepared):

@@ -100,5 +100,17 @@ def test_a_mission_is_told_to_the_page_while_it_runs_and_after(tmp_path):
         report = json.loads(process.stdout.read().splitlines()[-1])
     topics = {message.get("topic") or message.get("live") for message in told}
     assert report["outcome"] == "success"
-    assert {"hello", "map", "run", "tree", "transitions", "pose", "path", "progress", "control", "outcome"} <= topics
+    assert {
+        "hello",
+        "map",
+        "run",
+        "tree",
+        "transitions",
+        "pose",
+        "state",
+        "path",
+        "progress",
+        "control",
+        "outcome",
+    } <= topics
     assert next(message["data"]["outcome"] for message in told if message.get("topic") == "outcome") == "success"

@@ -377,6 +377,88 @@ def test_a_log_is_served_with_map_picture_and_events(page, log_path):
         assert float(page.locator("#slider").input_value()) > 0
 
 
+def state(holding: bool = False, charge: float = 0.9, localised: bool = True) -> dict[str, object]:
+    return {
+        "robot": "Alice", "holding": holding, "charge": charge,
+        "localised": localised, "position_sigma_m": 0.02, "speed_m_s": 0.42,
+    }  # fmt: skip
+
+
+def test_the_state_of_the_robot_stands_above_all(page, live):
+    # nothing known yet -> no strip; a coke was found and is held -> its name; 1 sigma of 2 cm -> known within 4 cm
+    feed, _, url = live
+    page.goto(url)
+    strip = page.locator("#state")
+    playwright_api.expect(strip).to_be_hidden()
+    feed("object_destination", 0.5, {"class_name": "coke", "goal_x": 1.0, "goal_y": 1.0})
+    feed("state", 1.0, state(holding=True))
+    playwright_api.expect(strip).to_have_text("robotAliceholdscokebattery90 %placeknown within 4 cmspeed0.4 m/s")
+    feed("state", 1.5, state(charge=0.1, localised=False))
+    playwright_api.expect(strip.locator(".bad")).to_have_text(["battery10 %", "placelost"])
+    playwright_api.expect(strip).to_contain_text("holdsnothing")
+
+
+def test_what_is_held_is_drawn_with_the_robot_on_the_map(page, live):
+    feed, _, url = live
+    page.goto(url)
+    pose = {"position": {"x": 1.0, "y": 2.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    feed("pose", 0.5, {"robot": "Alice", "pose": pose})
+    feed("object_destination", 0.5, {"class_name": "coke", "goal_x": 1.0, "goal_y": 1.0})
+    feed("state", 1.0, state(holding=True))
+    playwright_api.expect(page.locator("#map")).to_have_attribute("aria-label", re.compile("Alice at .*holding coke"))
+    assert page.evaluate("window.errand.page.store.now.destinations.length") == 0
+
+
+def test_the_steps_of_the_mission_stand_above_the_tree(page, live):
+    # first step done after 2 s, second under way; a click shows a step in the tree
+    feed, tree, url = live
+    mission = next(node for node in tree.root.walk() if node.path_id.count("/") == 1 and node.kind == "sequence")
+    first, second = [step.path_id for step in mission.children if step.kind != "remember"]
+    page.goto(url)
+    steps = page.locator("#steps li")
+    playwright_api.expect(steps).to_have_count(2)
+    change(feed, first, "RUNNING", 1.0)
+    change(feed, first, "SUCCESS", 3.0, "done")
+    change(feed, second, "RUNNING", 3.0)
+    playwright_api.expect(steps.nth(1)).to_have_attribute("data-look", "running")
+    playwright_api.expect(steps.nth(0)).to_have_attribute("data-look", "success")
+    playwright_api.expect(steps.nth(0).locator(".t")).to_have_text("2 s")
+    steps.nth(1).locator("button").click()
+    playwright_api.expect(row(page, second)).to_be_visible()
+    assert page.evaluate("document.activeElement.dataset.id") == second
+
+
+def test_the_leaf_that_decided_a_failure_is_in_view_and_its_sentence_stands_on_top(page, log_path):
+    with PageServer(PageContent(fed(read_history(log_path).events))) as server:
+        page.goto(server.url)
+        playwright_api.expect(page.locator("#why")).to_contain_text("it slipped")
+        leaf = page.locator(".row.decisive")
+        playwright_api.expect(leaf).to_contain_text("it slipped")
+        playwright_api.expect(leaf).to_be_in_viewport()
+
+
+def test_a_run_that_goes_well_has_no_failure_on_top(page, live):
+    feed, _, url = live
+    page.goto(url)
+    feed("outcome", 2.0, {"robot": "Alice", "outcome": "success", "cause": None, "message": "done"})
+    playwright_api.expect(page.locator("#mode-text")).to_have_text("success")
+    assert page.locator("#why").is_hidden()
+
+
+def test_events_name_what_was_done_and_not_path_ids(page, log_path):
+    with PageServer(PageContent(fed(read_history(log_path).events))) as server:
+        page.goto(server.url)
+        playwright_api.expect(page.locator("#events")).to_contain_text("go to the")
+        assert "/" not in "".join(page.locator("#events .what").all_inner_texts()).replace("</", "")
+
+
+def test_the_scene_says_that_it_loads_until_it_is_there(page, log_path, recording):
+    with PageServer(PageContent(fed(read_history(log_path).events), recording=recording)) as server:
+        page.goto(server.url)
+        playwright_api.expect(page.locator("#scene .loading")).to_be_visible()
+        playwright_api.expect(page.locator("#scene .loading")).to_have_count(0)
+
+
 def test_a_replay_of_one_file_works_without_a_server(page, log_path, tmp_path):
     html = tmp_path / "replay.html"
     html.write_text(to_html(read_history(log_path).events), encoding="utf-8")

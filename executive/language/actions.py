@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
+from itertools import takewhile, zip_longest
 from typing import Final
 
 from executive.language.clauses import Clause
@@ -37,7 +37,7 @@ class Action:
     `kind` is None for a statement, which only tells where something is. `said` is all that was said of it, `unknown`
     the words that do not fit, `choices` phrases of which only one can be meant, `teller` who told by what they did.
     `departs` says that a place is only left, `ways` are where the way was said to lead past, `time` is how long it is
-    to be waited.
+    to be waited. `anew` says that "then" or "after that" stood before it.
     """
 
     kind: VerbKind | None
@@ -52,12 +52,14 @@ class Action:
     departs: bool = False
     ways: tuple[Location, ...] = ()
     time: Phrase | None = None
+    anew: bool = False
 
 
 _ELIDING: Final = frozenset({VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PLACE, VerbKind.FIND})
 _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
 _FRONTED: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
 _AROUND: Final = frozenset({"around", "by"})
+_THEN: Final = frozenset({"then", "after that", "afterwards", "next", "second", "subsequently"})
 _IF: Final = "if"
 _OUT_OF: Final = "out of"
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
@@ -66,7 +68,11 @@ _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 def read_actions(clauses: Sequence[Clause], words: Lexicon) -> tuple[Action, ...]:
     """The actions of all clauses, in order."""
     merged = list(_without_checks(_without_reasons(_with_fronted(clauses))))
-    found = [replace(action, said=_said(clause)) for clause in merged for action in _actions(clause, words)]
+    found = [
+        replace(action, said=_said(clause), anew=before is not None and _ends_with_then(before))
+        for before, clause in zip([None, *merged], merged, strict=False)
+        for action in _actions(clause, words)
+    ]
     found = list(_with_elided(found))
     last = [replace(action, unknown=(action.said,)) if action.departs else action for action in found[-1:]]
     return tuple(action for action in found[:-1] if not _goes_nowhere(action)) + tuple(last)
@@ -82,6 +88,12 @@ def _with_elided(actions: Sequence[Action]) -> Iterator[Action]:
             action = replace(action, unknown=(), objects=(_IT,))
         things = things or any(not phrase.speaker for phrase in action.objects)
         yield action
+
+
+def _ends_with_then(clause: Clause) -> bool:
+    """Whether "then" or "after that" stands at its end, before the next verb."""
+    end = takewhile(lambda item: isinstance(item, Separator), reversed(clause.items))
+    return any(isinstance(item, Separator) and item.word in _THEN for item in end)
 
 
 def _said(clause: Clause) -> str:

@@ -93,11 +93,12 @@ def _carries_somewhere(action: ResolvedAction) -> bool:
 
 
 def _join_going(actions: Sequence[ResolvedAction]) -> tuple[ResolvedAction, ...]:
-    """Give the place of a bare "go" to the next action, where that lacks one."""
+    """Give the place of a bare "go" to the next action, where that lacks one; "then fetch" is an errand of its own."""
     joined: list[ResolvedAction] = []
     for action in actions:
         before = joined[-1] if joined and joined[-1].kind is VerbKind.GO else None
-        takes_source = before and action.kind in _GOES_FOR and action.source is None and not action.again
+        own = action.anew and action.kind is VerbKind.ROUND_TRIP
+        takes_source = before and action.kind in _GOES_FOR and action.source is None and not (action.again or own)
         takes_goal = before and action.kind is VerbKind.PLACE and action.goal is None
         there = before and action.kind in _GOES_FOR and action.source is not None and action.source.within is None
         same = before and there and before.goal and action.source and before.goal.name == action.source.name

@@ -23,7 +23,7 @@ _SEVERAL: Final = frozenset({"them", "they", "these", "those"})
 class ResolvedAction:
     """An action on one thing at most, without pronouns; `again` says that the thing was spoken of before.
 
-    `time` is how long it is to be waited.
+    `time` is how long it is to be waited, `anew` says that "then" stood before it.
     """
 
     kind: VerbKind
@@ -33,6 +33,7 @@ class ResolvedAction:
     goal: Location | None = None
     again: bool = False
     time: Phrase | None = None
+    anew: bool = False
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,7 @@ def _done(action: Action, kind: VerbKind, before: Resolved) -> Resolved:
             goal=goal,
             again=same,
             time=action.time,
+            anew=action.anew,
         )
         for thing in things or (None,)
         for same in [again or (thing is not None and thing not in meant)]

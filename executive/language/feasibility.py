@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 from executive.language.grounding import ABLE
@@ -36,10 +37,8 @@ def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | Non
     people = [f"{d.verb} {d.target.text}" for d in actions if _carries(d) and d.target is not None and d.target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {ABLE}", people)
-    finds = (d.target for d in actions if d.kind is VerbKind.FIND and d.target is not None)
-    sought = [phrase.spoken for phrase in finds if _anyone(phrase)]
-    if sought and knowledge is not None:
-        raise RefusalError(f"I can look for things, not for people like {listing(map(repr, sought))}", sought)
+    if knowledge is not None:
+        actions = [replace(action, target=None) if _asks_for_people(action) else action for action in actions]
     moved = [action.target for action in actions if _moved(action)]
     outside = [(part, part) for action in actions for part in _outside(action, action.target in moved)]
     if outside:
@@ -124,9 +123,11 @@ def _holdable(phrase: Phrase, action: ResolvedAction) -> bool:
     return not _light(phrase, action) and (phrase.kind is None or phrase.kind.within_reach)
 
 
-def _anyone(phrase: Phrase) -> bool:
-    """Whether it is somebody, or any person at all ("is anybody in the hall")."""
-    return phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
+def _asks_for_people(action: ResolvedAction) -> bool:
+    """Whether it asks where somebody is, or whether there is any person at all ("is anybody in the hall")."""
+    phrase = action.target if action.kind is VerbKind.FIND else None
+    anyone = phrase is not None and phrase.head.word in lexicon().anyone
+    return phrase is not None and (anyone or phrase.person or phrase.stands_for_somebody)
 
 
 def _anybody(phrase: Phrase) -> bool:

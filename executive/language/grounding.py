@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from executive.language.command_frames import CommandFrame
+from executive.language.lexicon import lexicon
 from executive.language.parser import Token
 from executive.language.phrases import Phrase
 from executive.language.questions import ClarifyingQuestion, RefusalError, Slot, perhaps, which
@@ -19,7 +20,7 @@ from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.mission.command import Command, Task, Thing
 from executive.mission.errors import known_names, listing
-from executive.mission.knowledge import ANYTHING, Knowledge
+from executive.mission.knowledge import ANYBODY, ANYTHING, Knowledge
 
 __all__ = ["ABLE", "Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
 
@@ -86,7 +87,8 @@ class _Grounder:
         target = None if frame.object is None else self.target(frame.object, frame.task)
         if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
             raise RefusalError(f"which object? Known are {listing(self.knowledge.thing_names())}", [target.name])
-        goal, goal_at = (None, None) if frame.goal is None else self._kept_goal(frame, frame.goal)
+        people = target is not None and frame.task is Task.FIND and self.knowledge.somebody(target.name) is not None
+        goal, goal_at = (None, None) if frame.goal is None else self._kept_goal(frame, frame.goal, people)
         if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
             goal = self.knowledge.default_place(frame.task, target.name)
         return Command(
@@ -102,24 +104,44 @@ class _Grounder:
 
     def target(self, phrase: Phrase, task: Task | None) -> Thing:
         """What a task is done to: a known thing, or a time."""
+        if task is Task.FIND and (person := self._sought(phrase)) is not None:
+            return Thing(person)
         return Thing(phrase.head.lemma) if task is Task.WAIT else self.thing(phrase)
 
-    def _kept_goal(self, frame: CommandFrame, location: Location) -> tuple[str, str | None]:
+    def _sought(self, phrase: Phrase) -> str | None:
+        """Who is looked for, a known person or anybody; None where it is a thing.
+
+        Raises RefusalError: somebody whom the robot cannot tell from others.
+        """
+        person = self.knowledge.person(phrase.text)
+        if person is not None and len(self.knowledge.people) > 1:
+            others = listing((name for name in self.knowledge.people if name != person), last="or")
+            raise RefusalError(f"I know nobody by face, and cannot tell {person} from {others}", [phrase.text])
+        if person is None and len(phrase.content) == 1 and not phrase.extra and phrase.head.word in lexicon().any_person:
+            return ANYBODY
+        somebody = phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
+        if person is None and phrase.named_person:
+            raise self._unknown(Slot.PERSON, (phrase.text,), _spellings(self.knowledge, tuple(self.knowledge.people)))
+        if person is None and somebody and self.knowledge.thing(phrase.text) is None:
+            raise RefusalError(f"I see whether anybody is there, but not whether it is {phrase.spoken!r}", [phrase.text])
+        return person
+
+    def _kept_goal(self, frame: CommandFrame, location: Location, people: bool) -> tuple[str, str | None]:
         """The frame's goal, whose relation the command keeps."""
         looks = frame.task in (Task.GRASP, Task.FIND)
         if looks and location == HERE:
-            raise RefusalError("I take and find things on surfaces: name a place", [HERE.name])
+            raise RefusalError("I take and find things on surfaces, and people in rooms: name a place", [HERE.name])
         act = "look" if looks else "go" if frame.item is None else "bring"
         check_relation(act, _KINDS, location)
         goal, goal_at = self.goal(location)
+        if people and goal in self.knowledge.surfaces:
+            raise RefusalError(f"I look for people in rooms, and the {goal} is none", [goal])
         own = (goal in self.knowledge.places, goal in self.knowledge.surfaces, True)
         check_relation(act, [kind for kind, fits in zip(_KINDS, own, strict=True) if fits][:1], location)
         return goal, goal_at
 
     def thing(self, phrase: Phrase) -> Thing:
         """The known thing or category, with the adjectives before it."""
-        if phrase.person and self.knowledge.person(phrase.text):
-            raise RefusalError(f"I can look for things, not for people like {phrase.text!r}", [phrase.text])
         known = _spellings(self.knowledge, self.knowledge.thing_names())
         for attributes, form in _readings(phrase):
             if (name := self.knowledge.thing(form)) is not None:

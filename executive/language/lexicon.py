@@ -76,6 +76,7 @@ class Lexicon:
     people: frozenset[str]
     everyone: frozenset[str]
     anyone: frozenset[str]
+    any_person: frozenset[str]
     directions: frozenset[str]
     worn: frozenset[str]
     quantities: frozenset[str]

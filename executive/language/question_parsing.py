@@ -64,7 +64,9 @@ def how_many(row: Row, items: list[Item]) -> Item | None:
         return None
     end = row.at + len(phrase.tokens)
     verb = row.tokens[end : end + 1]
-    if row.tokens[row.at + 1].word != "many" or not verb or verb[0].lemma != "be" or phrase.person:
+    if row.tokens[row.at + 1].word != "many" or not verb or verb[0].lemma != "be":
+        return None
+    if phrase.person and (len(phrase.tokens) > 3 or phrase.head.word not in row.words.any_person):
         return None
     if any(t.tag == "IN" and b.word in ("a", "an") for t, b in pairwise(row.tokens[end:])):
         return None

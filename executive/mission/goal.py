@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 from executive.mission.command import START, Command, Task, Thing
-from executive.mission.knowledge import Knowledge, Pose
+from executive.mission.knowledge import ANYBODY, Knowledge, Pose
 
 __all__ = ["Area", "GoalCondition", "GoalKind", "command_goal", "drive_goal", "surface_area", "surfaces_to_search"]
 
@@ -41,7 +41,7 @@ class Area:
 @dataclass(frozen=True)
 class GoalCondition:
     """One condition. `classes` fulfil it, `count` of them, together called `wanted`; they come from a `source` area
-    (none: anywhere) and they or the robot go to a `goal` area; `person` is the one to be handed to (None: anyone)."""
+    (none: anywhere) and they or the robot go to a `goal` area; `person` is the one to be handed to or asked for (None: anyone)."""
 
     kind: GoalKind
     classes: tuple[str, ...] = ()
@@ -99,6 +99,15 @@ def _grasped(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...])
 
 
 def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
+    assert command.object is not None
+    who = knowledge.somebody(command.object.name)
+    if who is not None:
+        place = None if command.goal is None else knowledge.place(command.goal)
+        rooms = tuple(Area(name, knowledge.places[name].polygon) for name in knowledge.rooms_to_search(who, place))
+        person = None if who == ANYBODY else who
+        return GoalCondition(
+            GoalKind.ANSWERED, (ANYBODY,), command.object_count, rooms, person=person, wanted=str(command.object)
+        )
     classes, areas = _classes(command.object, knowledge), _areas(command, knowledge, elsewhere)
     return GoalCondition(GoalKind.ANSWERED, classes, command.object_count, areas, wanted=str(command.object))
 

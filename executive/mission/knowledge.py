@@ -15,6 +15,7 @@ from skills.perception.class_forms import class_forms
 from skills.quantities import Angle, Coordinate
 
 __all__ = [
+    "ANYBODY",
     "ANYTHING",
     "BatteryFacts",
     "Knowledge",
@@ -29,7 +30,9 @@ __all__ = [
 ]
 
 ANYTHING: Final = "object"
-"""The name that stands for every class of things."""
+"""The name that stands for every class of objects."""
+ANYBODY: Final = "person"
+"""The name that stands for any person at all."""
 _ANYTHING: Final = frozenset({ANYTHING, "thing", "item"})
 Corner = tuple[Coordinate, Coordinate]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
@@ -156,6 +159,17 @@ class Knowledge(_Facts):
     def person(self, name: str) -> str | None:
         """The person that `name` means; None when unknown."""
         return _resolve(name, self.people)
+
+    def somebody(self, name: str) -> str | None:
+        """The person that `name` means, or `ANYBODY` for any; None when it means nobody."""
+        return self.person(name) or (ANYBODY if name.lower() == ANYBODY else None)
+
+    def rooms_to_search(self, person: str, place: str | None) -> tuple[str, ...]:
+        """The rooms in which to look for a person: that of the place, or all, the one where they usually are first."""
+        if place is not None:
+            return (self.room(place),)
+        usual = (self.room(self.people[person].at),) if person in self.people else ()
+        return tuple(dict.fromkeys((*usual, *self.places)))
 
     def default_place(self, task: Task | None, name: str) -> str | None:
         """Where `task` is done to a thing or category when no place was said.

@@ -14,6 +14,7 @@ from skills.robot import FloatArray
 REACH_OF_PERSON_M = 1.0
 OFFER_HEIGHT_M = 0.4
 NAMED_REGIONS = 3
+PERSON = "person"
 _STATE_KINDS = (GoalKind.WENT, GoalKind.PLACED, GoalKind.HANDED_OVER)
 
 
@@ -139,15 +140,21 @@ def _judge_went(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
 
 def _judge_answered(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     """The answer equal to the truth."""
-    there = {
-        history: on
-        for history in _of_class(condition, truth)
-        if history.resting and (on := _region_at(condition.source, history.last.p_WO)) is not None
-    }
+    if condition.classes == (PERSON,):
+        people = ((name, p_W) for name, p_W in truth.persons.items() if condition.person in (None, name))
+        there = [f"{name} is in {on}" for name, p_W in people if (on := _region_at(condition.source, p_W)) is not None]
+        nothing = f"{condition.person or 'nobody'} is {'not ' if condition.person else ''}in {_where(condition.source)}"
+    else:
+        rest = (history for history in _of_class(condition, truth) if history.resting)
+        there = [
+            f"the {history.name} is on {on}"
+            for history in rest
+            if (on := _region_at(condition.source, history.last.p_WO)) is not None
+        ]
+        nothing = f"there is no {_wanted(condition)}{_in(condition.source)}"
     fact = len(there) >= condition.needed
     said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
-    where = " and ".join(f"the {history.name} is on {on}" for history, on in there.items())
-    found = where or f"there is no {_wanted(condition)}{_in(condition.source)}"
+    found = " and ".join(there) or nothing
     return Finding(condition.answer is fact, f"the answer was {said}, and {found}.")
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from skills.api import ObjectObservation, Surface
 
 SAME_WITHIN_M = 0.12
+_PERSON = "person"
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
@@ -35,7 +36,7 @@ def counted(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> 
     told = " and ".join(numbered(count, kind) for kind, count in numbers.items())
     places = dict.fromkeys(seen.surface for seen in found if seen.surface)
     where = " and ".join(f"the {name}" for name in places) or surface_names(surfaces)
-    return f"there {'is' if len(found) == 1 else 'are'} {told} on {where}"
+    return f"there {'is' if len(found) == 1 else 'are'} {told} {'in' if kinds == [_PERSON] else 'on'} {where}"
 
 
 def numbered(count: int, kind: str) -> str:

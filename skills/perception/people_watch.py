@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Detection, Job, LayeredView, SkillContext
+from skills.api import Detection, Detector, Job, LayeredView, SkillContext
 from skills.geometry import relative
 from skills.perception.detector.camera_images import found_in_grey
 from skills.perception.people import SeenPerson, merged
@@ -135,30 +135,12 @@ class PeopleWatch:
 
     def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D, with_depth: bool) -> _Look:
         """People in one picture of each camera; without depth only whether there may be somebody."""
-        found = found_in_grey(self._context.detector, images, PERSON)
-        pairs = [(image, one) for image, ones in zip(images, found, strict=True) for one in ones]
+        detector, options = self._context.detector, self._options
         if not with_depth:
-            return _Look((), tuple(images), X_WO, here_W, suspected=any(self._is_person(one) for _, one in pairs))
-        seen = [self._placed(image, one, X_WO, here_W) for image, one in pairs]
-        return _Look(tuple(one for one in seen if one is not None), tuple(images), X_WO, here_W)
-
-    def _is_person(self, one: Detection) -> bool:
-        return one.class_name == PERSON and one.score >= self._options.least_score
-
-    def _placed(self, image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D) -> SeenPerson | None:
-        """Where a detected person is; None for other objects, and for people out of the reach of depth."""
-        if not self._is_person(one):
-            return None
-        position = position_of(image, one)
-        if position is None:
-            return None
-        p_OC = image.frames.pose(image.camera_frame).translation()
-        if float(np.hypot(*(position.p_OT - p_OC)[:2])) > self._options.reach_m:
-            return None
-        x, y, _ = (float(value) for value in X_WO @ position.p_OT)
-        turn = X_WO.rotation().matrix()
-        covariance = (turn @ position.covariance_O @ turn.T)[:2, :2]
-        return SeenPerson((x, y), covariance, one.score, image.stamp_s, here_W)
+            suspected = bool(_detected(detector, images, options.least_score))
+            return _Look((), tuple(images), X_WO, here_W, suspected=suspected)
+        found = people_in_images(detector, images, X_WO, here_W, options.least_score, options.reach_m)
+        return _Look(tuple(found), tuple(images), X_WO, here_W)
 
     def _take(self, look: _Look) -> None:
         """Bring what is known up to date, tell of it, and look again soon when somebody is new."""
@@ -202,6 +184,44 @@ class PeopleWatch:
                 for one in self._seen
             ],
         }
+
+
+def people_in_images(
+    detector: Detector,
+    images: Sequence[Image],
+    X_WO: RigidTransform,
+    here_W: Pose2D,
+    least_score: float,
+    reach_m: float,
+) -> list[SeenPerson]:
+    """Where the people in some pictures with depth are; those are left out who are farther from the camera than
+    reach_m, or whose depth is not known."""
+    found = _detected(detector, images, least_score)
+    seen = (_placed(image, one, X_WO, here_W, reach_m) for image, one in found)
+    return [one for one in seen if one is not None]
+
+
+def _detected(detector: Detector, images: Sequence[Image], least_score: float) -> list[tuple[Image, Detection]]:
+    """The people in the pictures, each with its picture."""
+    found = found_in_grey(detector, images, PERSON)
+    pairs = ((image, one) for image, ones in zip(images, found, strict=True) for one in ones)
+    return [(image, one) for image, one in pairs if one.class_name == PERSON and one.score >= least_score]
+
+
+def _placed(
+    image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, reach_m: float
+) -> SeenPerson | None:
+    """Where a detected person is; None when out of reach, or where the depth is not known."""
+    position = position_of(image, one)
+    if position is None:
+        return None
+    p_OC = image.frames.pose(image.camera_frame).translation()
+    if float(np.hypot(*(position.p_OT - p_OC)[:2])) > reach_m:
+        return None
+    x, y, _ = (float(value) for value in X_WO @ position.p_OT)
+    turn = X_WO.rotation().matrix()
+    covariance = (turn @ position.covariance_O @ turn.T)[:2, :2]
+    return SeenPerson((x, y), covariance, one.score, image.stamp_s, here_W)
 
 
 def _inside(image: Image, X_WO: RigidTransform, points_W: FloatArray, reach_m: float) -> bool:

@@ -73,6 +73,31 @@ def _look_plan(
     )
 
 
+def people_looks(
+    builder: PlanBuilder, person: str, place: str | None, key: str, *, tallied: bool
+) -> tuple[tuple[str, NodeSpec], ...]:
+    """For each room where a person is looked for: go there and look about; as `look_plans` otherwise.
+
+    Raises InputError: the place is a surface, or one of several people is meant, whom nothing tells apart.
+    """
+    knowledge = builder.knowledge
+    if place in knowledge.surfaces:
+        raise builder.error(f"people are looked for in rooms, and '{place}' is none", "name the room")
+    if person in knowledge.people and len(knowledge.people) > 1:
+        hint = "ask whether anybody is there"
+        raise builder.error(f"the robot knows nobody by face, and {person} may be any of several people", hint)
+    rooms = knowledge.rooms_to_search(person, place)
+    return tuple((room, _look_about_plan(builder.at(room), person, room, key, tallied)) for room in rooms)
+
+
+def _look_about_plan(builder: PlanBuilder, person: str, room: str, key: str, tallied: bool) -> NodeSpec:
+    facts = builder.knowledge.places[room]
+    ports = {"area_W": facts.polygon, "place": room, "person": person, "count": 0 if tallied else 1}
+    tally = {"observations": tally_key(f"{builder.path_id}/find-people")} if tallied else {}
+    look = builder.skill("find_people", ports, {"observation": key, **tally})
+    return builder.sequence(f"look about the {room}", builder.navigate(pose_2d(facts.pose), f"the {room}"), look)
+
+
 def detect_plan(
     builder: PlanBuilder,
     thing: Thing,

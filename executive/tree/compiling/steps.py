@@ -9,6 +9,7 @@ from typing import Final
 
 from executive.mission.command import START, TIME_UNITS_S, Task, Thing
 from executive.mission.geometry import inside
+from executive.mission.knowledge import ANYBODY
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
@@ -16,6 +17,7 @@ from executive.tree.compiling.handling import go_near_plan, held_plan, pick_up_p
 from executive.tree.compiling.interrupts import dock_plan
 from executive.tree.compiling.search import (
     look_plans,
+    people_looks,
     required_surfaces,
     search_plan,
     surfaces_elsewhere,
@@ -67,27 +69,37 @@ def find_plan(builder: PlanBuilder) -> NodeSpec:
     """Look at the surfaces of the place and answer yes or no; where it is asked where or how many, tell that, too.
 
     The first object that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
+    People are looked for in rooms.
     """
-    thing, count = _required(builder, builder.command.object), builder.command.object_count
-    place = None if builder.command.goal is None else builder.place(builder.command.goal)
-    surfaces = required_surfaces(builder, thing, place)
-    below, counting = builder.at("search"), count != 1
-    whole_room = place is None or place in builder.knowledge.places
-    extra = {"floor": whole_room, "count": 0 if counting else 1}
-    looks = look_plans(below, thing, surfaces, f"{builder.path_id}/detection", extra, tallied=counting)
-    search = below.node("round" if counting else "selector", f"look for {thing}", *(look for _, look in looks))
-    leaves = {s: tuple(f"{look.path_id}/detect" for name, look in looks if name == s) for s in surfaces}
-    asked = _asked_for(str(thing), count)
+    command, knowledge = builder.command, builder.knowledge
+    place = None if command.goal is None else builder.place(command.goal)
+    counting, key = command.object_count != 1, f"{builder.path_id}/detection"
+    person = None if command.object is None else knowledge.somebody(command.object.name)
+    if person is not None:
+        what = "somebody" if person == ANYBODY else person
+        asked = what if command.object_count == 1 else _asked_for(person, command.object_count)
+        looks = people_looks(builder.at("search"), person, place, key, tallied=counting)
+    else:
+        thing = _required(builder, command.object)
+        what, asked = str(thing), _asked_for(str(thing), command.object_count)
+        whole_room = place is None or place in knowledge.places
+        extra = {"floor": whole_room, "count": 0 if counting else 1}
+        surfaces = required_surfaces(builder, thing, place)
+        looks = look_plans(builder.at("search"), thing, surfaces, key, extra, tallied=counting)
+    below = builder.at("search")
+    search = below.node("round" if counting else "selector", f"look for {what}", *(look for _, look in looks))
+    leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
+    named = "is" if person in knowledge.people else "are there" if counting else "is there"
     answer = builder.node(
         "answer",
-        f"{'are' if counting else 'is'} there {asked} {where(place)}?",
+        f"{named} {asked} {where(place)}?",
         search,
         question=f"{asked} {where(place)}",
         looks=MappingProxyType(leaves),
         key=f"{builder.path_id}/answer",
         tells=place is None,
         tallies=MappingProxyType({leaf: tally_key(leaf) for own in leaves.values() for leaf in own if counting}),
-        needed=max(1, count),
+        needed=max(1, command.object_count),
     )
     return tidied(builder.at("tidy"), answer)
 

@@ -1,0 +1,1 @@
+"""Looking about for people."""

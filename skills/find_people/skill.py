@@ -1,0 +1,167 @@
+"""The find_people skill: look about from where the robot stands, and say who is in a part of the world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import shapely
+
+from skills.api import Cause, ObjectObservation, Running, SkillContext, Succeeded, Thing
+from skills.arm.routine import Routine, RoutineSkill, SkillFailure
+from skills.detect.words import counted
+from skills.navigate.base import Base
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark
+from skills.perception.people import SeenPerson, merged, people_in_scan
+from skills.perception.people_watch import PERSON, people_in_images
+from skills.quantities import Coordinate, Count, Delay, Length, Share, Tries, Turn, TurnRate
+from skills.robot import Image
+
+_SCAN_PATIENCE_S = 1.0
+_SIZE_M = (0.5, 0.5, 1.7)
+
+
+@dataclass(frozen=True)
+class FindPeopleInputs:
+    """Where to look: the corners (x, y) of `area_W`, called `place`. `person` is who is looked for; the skill knows
+    nobody by face, so that anybody counts. A `count` of 0 counts all that are seen."""
+
+    area_W: tuple[tuple[Coordinate, Coordinate], ...]
+    place: str
+    person: str = PERSON
+    count: Tries = 1
+
+
+@dataclass(frozen=True)
+class FindPeopleOptions:
+    """How the robot looks: `looks` times, and turns by `turn_rad` in between.
+
+    Somebody counts once seen twice within `same_m`: in two looks, or in one by both a camera and the LiDAR. A camera
+    must be at least `least_score` sure, and they `reach_m` at most away.
+    """
+
+    looks: Count = 5
+    turn_rad: Turn = 0.5
+    turn_rad_s: TurnRate = 0.4
+    settle_s: Delay = 0.5
+    same_m: Length = 0.7
+    least_score: Share = 0.5
+    reach_m: Length = 6.0
+
+
+class FindPeople(RoutineSkill[FindPeopleInputs]):
+    """Looks for people with body cameras and LiDAR; with the LiDAR alone where the detector knows no people."""
+
+    name = "find_people"
+    Inputs = FindPeopleInputs
+    Options: ClassVar[type] = FindPeopleOptions
+    options: FindPeopleOptions
+    outputs: ClassVar[Mapping[str, type]] = {
+        "observation": ObjectObservation,
+        "observations": tuple[ObjectObservation, ...],
+    }
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "there is no new scan",
+        Cause.EXECUTION: "it is too dark to see, or the robot refuses to turn",
+        Cause.POSTCONDITION: "nobody is seen, or fewer than asked for",
+    }
+    default_timeout_s = 60.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
+
+    def __init__(self, context: SkillContext) -> None:
+        super().__init__(context)
+        self._base = Base(context)
+
+    def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
+        """Look, turn, look again, until enough people were seen twice."""
+        self._base = Base(self.context)
+        area, same_m = shapely.Polygon(inputs.area_W), self.options.same_m
+        seen, echoes, found = tuple[SeenPerson, ...](), list[SeenPerson](), list[SeenPerson]()
+        for look in range(self.options.looks):
+            if look:
+                yield from self._turn()
+            by_lidar = self._in_scan()
+            by_camera = yield from self._in_pictures(f"looking for people in the {inputs.place}")
+            echoes += [] if by_camera is None else by_lidar
+            for one in by_lidar if by_camera is None else by_camera:
+                seen = merged(seen, one, same_m) if area.covers(shapely.Point(one.place_W)) else seen
+            found = [one for one in seen if one.looks > 1 or any(_apart_m(one, echo) <= same_m for echo in echoes)]
+            if 0 < inputs.count <= len(found):
+                break
+        return self._ended(inputs, tuple(_observation(one, inputs) for one in found))
+
+    def _ended(self, inputs: FindPeopleInputs, found: tuple[ObjectObservation, ...]) -> Succeeded:
+        """The answer. Raises SkillFailure when there is none, or not enough."""
+        if not found or len(found) < inputs.count:
+            few = counted(found, ()) if found else f"nobody is seen in the {inputs.place} from here"
+            raise SkillFailure(Cause.POSTCONDITION, few)
+        told = _told(found[0]) if inputs.count == 1 else counted(found, ())
+        return Succeeded(told, {"observation": found[0], "observations": found})
+
+    def end(self) -> None:
+        """Stop what this skill set in motion."""
+        self._base.stop()
+        super().end()
+
+    def _in_pictures(self, message: str) -> Routine[Sequence[SeenPerson] | None]:
+        """Who is in the pictures of the body cameras now; None where the detector knows no people.
+
+        Raises SkillFailure: it is dark.
+        """
+        robot, detector, options = self.context.robot, self.context.detector, self.options
+        cameras = robot.capabilities().body_cameras
+        if PERSON not in detector.class_names or not cameras:
+            return None
+        X_WO, here_W = self.context.localiser.estimate().X_WO, self.context.pose()
+        images: list[Image] = yield from self.sense(
+            lambda: [robot.image(camera.source) for camera in cameras], latency_s=0.0, name="pictures", message=message
+        )
+        if all(map(is_dark, images)):
+            raise SkillFailure(Cause.EXECUTION, "it is too dark to see anybody")
+        return (
+            yield from self.compute(
+                lambda: people_in_images(detector, images, X_WO, here_W, options.least_score, options.reach_m),
+                latency_s=DETECTION_LATENCY_S,
+                name="look for people",
+                message=message,
+            )
+        )
+
+    def _in_scan(self) -> Sequence[SeenPerson]:
+        """Who may be in the newest scan. Raises SkillFailure: there is none."""
+        robot = self.context.robot
+        scan = robot.scan()
+        if scan is None or scan.stamp_s < self.context.clock.now() - _SCAN_PATIENCE_S:
+            raise SkillFailure(Cause.PRECONDITION, "there is no new scan to see people in")
+        X_WB = self.context.localiser.estimate().X_WO @ robot.odometry().X_OB
+        return people_in_scan(scan, X_WB, robot.capabilities().footprint_m)
+
+    def _turn(self) -> Routine[None]:
+        """A little turn on the spot; then rest."""
+        end_s = self.context.clock.now() + self.options.turn_rad / self.options.turn_rad_s
+        while self.context.clock.now() < end_s:
+            self._base.drive((0.0, 0.0, self.options.turn_rad_s))
+            yield Running("turning to see more")
+            if (refusal := self._base.refusal()) is not None:
+                raise SkillFailure(Cause.EXECUTION, f"the robot refused to turn: {refusal}")
+        self._base.stop()
+        yield from self.pause(self.options.settle_s, "coming to rest")
+
+
+def _apart_m(one: SeenPerson, other: SeenPerson) -> float:
+    return math.dist(one.place_W, other.place_W)
+
+
+def _told(seen: ObjectObservation) -> str:
+    """ "saw Robin in the kitchen at (1.00, 2.00)"."""
+    who = "somebody" if seen.thing.name == PERSON else seen.thing.name
+    return f"saw {who} in the {seen.surface} at ({seen.position_W[0]:.2f}, {seen.position_W[1]:.2f})"
+
+
+def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservation:
+    """Somebody who was seen, as an observation of what was asked for."""
+    x_m, y_m = seen.place_W
+    middle_W = (x_m, y_m, _SIZE_M[2] / 2)
+    return ObjectObservation(seen.stamp_s, Thing(inputs.person), middle_W, _SIZE_M, 0.0, seen.score, inputs.place)

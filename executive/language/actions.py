@@ -60,6 +60,7 @@ _IT: Final = Phrase((Token(0, 0, "it", "it", "PRON", "PRP", 0, "obj"),))
 _FRONTED: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
 _AROUND: Final = frozenset({"around", "by"})
 _THEN: Final = frozenset({"then", "after that", "afterwards", "next", "second", "subsequently"})
+_TAKE: Final = "take"
 _IF: Final = "if"
 _OUT_OF: Final = "out of"
 _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
@@ -67,7 +68,7 @@ _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 def read_actions(clauses: Sequence[Clause], words: Lexicon) -> tuple[Action, ...]:
     """The actions of all clauses, in order."""
-    merged = list(_without_checks(_without_reasons(_with_fronted(clauses))))
+    merged = list(_without_checks(_without_reasons(_with_fronted(_with_verb(clauses, words)))))
     found = [
         replace(action, said=_said(clause), anew=before is not None and _ends_with_then(before))
         for before, clause in zip([None, *merged], merged, strict=False)
@@ -105,6 +106,16 @@ def _said(clause: Clause) -> str:
 def _goes_nowhere(action: Action) -> bool:
     """Whether it is the "go" of "go and find", which says nothing of its own."""
     return action.kind is VerbKind.GO and action.goal is None and action.unknown == (action.verb,)
+
+
+def _with_verb(clauses: Sequence[Clause], words: Lexicon) -> Sequence[Clause]:
+    """Say "take" where there is no verb at all: "hammer to the kitchen, please"."""
+    items = [item for clause in clauses for item in clause.items if not isinstance(item, Separator)]
+    chunks = [item for item in items if isinstance(item, Chunk)]
+    carried = [chunk.role for chunk in chunks] == [None, PrepositionRole.GOAL] and len(chunks) == len(items)
+    if len(clauses) != 1 or clauses[0].verb is not None or not carried or chunks[0].phrase.kind is not NounKind.THING:
+        return clauses
+    return (replace(clauses[0], verb=Verb(_TAKE, words.verbs[(_TAKE,)])),)
 
 
 def _with_fronted(clauses: Sequence[Clause]) -> Sequence[Clause]:

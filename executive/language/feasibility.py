@@ -39,6 +39,7 @@ def check_feasible(actions: Sequence[ResolvedAction], knowledge: Knowledge | Non
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {ABLE}", people)
     if knowledge is not None:
         actions = [replace(action, target=None) if _asks_for_people(action) else action for action in actions]
+        actions = [action for action in actions if not _visits_all(action)]
     moved = [action.target for action in actions if _moved(action)]
     outside = [(part, part) for action in actions for part in _outside(action, action.target in moved)]
     if outside:
@@ -121,6 +122,10 @@ def _holdable(phrase: Phrase, action: ResolvedAction) -> bool:
     if called or (action.kind is not VerbKind.FIND and _fixture(phrase)):
         return False
     return not _light(phrase, action) and (phrase.kind is None or phrase.kind.within_reach)
+
+
+def _visits_all(action: ResolvedAction) -> bool:
+    return action.kind is VerbKind.GO and action.goal is not None and action.goal.every_room
 
 
 def _asks_for_people(action: ResolvedAction) -> bool:

@@ -56,7 +56,7 @@ def ground_noted(frames: Sequence[CommandFrame], knowledge: Knowledge, facts: Wo
         RefusalError: a thing, place or person is unknown, or could be several; with a question where that helps.
     """
     grounder = _Grounder(knowledge, facts)
-    commands = tuple(grounder.command(frame) for frame in frames)
+    commands = tuple(command for frame in frames for command in grounder.commands(frame))
     return Grounded(commands, tuple(dict.fromkeys(grounder.notes)))
 
 
@@ -80,6 +80,13 @@ class _Grounder:
     knowledge: Knowledge
     facts: WordFacts | None
     notes: list[str] = field(default_factory=list)
+
+    def commands(self, frame: CommandFrame) -> Iterator[Command]:
+        """One frame as a command; going to every room is one for each."""
+        if frame.goal is not None and frame.goal.every_room and frame.item is None and frame.task is None:
+            yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.places)
+        else:
+            yield self.command(frame)
 
     def command(self, frame: CommandFrame) -> Command:
         """One frame as a command."""
@@ -169,7 +176,7 @@ class _Grounder:
         """
         if location.phrase is None:
             raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
-        if location.phrase.said_count not in (None, 1):
+        if location.phrase.said_count not in (None, 1) or location.every_room:
             raise RefusalError(
                 f"I go to one place at a time, not to {location.phrase.spoken!r}", [location.phrase.spoken]
             )

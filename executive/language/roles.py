@@ -37,6 +37,11 @@ class Location:
         return self.phrase is not None and (self.phrase.person or self.phrase.kind is NounKind.PERSON)
 
     @property
+    def every_room(self) -> bool:
+        """Whether all rooms are meant."""
+        return self.phrase is not None and self.phrase.universal and self.phrase.singular.split()[-1] == "room"
+
+    @property
     def name(self) -> str:
         """The words of the place itself, without articles; "start" for HERE."""
         return _HERE_NAME if self.phrase is None else self.phrase.text

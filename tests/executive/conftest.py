@@ -259,6 +259,14 @@ class HandOverInputs:
 
 
 @dataclass(frozen=True)
+class FindPeopleInputs:
+    area_W: tuple[tuple[float, float], ...]
+    place: str
+    person: str
+    count: int
+
+
+@dataclass(frozen=True)
 class ChargeInputs:
     level: float
 
@@ -271,6 +279,10 @@ class NoInputs:
 PORTS: dict[str, tuple[type, dict[str, type]]] = {
     "navigate": (NavigateInputs, {}),
     "detect": (DetectInputs, {"observation": ObjectObservation, "observations": tuple[ObjectObservation, ...]}),
+    "find_people": (
+        FindPeopleInputs,
+        {"observation": ObjectObservation, "observations": tuple[ObjectObservation, ...]},
+    ),
     "approach": (ApproachInputs, {"observation": ObjectObservation}),
     "grasp": (GraspInputs, {"tried": tuple[int, ...]}),
     "place": (PlaceInputs, {}),

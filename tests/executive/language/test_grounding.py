@@ -123,3 +123,13 @@ def test_other_languages_are_answered_as_such(told, sentence, words):
     answer = told(sentence)
     assert answer.status is Status.REFUSED
     assert words in answer.reason
+
+
+@pytest.mark.parametrize(
+    ("sentence", "place"),
+    [("where is Robin", "Nothing"), ("find Robin", "Nothing"), ("is Robin in the bedroom", "bedroom")],
+)
+def test_the_only_person_of_a_world_is_looked_for(parser, knowledge, sentence, place):
+    alone = knowledge.model_copy(update={"people": {"Robin": knowledge.people["Robin"]}})
+    answer = understand(sentence, parser=parser, knowledge=alone, require_wake=False)
+    assert [str(command) for command in answer.commands] == [f"Take [Nothing] to [{place}] and do [find] to [Robin]"]

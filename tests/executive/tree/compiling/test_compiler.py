@@ -165,6 +165,52 @@ def test_a_status_check_names_every_look(compiled):
     }
 
 
+@pytest.fixture
+def one_person(knowledge):
+    return knowledge.model_copy(update={"people": {"Robin": knowledge.people["Robin"]}})
+
+
+# goal        asked           people in   answer  rooms looked at  told
+@pytest.mark.parametrize(
+    ("goal", "asked", "people_in", "answer", "looks", "told"),
+    [
+        ("kitchen", "person", {"kitchen"}, True, 1, "yes: somebody in the kitchen"),
+        ("kitchen", "person", set(), False, 1, "no: somebody in the kitchen"),
+        ("Nothing", "person", {"bedroom"}, True, 2, "yes: somebody anywhere; saw them in the bedroom"),
+        ("Nothing", "Robin", {"hall"}, True, 1, "yes: Robin anywhere; saw them in the hall"),
+        ("Nothing", "Robin", set(), False, 4, "no: Robin anywhere"),
+        ("Nothing", "some person", {"hall", "kitchen"}, True, 4, "yes: people anywhere; there are two people in the"),
+        ("kitchen", "2 person", {"kitchen"}, False, 1, "no: two people in the kitchen; there is one person in the"),
+    ],
+)
+def test_people_are_looked_for_in_rooms(
+    one_person, registry, run_tree, script, goal, asked, people_in, answer, looks, told
+):
+    def look(skill):
+        if skill.inputs.place not in people_in:
+            return Failed(Cause.POSTCONDITION, "nobody")
+        (x_m, y_m), *_ = skill.inputs.area_W
+        who = Thing(skill.inputs.person)
+        seen = ObjectObservation(0.0, who, (x_m, y_m, 1.0), (0.5, 0.5, 1.7), 0.0, 0.9, skill.inputs.place)
+        return Succeeded(f"saw them in the {skill.inputs.place}", {"observation": seen, "observations": (seen,)})
+
+    script.ends["find_people"] = look
+    command = parse_command(f"Take [Nothing] to [{goal}] and do [find] to [{asked}]")
+    mission = Mission("ask", DEFAULT_WORLD, "Alice", (MissionStep((command,)),))
+    worst = run_tree(compile_mission(mission, knowledge=one_person, registry=registry)).worst
+    assert (worst.outcome, list(worst.answers.values())) == (Outcome.SUCCESS, [answer])
+    assert worst.message.startswith(told)
+    assert script.begun.count("find_people") == looks
+
+
+@pytest.mark.parametrize(
+    ("asked", "goal", "why"), [("person", "counter", "in rooms"), ("Robin", "hall", "nobody by face")]
+)
+def test_people_who_cannot_be_looked_for_are_refused(compiled, asked, goal, why):
+    with pytest.raises(InputError, match=why):
+        compiled(f"Take [Nothing] to [{goal}] and do [find] to [{asked}]")
+
+
 @pytest.mark.parametrize(
     ("asked", "seen_on", "answer", "told"),
     [

@@ -124,13 +124,20 @@ class _Grounder:
         if person is not None and len(self.knowledge.people) > 1:
             others = listing((name for name in self.knowledge.people if name != person), last="or")
             raise RefusalError(f"I know nobody by face, and cannot tell {person} from {others}", [phrase.text])
-        if person is None and len(phrase.content) == 1 and not phrase.extra and phrase.head.word in lexicon().any_person:
+        if (
+            person is None
+            and len(phrase.content) == 1
+            and not phrase.extra
+            and phrase.head.word in lexicon().any_person
+        ):
             return ANYBODY
         somebody = phrase.person or phrase.stands_for_somebody or phrase.head.word in lexicon().anyone
         if person is None and phrase.named_person:
             raise self._unknown(Slot.PERSON, (phrase.text,), _spellings(self.knowledge, tuple(self.knowledge.people)))
         if person is None and somebody and self.knowledge.thing(phrase.text) is None:
-            raise RefusalError(f"I see whether anybody is there, but not whether it is {phrase.spoken!r}", [phrase.text])
+            raise RefusalError(
+                f"I see whether anybody is there, but not whether it is {phrase.spoken!r}", [phrase.text]
+            )
         return person
 
     def _kept_goal(self, frame: CommandFrame, location: Location, people: bool) -> tuple[str, str | None]:

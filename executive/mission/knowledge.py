@@ -1,4 +1,4 @@
-"""What is known of a world: places, surfaces, things and where they usually are, people, and the robot's own places."""
+"""What is known of a world: places, surfaces, objects and where they usually are, people, and the robot's own places."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class SurfaceFacts(_Facts):
 
 
 class ThingFacts(_Facts):
-    """A class of things: other names, the categories it belongs to, the surfaces where it usually is."""
+    """A class of objects: other names, the categories it belongs to, the surfaces where it usually is."""
 
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
     categories: tuple[Name, ...] = Field(default=(), description='as in "a drink"')
@@ -113,11 +113,11 @@ class Knowledge(_Facts):
     dock: Pose = Field(description="where it stands to charge")
     battery: BatteryFacts = Field(default=BatteryFacts(), description="when it charges, and until when")
     places: dict[Name, Place] = Field(description="the rooms by name")
-    surfaces: dict[Name, SurfaceFacts] = Field(description="the flat tops where things lie, by name")
-    things: dict[Name, ThingFacts] = Field(description="the classes of things by name")
+    surfaces: dict[Name, SurfaceFacts] = Field(description="the flat tops where objects lie, by name")
+    things: dict[Name, ThingFacts] = Field(description="the classes of objects by name")
     people: dict[Name, Person] = Field(default_factory=dict, description="the people by name")
     defaults: dict[str, dict[str, str]] = Field(
-        default_factory=dict, description="for a task, the room for each thing or category when none was said"
+        default_factory=dict, description="for a task, the room for each class or category when the request names none"
     )
 
     def place(self, name: str) -> str | None:
@@ -153,7 +153,7 @@ class Knowledge(_Facts):
         return tuple(dict.fromkeys(category for facts in self.things.values() for category in facts.categories))
 
     def usual_surfaces(self, name: str) -> tuple[str, ...]:
-        """Where things of that class or category usually are, likeliest first."""
+        """Where objects of that class or category usually are, likeliest first."""
         return tuple(dict.fromkeys(place for c in self.classes(name) for place in self.things[c].usual))
 
     def person(self, name: str) -> str | None:

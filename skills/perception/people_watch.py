@@ -208,9 +208,7 @@ def _detected(detector: Detector, images: Sequence[Image], least_score: float) -
     return [(image, one) for image, one in pairs if one.class_name == PERSON and one.score >= least_score]
 
 
-def _placed(
-    image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, reach_m: float
-) -> SeenPerson | None:
+def _placed(image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, reach_m: float) -> SeenPerson | None:
     """Where a detected person is; None when out of reach, or where the depth is not known."""
     position = position_of(image, one)
     if position is None:

@@ -374,6 +374,28 @@ def test_answer_is_compared_with_the_truth(answer, true_of):
     assert not stage.holds(dataclasses.replace(asked, answer=None))
 
 
+ROOM, OTHER = square("the kitchen", 0.0, 3.0, half=1.0), square("the hall", 4.0, 4.0)
+
+
+# room   asked     count  truth  what is said of it
+@pytest.mark.parametrize(
+    ("room", "person", "count", "fact", "told"),
+    [
+        (ROOM, None, 1, True, "robin is in the kitchen"),
+        (ROOM, "robin", 1, True, "robin is in the kitchen"),
+        (ROOM, None, 2, False, "robin is in the kitchen"),
+        (OTHER, None, 1, False, "nobody is in the hall"),
+        (OTHER, "robin", 1, False, "robin is not in the hall"),
+    ],
+)
+def test_an_answer_about_people_is_judged_by_where_they_stand(room, person, count, fact, told):
+    stage = Stage().watch()
+    asked = GoalCondition(GoalKind.ANSWERED, ("person",), count, (room,), person=person)
+    for answer, right in ((fact, True), (not fact, False), (None, False)):
+        verdict = stage.referee.judge([dataclasses.replace(asked, answer=answer)])
+        assert (verdict.success, told in verdict.why) == (right, True)
+
+
 def test_path_is_kept():
     stage = Stage()
     for x in np.linspace(0, 1, 21):

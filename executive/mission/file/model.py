@@ -106,7 +106,7 @@ class SkillCall:
 class MissionStep:
     """One step, one of three: commands, or a skill, or the steps of another mission. `source` is None when spoken.
 
-    With `elsewhere`, a thing that is not in its place is looked for elsewhere, too.
+    With `elsewhere`, an object that is not in its place is also searched for elsewhere.
     """
 
     commands: tuple[Command, ...] = ()

@@ -39,8 +39,9 @@ def typed_command(file: MissionFile, index: int, knowledge: Knowledge) -> Comman
 def _unknown_names(file: MissionFile, path: KeyPath, command: Command, knowledge: Knowledge) -> Iterator[InputError]:
     waits = command.task is Task.WAIT and command.object is not None and command.object.name in TIME_UNITS_S
     for key, thing in (("take", command.item), ("object", None if waits else command.object)):
-        if thing is not None and knowledge.thing(thing.name) is None:
-            yield _unknown(file, (*path, key), "thing", thing.name, knowledge.thing_names(), knowledge)
+        person = command.task is Task.FIND and thing is not None and knowledge.somebody(thing.name) is not None
+        if thing is not None and knowledge.thing(thing.name) is None and not person:
+            yield _unknown(file, (*path, key), "object", thing.name, knowledge.thing_names(), knowledge)
     goals = (*knowledge.place_names(), *knowledge.people, START)
     if command.goal is not None and _goal(command.goal, knowledge) is None:
         yield _unknown(file, (*path, "to"), "place or person", command.goal, goals, knowledge)
@@ -59,7 +60,8 @@ def _known(command: Command, knowledge: Knowledge) -> Command:
     """The command in the world's own names."""
 
     def named(thing: Thing | None) -> Thing | None:
-        return thing and Thing(knowledge.thing(thing.name) or thing.name, thing.attributes)
+        known = thing and (knowledge.thing(thing.name) or knowledge.somebody(thing.name))
+        return thing and Thing(known or thing.name, thing.attributes)
 
     return Command(
         item=named(command.item),

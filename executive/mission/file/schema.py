@@ -112,11 +112,11 @@ class StepFile(PolicyFile):
     take: Text | None = Field(None, description="What is carried; a number may stand before it.")
     to: Text | None = Field(None, description='The place or person, or "start", or "Robin at hall".')
     do: Task | None = Field(None, description="What to do there to the object.")
-    object: Text | None = Field(None, description="The thing that it is done to.")
+    object: Text | None = Field(None, description="The object of the task, or who is looked for.")
     skill: Name | None = Field(None, description="The name of a registered skill.")
     use: Name | None = Field(None, description="Another mission file, as seen from this file's folder.")
     elsewhere: StrictBool | None = Field(
-        None, description="Whether a thing that is not in its place is looked for elsewhere, too (it is unless said)."
+        None, description="Whether an object that is not in its place is also searched for elsewhere; by default, yes."
     )
     with_: dict[str, Any] | None = Field(
         None, alias="with", description="The skill's input ports, or the parameters of the used file."
@@ -152,7 +152,7 @@ class MissionFile(PolicyFile):
     name: Name = Field(description="The mission's name; part of all path ids.")
     description: str | None = Field(None, description="What it is for.")
     world: Name = Field(DEFAULT_WORLD, description="A world by its name or folder.")
-    robot: Name | None = Field(None, description="The robot's name; the world's own unless said.")
+    robot: Name | None = Field(None, description="The robot's name; by default that of the world.")
     knowledge: dict[str, Any] | None = Field(
         None, description="Laid over the world's knowledge: what stands here replaces what stands there, key by key."
     )
@@ -163,7 +163,7 @@ class MissionFile(PolicyFile):
     questions: QuestionPolicy | None = Field(
         None,
         description="What becomes of a sentence that could mean several things. ask: who starts the mission is asked. "
-        "first: the likeliest is taken. refuse: the file is refused, as it is unless said.",
+        "first: the likeliest is taken. refuse (the default): the file is refused.",
     )
     each: PolicyFile | None = Field(None, description="The policy of every step that does not say otherwise.")
     steps: Annotated[tuple[StepFile, ...], Field(min_length=1)] = Field(description="What to do, one after the other.")

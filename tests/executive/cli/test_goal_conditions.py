@@ -34,6 +34,21 @@ def test_a_room_as_goal_means_any_surface_in_it(knowledge):
     assert (placed.kind, {region.name for region in placed.goal}) == (GoalKind.PLACED, {"counter", "shelf"})
 
 
+# room asked for  who       the person of the condition  its rooms, the usual one first
+@pytest.mark.parametrize(
+    ("goal", "who", "person", "rooms"),
+    [
+        ("kitchen", "person", None, ["kitchen"]),
+        ("kitchen", "Sam", "Sam", ["kitchen"]),
+        ("Nothing", "Sam", "Sam", ["bathroom", "kitchen", "bedroom", "hall"]),
+    ],
+)
+def test_a_question_about_people_asks_for_them_in_rooms(knowledge, goal, who, person, rooms):
+    (asked,) = conditions(knowledge, f"Take [Nothing] to [{goal}] and do [find] to [{who}]")
+    assert (asked.kind, asked.classes, asked.person) == (GoalKind.ANSWERED, ("person",), person)
+    assert [region.name for region in asked.source] == rooms
+
+
 def test_a_person_is_named(knowledge):
     (condition,) = conditions(knowledge, "Take [coke] to [Sam] and do [Nothing] to [Nothing]")
     assert (condition.kind, condition.person) == (GoalKind.HANDED_OVER, "Sam")

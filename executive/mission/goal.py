@@ -41,7 +41,8 @@ class Area:
 @dataclass(frozen=True)
 class GoalCondition:
     """One condition. `classes` fulfil it, `count` of them, together called `wanted`; they come from a `source` area
-    (none: anywhere) and they or the robot go to a `goal` area; `person` is the one to be handed to or asked for (None: anyone)."""
+    (none: anywhere) and they or the robot go to a `goal` area; `person` is the one to be handed to or asked for (None:
+    anyone)."""
 
     kind: GoalKind
     classes: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""What is known of a world: places, surfaces, objects and where they usually are, people, and the robot's own places."""
+"""What is known of a world: places, surfaces, objects and their usual places, people, and the robot's own places."""
 
 from __future__ import annotations
 

@@ -78,6 +78,16 @@ def test_waiting_takes_a_time_and_charging_nothing(load):
     ]
 
 
+def test_people_can_be_looked_for_but_not_grasped(load):
+    steps = "  - {to: hall, do: find, object: person}\n  - {do: find, object: some person}\n"
+    assert [str(command) for command in load(f"name: go\nsteps:\n{steps}").commands] == [
+        "Take [Nothing] to [hall] and do [find] to [person]",
+        "Take [Nothing] to [Nothing] and do [find] to [some person]",
+    ]
+    with pytest.raises(InputError, match="unknown object 'person'"):
+        load("name: go\nsteps:\n  - {to: hall, do: grasp, object: person}\n")
+
+
 def test_world_and_robot_have_defaults(load):
     mission = load("name: go\nsteps:\n  - {to: kitchen}\n")
     assert (mission.world, mission.robot_name) == ("flat", "Alice")

@@ -130,7 +130,8 @@ def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) ->
     if command.item is not None:
         return _carried(command, knowledge, elsewhere)
     assert command.goal is not None
-    return GoalCondition(GoalKind.WENT, goal=(_place_area(knowledge, command.goal),))
+    person = knowledge.person(command.goal)
+    return GoalCondition(GoalKind.WENT, goal=(_place_area(knowledge, command.goal),), person=person)
 
 
 def _waited(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition | None:

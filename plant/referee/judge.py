@@ -13,6 +13,7 @@ from skills.robot import FloatArray
 
 REACH_OF_PERSON_M = 1.0
 OFFER_HEIGHT_M = 0.4
+NEAR_PERSON_M = 2.0
 NAMED_REGIONS = 3
 PERSON = "person"
 _STATE_KINDS = (GoalKind.WENT, GoalKind.PLACED, GoalKind.HANDED_OVER)
@@ -127,6 +128,8 @@ def _judge_placed(condition: GoalCondition, truth: Truth, past: bool) -> Finding
 def _judge_went(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
     """The body in the place, now or (when overtaken) at some time."""
     robots = [name for name in truth.bases if condition.robot in (None, name)]
+    if condition.person is not None and robots:
+        return _judge_near_person(condition.person, robots[0], truth, past)
     for name in robots:
         points = truth.paths[name] if past else truth.bases[name][None, :]
         there = next((on for p in points if (on := _region_at(condition.goal, p)) is not None), None)
@@ -136,6 +139,15 @@ def _judge_went(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
         return Finding(False, f"There is no robot {condition.robot}.")
     x, y, _ = truth.bases[robots[0]]
     return Finding(False, f"{robots[0]} is at ({x:.2f}, {y:.2f}), not at {_where(condition.goal)}.")
+
+
+def _judge_near_person(person: str, robot: str, truth: Truth, past: bool) -> Finding:
+    """The robot near a person, now or (when overtaken) at some time."""
+    p_WP = truth.persons.get(person)
+    if p_WP is None:
+        return Finding(False, f"there is no person {person} to go to.")
+    apart_m = min(_apart_m(p, p_WP) for p in (truth.paths[robot] if past else [truth.bases[robot]]))
+    return Finding(apart_m <= NEAR_PERSON_M, f"{robot} {'was' if past else 'is'} {apart_m:.1f} m from {person}.")
 
 
 def _judge_answered(condition: GoalCondition, truth: Truth, past: bool) -> Finding:

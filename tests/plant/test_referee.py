@@ -365,6 +365,19 @@ def test_went_is_judged_where_the_body_is_at_the_end():
     assert "(2.00, -3.00), not at the hall" in stage.referee.judge([to_hall]).why
 
 
+# where the body is  -> holds now, and as a step that another one follows
+@pytest.mark.parametrize(("place", "now"), [((1.0, 2.0, 0.5), True), ((3.0, -3.0, 0.5), False)])
+def test_going_to_a_person_is_judged_by_the_distance_to_them(place, now):
+    stage, goal = Stage(), square("hall", 0.0, 0.0)
+    to_robin = GoalCondition(GoalKind.WENT, goal=(goal,), person="robin", robot="alice")
+    stage.put("body", place).watch()
+    assert stage.holds(to_robin) is now
+    assert not stage.holds(dataclasses.replace(to_robin, person="eve"))
+    stage.put("body", (-4.0, -4.0, 0.5)).watch()
+    away = GoalCondition(GoalKind.WENT, goal=(square("far", -4.0, -4.0),), robot="alice")
+    assert stage.holds(to_robin, away) is now
+
+
 @pytest.mark.parametrize(("answer", "true_of"), [(True, TABLE), (False, SHELF)])
 def test_answer_is_compared_with_the_truth(answer, true_of):
     stage = Stage()

@@ -26,7 +26,7 @@ class Answer(ExplainedDecorator):
     answer False. Child FAILURE with a surface that could not be looked at: FAILURE with what kept the robot from it.
     `looks` names for each surface the leaves that look at it, one for each viewpoint: all of them must have looked,
     which means that they succeeded, or failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; one
-    that `tells` repeats what was seen where.
+    that `tells` repeats what was seen where. `question` is what a yes says, `denied` what a no says.
 
     With `tallies` the child looks at all surfaces, and what its leaves saw, each under a blackboard key, is counted,
     each object once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
@@ -34,6 +34,7 @@ class Answer(ExplainedDecorator):
     """
 
     question: str
+    denied: str = ""
     looks: Mapping[str, Sequence[str]]
     key: str
     board: Board
@@ -76,10 +77,11 @@ class Answer(ExplainedDecorator):
 
     def _answered(self, answer: bool, found: str) -> Status:
         self.answer, self.cause = answer, None
-        self.message = f"{'yes' if answer else 'no'}: {self.question}" + (f"; {found}" if found else "")
+        told = f"yes: {self.question}" if answer else f"no: {self.denied or self.question}"
+        self.message = told + (f"; {found}" if found else "")
         self.board.put(self.key, answer)
-        told = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
-        self.publish(ANSWER_TOPIC, told)
+        note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
+        self.publish(ANSWER_TOPIC, note)
         return Status.SUCCESS
 
 

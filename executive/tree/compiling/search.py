@@ -134,7 +134,7 @@ def search_plan(builder: PlanBuilder, thing: Thing, place: str | None, key: str,
     )
     looks = look_plans(builder, thing, surfaces, key)
     further = look_plans(builder.at("elsewhere"), thing, elsewhere, key)
-    looked = where(place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
+    looked = where(builder.knowledge, place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
     return builder.node(
         "selector",
         f"find {thing}",
@@ -170,6 +170,8 @@ def required_surfaces(builder: PlanBuilder, thing: Thing, place: str | None) -> 
     return surfaces
 
 
-def where(place: str | None) -> str:
-    """The place as the end of a sentence."""
-    return "anywhere" if place is None else f"in the {place}"
+def where(knowledge: Knowledge, place: str | None) -> str:
+    """The place as the end of a sentence: in a room, on a surface."""
+    if place is None:
+        return "anywhere"
+    return f"{'on' if place in knowledge.surfaces else 'in'} the {place}"

@@ -9,7 +9,7 @@ from typing import Final
 
 from executive.mission.command import START, TIME_UNITS_S, Task, Thing
 from executive.mission.geometry import inside
-from executive.mission.knowledge import ANYBODY
+from executive.mission.knowledge import ANYBODY, ANYTHING
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
@@ -59,7 +59,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     search = search_plan(builder.at("find"), thing, place, key, anywhere=anywhere)
     get = (pick_up_plan(builder, thing, search, key, around), tuck_plan(builder))
     if not builder.in_gripper:
-        return builder.sequence(f"get {thing} {where(place)}", *get)
+        return builder.sequence(f"get {thing} {where(builder.knowledge, place)}", *get)
     return builder.node(
         "selector", f"have {thing}", held_plan(builder, thing), builder.at("get").sequence("get it", *get)
     )
@@ -89,12 +89,19 @@ def find_plan(builder: PlanBuilder) -> NodeSpec:
     below = builder.at("search")
     search = below.node("round" if counting else "selector", f"look for {what}", *(look for _, look in looks))
     leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
-    named = "is" if person in knowledge.people else "are there" if counting else "is there"
+    spot = where(knowledge, place)
+    denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {asked} {spot}"
+    if what == ANYTHING:
+        asked, denied = "something", f"nothing {spot}"
+    elif person == ANYBODY and not counting:
+        denied = f"nobody {spot}"
+    named = "is" if person in knowledge.people else "are there" if counting and what != ANYTHING else "is there"
     answer = builder.node(
         "answer",
-        f"{named} {asked} {where(place)}?",
+        f"{named} {asked} {spot}?",
         search,
-        question=f"{asked} {where(place)}",
+        question=f"{asked} {spot}",
+        denied=denied,
         looks=MappingProxyType(leaves),
         key=f"{builder.path_id}/answer",
         tells=place is None,
@@ -207,7 +214,7 @@ def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
         )
     guards = tuple(_carry_to_plan(builder.at(name, "carry"), item, name) for name in surfaces)
     ways = tuple(_put_on_plan(builder.at(name), name, guard) for name, guard in zip(surfaces, guards, strict=True))
-    put = builder.node("selector", f"put {item} down {where(place)}", *ways)
+    put = builder.node("selector", f"put {item} down {where(builder.knowledge, place)}", *ways)
     return unless_dropped(builder.at("carry-on"), item, put, guards)
 
 

@@ -54,6 +54,11 @@ def test_a_person_is_named(knowledge):
     assert (condition.kind, condition.person) == (GoalKind.HANDED_OVER, "Sam")
 
 
+def test_going_to_a_person_asks_for_that_person(knowledge):
+    (condition,) = conditions(knowledge, "Take [Nothing] to [Sam] and do [Nothing] to [Nothing]")
+    assert (condition.kind, condition.person) == (GoalKind.WENT, "Sam")
+
+
 @pytest.mark.parametrize(
     ("goal", "point"), [("kitchen", (5.9, -1.9, 0.5)), ("counter", (4.5, -1.0, 0.5)), ("start", (0, 0, 0.5))]
 )

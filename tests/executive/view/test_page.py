@@ -481,7 +481,7 @@ def recording(tmp_path) -> Path:
 
 def expect_scene_follows_slider(page) -> None:
     # slider at the end, past the recording's 0.5 s -> held at 0.5; at the beginning -> held at 0
-    viewer = "document.querySelector('#scene iframe').contentWindow.viewer"
+    viewer = "document.querySelector('#scene iframe')?.contentWindow.viewer"
     shows = f"t => {{ const v = {viewer}; return Boolean(v) && !v.animator.playing && v.animator.t === t; }}"
     page.wait_for_function(shows, arg=0.5)
     page.locator("#slider").focus()

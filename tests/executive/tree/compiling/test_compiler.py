@@ -175,12 +175,12 @@ def one_person(knowledge):
     ("goal", "asked", "people_in", "answer", "looks", "told"),
     [
         ("kitchen", "person", {"kitchen"}, True, 1, "yes: somebody in the kitchen"),
-        ("kitchen", "person", set(), False, 1, "no: somebody in the kitchen"),
+        ("kitchen", "person", set(), False, 1, "no: nobody in the kitchen"),
         ("Nothing", "person", {"bedroom"}, True, 2, "yes: somebody anywhere; saw them in the bedroom"),
         ("Nothing", "Robin", {"hall"}, True, 1, "yes: Robin anywhere; saw them in the hall"),
-        ("Nothing", "Robin", set(), False, 4, "no: Robin anywhere"),
+        ("Nothing", "Robin", set(), False, 4, "no: not Robin anywhere"),
         ("Nothing", "some person", {"hall", "kitchen"}, True, 4, "yes: people anywhere; there are two people in the"),
-        ("kitchen", "2 person", {"kitchen"}, False, 1, "no: two people in the kitchen; there is one person in the"),
+        ("kitchen", "2 person", {"kitchen"}, False, 1, "no: not two people in the kitchen; there is one person in the"),
     ],
 )
 def test_people_are_looked_for_in_rooms(
@@ -221,8 +221,8 @@ def test_people_who_cannot_be_looked_for_are_refused(compiled, asked, goal, why)
             "yes: cokes in the kitchen; there are two cokes on the counter and",
         ),
         ("2 coke", ("counter", "shelf"), True, "yes: two cokes in the kitchen; there are two cokes"),
-        ("2 coke", ("shelf",), False, "no: two cokes in the kitchen; there is one coke on the shelf"),
-        ("some coke", (), False, "no: cokes in the kitchen"),
+        ("2 coke", ("shelf",), False, "no: not two cokes in the kitchen; there is one coke on the shelf"),
+        ("some coke", (), False, "no: no cokes in the kitchen"),
     ],
 )
 def test_things_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, script, asked, seen_on, answer, told):

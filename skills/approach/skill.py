@@ -80,9 +80,7 @@ class Approach(ArmSkill[ApproachInputs]):
                 message="choosing where to stand",
             )
             if not places:
-                raise SkillFailure(
-                    Cause.PLANNING, f"there is no free place to stand from which the {seen.thing} is within reach"
-                )
+                raise SkillFailure(Cause.PLANNING, self._why_none(seen))
             yield from self.stow()
             tolerances = (self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s)
             goals = [NavigateInputs(place.pose, *tolerances) for place in places[: self.options.tries]]
@@ -106,6 +104,14 @@ class Approach(ArmSkill[ApproachInputs]):
         context = self.context
         point_W = (seen.position_W[0], seen.position_W[1])
         return free_places(point_W, context.pose(), context.costmap, context.robot.capabilities())
+
+    def _why_none(self, seen: ObjectObservation) -> str:
+        """Whether the object itself is beyond the gripper, or only the places about it are."""
+        candidates = self.context.stack.grasp_planner.candidates
+        if candidates(observed_target(seen, self.X_WB()), p_BS=self.model.p_BS, gripper=self.gripper):
+            return f"there is no free place to stand from which the {seen.thing} is within reach"
+        size_mm = " x ".join(f"{1000 * side:.0f}" for side in seen.size_m)
+        return f"the gripper cannot take hold of the {seen.thing} as it lies ({size_mm} mm)"
 
     def _reach_cost(self, seen: ObjectObservation) -> Callable[[Pose2D], float | None]:
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]

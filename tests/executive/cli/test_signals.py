@@ -15,6 +15,16 @@ from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore
 
 ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(autouse=True)
+def a_terminal_that_can_hang_up():
+    """The tests themselves may run under `nohup`, which has the signal ignored."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
 RUN = """
     import sys, threading, time
     from pathlib import Path

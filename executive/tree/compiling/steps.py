@@ -100,7 +100,7 @@ def find_plan(builder: PlanBuilder) -> NodeSpec:
         "answer",
         f"{named} {asked} {spot}?",
         search,
-        question=f"{asked} {spot}",
+        question=asked if place is None else f"{asked} {spot}",
         denied=denied,
         looks=MappingProxyType(leaves),
         key=f"{builder.path_id}/answer",

@@ -176,10 +176,10 @@ def one_person(knowledge):
     [
         ("kitchen", "person", {"kitchen"}, True, 1, "yes: somebody in the kitchen"),
         ("kitchen", "person", set(), False, 1, "no: nobody in the kitchen"),
-        ("Nothing", "person", {"bedroom"}, True, 2, "yes: somebody anywhere; saw them in the bedroom"),
-        ("Nothing", "Robin", {"hall"}, True, 1, "yes: Robin anywhere; saw them in the hall"),
+        ("Nothing", "person", {"bedroom"}, True, 2, "yes: somebody; saw them in the bedroom"),
+        ("Nothing", "Robin", {"hall"}, True, 1, "yes: Robin; saw them in the hall"),
         ("Nothing", "Robin", set(), False, 4, "no: not Robin anywhere"),
-        ("Nothing", "some person", {"hall", "kitchen"}, True, 4, "yes: people anywhere; there are two people in the"),
+        ("Nothing", "some person", {"hall", "kitchen"}, True, 4, "yes: people; there are two people in the"),
         ("kitchen", "2 person", {"kitchen"}, False, 1, "no: not two people in the kitchen; there is one person in the"),
     ],
 )

@@ -104,7 +104,7 @@ class ScanMatchingLocaliser:
         scan = robot.scan()
         if scan is None or scan.stamp_s <= self._stamp_s or self._frozen(scan):
             return
-        self._stamp_s, self._scan = scan.stamp_s, scan
+        self._stamp_s = scan.stamp_s
         self._predict(Pose2D.from_transform(scan.X_OB))
         points_F = self._points(scan)
         if len(points_F) < self._options.min_points:
@@ -187,9 +187,10 @@ class ScanMatchingLocaliser:
         self._localised = self._localised and self._poor_scans < self._options.lost_scans
 
     def _frozen(self, scan: Scan) -> bool:
-        """Whether a scan repeats the last one, noise and all, although the robot has moved."""
+        """Whether a scan repeats an earlier one, noise and all, although the robot has moved since."""
         last = self._scan
         if last is None or not np.array_equal(scan.ranges_m, last.ranges_m, equal_nan=True):
+            self._scan = scan
             return False
         step = relative(Pose2D.from_transform(last.X_OB), Pose2D.from_transform(scan.X_OB))
         return math.hypot(step.x_m, step.y_m) > _FROZEN_M or abs(step.yaw_rad) > _FROZEN_RAD

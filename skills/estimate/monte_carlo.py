@@ -28,9 +28,11 @@ class MonteCarloOptions:
 
     Particles are weighed after each `update_m` of the way or `update_rad` of a turn; at rest, while the place is not
     known, every `patience_scans` scans, but a few times only, since all these scans err alike. The place is known once
-    `sure_mass` of the weight is in one mode for `sure_updates` on end, and unknown when less than `unsure_mass` is left in it. Where scans surprise by more than `surprise`, or the place is not known,
-    particles are injected: of `draws` random poses, the best `hypotheses`, refined by scan matching; about each
-    `injected` particles. A search of the map finds nothing where places differ by less than `alike_share`.
+    `sure_mass` of the weight is in one mode for `sure_updates` on end. When less than `unsure_mass` is left there, it
+    is given up for a mode where the scan fits better by `better_share`, and has for `better_updates` where scan matching
+    still explains most of it. Where scans surprise by more than `surprise`,
+    or the place is not known, particles are injected: of `draws` random poses, the best `hypotheses`, refined by scan
+    matching; about each `injected` particles. Two places alike but for `alike_share` are none that a search finds.
     """
 
     tracking: LocaliserOptions = field(default_factory=LocaliserOptions)
@@ -41,7 +43,9 @@ class MonteCarloOptions:
     sure_mass: Share = 0.85
     sure_updates: Count = 3
     unsure_mass: Share = 0.4
-    surprise: Share = 0.15
+    better_share: Share = 0.1
+    better_updates: Count = 10
+    surprise: Share = 0.25
     draws: Count = 10_000
     hypotheses: Count = 12
     injected: Count = 25
@@ -71,7 +75,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         else:
             self._filter.place(initial, self._covariance)
         self._weighed_at: Pose2D | None = None
-        self._scans = self._at_rest = 0
+        self._scans = self._at_rest = self._rival_updates = 0
         self._agreeing = 0 if initial is None else self._own.sure_updates
         self._mass = 0.0 if initial is None else 1.0
 
@@ -149,7 +153,6 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         options = self._own
         self._mass = self._filter.mass_near(compose(self._X_WO, self._X_OB)) if self._placed else 0.0
         if self._mass < options.unsure_mass:
-            self._localised = False
             self._go_to(self._filter.mode(), points_F)
         sure = self._mass >= options.sure_mass and self._inlier_share >= self._options.found_share
         self._agreeing = self._agreeing + 1 if sure or (self._localised and self._mass >= options.unsure_mass) else 0
@@ -157,11 +160,16 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
             self._localised, self._poor_scans = True, 0
 
     def _go_to(self, mode: Mode, points_F: FloatArray) -> None:
-        """Believe in a mode, where the scan fits there and it has more weight than the belief."""
+        """Believe in a mode where the scan fits; in place of a belief that fits well only if it is better for long."""
         found = match(self._grid, points_F, mode.mean, mode.covariance + _SPREAD, self._options.matching)
-        if found.inlier_share >= self._options.lost_share and mode.mass > self._mass:
+        fits = mode.mass > self._mass and found.inlier_share >= self._options.lost_share
+        better = fits and found.inlier_share > self._inlier_share + self._own.better_share
+        self._rival_updates = self._rival_updates + 1 if better else 0
+        doubted = self._inlier_share < self._options.found_share or self._rival_updates >= self._own.better_updates
+        if fits and (not self._localised or (better and doubted)):
             self._believe(found)
-            self._placed, self._mass, self._inlier_share = True, mode.mass, found.inlier_share
+            self._placed, self._localised, self._rival_updates = True, False, 0
+            self._mass, self._inlier_share = mode.mass, found.inlier_share
 
     def _injected(self, points_F: FloatArray, beams: FloatArray) -> FloatArray | None:
         """Particles for hypotheses that the filter may not have: the belief, and when scans surprise, any other."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from skills.estimate.compiled import compiled
 from skills.estimate.grid_map import GridMap
 from skills.geometry import wrap
-from skills.quantities import Count, Factor, Length, Share, Tries, Turn
+from skills.quantities import Count, Factor, Length, Margin, Share, Tries, Turn
 from skills.robot import FloatArray, Pose2D
 
 MODE_RADIUS_M = 0.5
@@ -22,17 +22,20 @@ MODE_TURN_RAD = 0.35
 """Particles nearer than both to a pose belong to the mode there."""
 _AGREEMENT_PARTICLES = 200
 _IN_WALL = 5.0
+_MOST_ANNEALING = 12
 
 
 @dataclass(frozen=True)
 class FilterOptions:
     """How particles move, are weighed, and how many there are.
 
-    `beams` points of a scan count as `effective_beams` independent ones; each is a hit of spread `hit_sigma_m`, or with
+    `beams` points of a scan count as `effective_beams` independent ones, or fewer, so that after weighing at least
+    `least_effective` particles count; each is a hit of spread `hit_sigma_m`, or with
     `random_share` anything. A beam that less than `skip_share` of the particles explain within `skip_m` is skipped,
     unless that were more than `skip_most` of the beams. The number of particles keeps the KL divergence over bins of
     `bin_m` and `bin_rad` below `kld_error` at the normal quantile `kld_quantile`. `slow` and `fast` are the rates of
-    the two averages of the likelihood. Odometry errs by `drift_per_m`, `yaw_drift_rad_per_m` and `yaw_drift_per_rad`.
+    the two averages of the likelihood. Odometry errs by `drift_per_m`, `yaw_drift_rad_per_m` and `yaw_drift_per_rad`;
+    `roughening_m` and `roughening_rad` keep equal particles apart.
     """
 
     seed: Tries = 0
@@ -44,6 +47,7 @@ class FilterOptions:
     bin_m: Length = 0.25
     bin_rad: Turn = 0.175
     effective_beams: Factor = 12.0
+    least_effective: Factor = 40.0
     hit_sigma_m: Length = 0.1
     random_share: Share = 0.1
     skip_m: Length = 0.4
@@ -54,6 +58,8 @@ class FilterOptions:
     drift_per_m: Share = 0.06
     yaw_drift_rad_per_m: Share = 0.04
     yaw_drift_per_rad: Share = 0.06
+    roughening_m: Margin = 0.015
+    roughening_rad: Margin = 0.008
 
 
 @dataclass(frozen=True)
@@ -121,8 +127,8 @@ class ParticleFilter:
         """Move each particle by a step of odometry, in the body frame, with the odometry's errors."""
         options = self._options
         way, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
-        along = 2e-3 + options.drift_per_m * way
-        yaw = 1e-3 + options.yaw_drift_rad_per_m * way + options.yaw_drift_per_rad * turn
+        along = options.roughening_m + options.drift_per_m * way
+        yaw = options.roughening_rad + options.yaw_drift_rad_per_m * way + options.yaw_drift_per_rad * turn
         noise = self._rng.standard_normal(self.poses.shape) * (along, along, yaw)
         dx, dy = step.x_m + noise[:, 0], step.y_m + noise[:, 1]
         c, s = np.cos(self.poses[:, 2]), np.sin(self.poses[:, 2])
@@ -139,8 +145,12 @@ class ParticleFilter:
         self._fast = self._fast + options.fast * (fit - self._fast) if self._fast > 0.0 else fit
         kept = self._explained(points_F)
         logs = everything if kept.all() else self.log_likelihoods(self.poses, points_F[kept])
-        weights = self.weights * np.exp(options.effective_beams * (logs - logs.max()))
-        self.weights = weights / weights.sum()
+        power, steps = options.effective_beams, 0
+        weights = self._weighed(logs, power)
+        while 1.0 / float(weights @ weights) < options.least_effective and steps < _MOST_ANNEALING:
+            power, steps = 0.6 * power, steps + 1
+            weights = self._weighed(logs, power)
+        self.weights = weights
 
     def log_likelihoods(self, poses: FloatArray, points_F: FloatArray) -> FloatArray:
         """The mean log likelihood (N,) of the beams at each pose."""
@@ -172,6 +182,10 @@ class ParticleFilter:
             mean, covariance = _spread(self.poses[chosen], self.weights[chosen])
             chosen = self._near(mean)
         return Mode(float(self.weights[chosen].sum()), mean, covariance)
+
+    def _weighed(self, logs: FloatArray, power: float) -> FloatArray:
+        weights = self.weights * np.exp(power * (logs - logs.max()))
+        return np.asarray(weights / weights.sum())
 
     def _near(self, pose: Pose2D) -> NDArray[np.bool_]:
         off = self.poses - [pose.x_m, pose.y_m, pose.yaw_rad]

@@ -29,10 +29,10 @@ class MonteCarloOptions:
     Particles are weighed after each `update_m` of the way or `update_rad` of a turn; at rest, while the place is not
     known, every `patience_scans` scans, but a few times only, since all these scans err alike. The place is known once
     `sure_mass` of the weight is in one mode for `sure_updates` on end. When less than `unsure_mass` is left there, it
-    is given up for a mode where the scan fits better by `better_share`, and has for `better_updates` where scan matching
-    still explains most of it. Where scans surprise by more than `surprise`,
-    or the place is not known, particles are injected: of `draws` random poses, the best `hypotheses`, refined by scan
-    matching; about each `injected` particles. Two places alike but for `alike_share` are none that a search finds.
+    is given up for a mode where the scan fits better by `better_share`; while scan matching still explains most of the
+    scan, only after `better_updates` of that. Where scans surprise by more than `surprise`, or the place is not known,
+    particles are injected: of `draws` random poses, the best `hypotheses`, refined by scan matching; about each
+    `injected` particles. Two places alike but for `alike_share` are none that a search finds.
     """
 
     tracking: LocaliserOptions = field(default_factory=LocaliserOptions)

@@ -310,4 +310,5 @@ def _agreement(
             u, v = x0 + c * points[n, 0] - s * points[n, 1], y0 + s * points[n, 0] + c * points[n, 1]
             if 0.0 <= u < columns and 0.0 <= v < rows and abs(distance[int(v), int(u)]) < near_m:
                 counts[n] += 1.0
-    return counts / max(1, poses.shape[0])
+    counts /= max(1, poses.shape[0])
+    return counts

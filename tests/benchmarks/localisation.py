@@ -19,7 +19,7 @@ import math
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -190,9 +190,7 @@ class Wanderer:
         self.rng = np.random.default_rng(seed)
         X_BL = RigidTransform(spot_facts()["lidar"]["xyz"])
         inspector = engine.world.scene_graph.model_inspector()
-        self._lidar = Lidar(
-            self._plant, inspector, self._model.body, X_BL, self.rng, unseen=self._model.instances()
-        )
+        self._lidar = Lidar(self._plant, inspector, self._model.body, X_BL, self.rng, unseen=self._model.instances())
         self._odometry = OdometryModel(self.rng)
         self._keepout = load_grid_map(world.keepout_map_path).with_unknown_blocked()
         self.now_s, self.way_m, self._turning = 0.0, 0.0, 0.0

@@ -280,13 +280,13 @@ class Bench:
         believed_start: Pose2D | None = None,
         seed: int = 0,
         cameras: bool = True,
-        component: LocaliserComponent = LocaliserOptions(),
+        component: LocaliserComponent | None = None,
         told: bool = True,
     ) -> None:
         self.clock = PlanarClock()
         self.robot = PlanarRobot(self.clock, [*surveyed, *unmapped], start, seed=seed, cameras=cameras)
         believed = (believed_start or start) if told else None
-        self.localiser = component.build(grid_of(surveyed, (0.7, 1.3)), believed, surely=told)
+        self.localiser = (component or LocaliserOptions()).build(grid_of(surveyed, (0.7, 1.3)), believed, surely=told)
         self.costmap = LayeredCostmap(grid_of(surveyed, (0.05, 1.0)))
         self.worker = NamingWorker(self.clock)
         self.published: list[tuple[str, Mapping[str, Any]]] = []

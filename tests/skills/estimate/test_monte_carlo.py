@@ -1,4 +1,4 @@
-"""Monte Carlo localisation of a robot among boxes: driven, kidnapped, nowhere in particular, and with a broken LiDAR."""
+"""Monte Carlo localisation of a robot among boxes: driven, kidnapped, anywhere, and with a broken LiDAR."""
 
 import dataclasses
 import math
@@ -119,9 +119,7 @@ def test_a_frozen_lidar_makes_the_estimate_old_and_not_wrong(component):
     bench = Bench(START, component=component, cameras=False)
     tick(bench, 20)
     old, now_s = bench.robot.scan(), bench.clock.now()
-    bench.robot.scan = lambda: dataclasses.replace(
-        old, stamp_s=bench.clock.now(), X_OB=bench.robot.odometry().X_OB
-    )
+    bench.robot.scan = lambda: dataclasses.replace(old, stamp_s=bench.clock.now(), X_OB=bench.robot.odometry().X_OB)
     tick(bench, 20, (0.4, 0.0, 0.0))
     assert bench.localiser.estimate().stamp_s < now_s + 0.3
     assert bench.pose_error()[0] < 0.03

@@ -172,8 +172,8 @@ class Simulation:
         """Build the plant of `world`; things and people stand where the seed puts them.
 
         The first robot stands at `start`, by default the world's start pose, others a robot's length behind one
-        another. Batteries begin at `charge` (0 to 1). `extra_models` stand in the world though no map knows them; `locomotion` limits what bears
-        the robots. Raises WorldError when the things do not fit into the world.
+        another. Batteries begin at `charge` (0 to 1). `extra_models` stand in the world though no map knows them;
+        `locomotion` limits what bears the robots. Raises WorldError when the things do not fit into the world.
         """
         self.seed, self.world, self.start = seed, world, start or world.start
         things, people = place_objects(world, seed), place_people(world, seed)

@@ -15,7 +15,7 @@ _BEYOND_M = 5.0
 
 @dataclass(frozen=True)
 class FreeSpaceOptions:
-    """Points between `heights_m` above the floor are in the way; the body keeps off them at its sides, ahead, in a turn."""
+    """Points between `heights_m` above the floor are in the way; what the body keeps off them (m)."""
 
     heights_m: tuple[Height, Height] = (0.1, 1.2)
     side_m: Margin = 0.15

@@ -106,10 +106,14 @@ def run_entry(
         raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
     scan_map, keepout_map = _grid(world.scan_map_path), _grid(world.keepout_map_path)
     start = believed or (simulation.start if told else None)
+    try:
+        localiser = stack.localiser.build(scan_map, start, surely=told and believed is None)
+    except MapError as error:
+        raise InputError(f"{world.scan_map_path}: {error}") from error
     return RunEntry(
         tree=tree,
         robot=simulation.robots[tree.robot_name],
-        localiser=stack.localiser.build(scan_map, start, surely=told and believed is None),
+        localiser=localiser,
         costmap=stack.costmap.build(keepout_map),
         detector=shared_detector(stack),
         stack=stack,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
-from skills.estimate.grid_map import GridMap
+from skills.estimate.grid_map import GridMap, MapError
 from skills.geometry import wrap
 from skills.quantities import Count, Factor, Length, Margin, Share, Tries, Turn
 from skills.robot import FloatArray, Pose2D
@@ -23,6 +23,7 @@ MODE_TURN_RAD = 0.35
 _AGREEMENT_PARTICLES = 200
 _IN_WALL = 5.0
 _MOST_ANNEALING = 12
+_LEAST_SHARE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class FilterOptions:
     beams: Count = 60
     min_particles: Count = 400
     max_particles: Count = 20_000
-    kld_error: Share = 0.05
+    kld_error: Factor = 0.05
     kld_quantile: Factor = 2.33
     bin_m: Length = 0.25
     bin_rad: Turn = 0.175
@@ -72,7 +73,10 @@ class Mode:
 
 
 class ParticleFilter:
-    """Weighted poses X_WB. `place` or `scatter` first; then `move`, `weigh` and `resample` in turn."""
+    """Weighted poses X_WB. `place` or `scatter` first; then `move`, `weigh` and `resample` in turn.
+
+    Raises MapError: the map has no free ground.
+    """
 
     def __init__(self, grid: GridMap, options: FilterOptions) -> None:
         self._grid, self._options = grid, options
@@ -80,7 +84,8 @@ class ParticleFilter:
         self._field = _likelihood_field(grid, options)
         self._geometry = (grid.resolution_m, grid.origin_m[0], grid.origin_m[1])
         self._standable = _standable(grid)
-        self._free = np.argwhere(self._standable)
+        if not self._standable.any():
+            raise MapError("the map has no free ground where a robot could be; check its picture and thresholds")
         self._slow = self._fast = 0.0
         self.poses: FloatArray = np.empty((0, 3))
         self.weights: FloatArray = np.empty(0)
@@ -110,11 +115,13 @@ class ParticleFilter:
 
     def anywhere(self, count: int) -> FloatArray:
         """Poses (count, 3) drawn evenly from the free cells."""
-        poses = np.empty((count, 3))
-        cells = self._free[self._rng.integers(len(self._free), size=count)]
-        poses[:, :2] = self._grid.centres(cells) + self._grid.resolution_m * (self._rng.random((count, 2)) - 0.5)
-        poses[:, 2] = self._rng.uniform(-math.pi, math.pi, count)
-        return poses
+        kept = np.empty((0, 2))
+        while len(kept) < count:
+            drawn = self._rng.random((4 * count, 2)) * self._standable.shape
+            rows, columns = drawn.astype(np.int64).T
+            kept = np.concatenate([kept, drawn[self._standable[rows, columns]]])
+        places = kept[:count, ::-1] * self._grid.resolution_m + self._grid.origin_m
+        return np.column_stack([places, self._rng.uniform(-math.pi, math.pi, count)])
 
     def likely(self, draws: int, count: int, points_F: FloatArray) -> FloatArray:
         """The likeliest (count, 3) of so many random poses, at most one of each part of the map and heading."""
@@ -228,7 +235,7 @@ class ParticleFilter:
 def _likelihood_field(grid: GridMap, options: FilterOptions) -> NDArray[np.float32]:
     """The log likelihood of a beam that ends in each cell."""
     hits = np.exp(-0.5 * np.square(grid.distance / options.hit_sigma_m))
-    field = np.log((1.0 - options.random_share) * hits + options.random_share)
+    field = np.log((1.0 - options.random_share) * hits + max(options.random_share, _LEAST_SHARE))
     return np.ascontiguousarray(field, dtype=np.float32)
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from skills.estimate.grid_map import GridMap
+from skills.estimate.grid_map import GridMap, MapError
 from skills.estimate.particle_filter import FilterOptions, ParticleFilter
 from skills.robot import Pose2D
 from skills.testing.blocks import Block, block_array, cast_rays, grid_of
@@ -136,6 +136,11 @@ def test_random_poses_stand_on_free_known_ground():
     cells = half.cells(poses)
     assert not unknown[cells[:, 0], cells[:, 1]].any()
     assert not grid.occupied[cells[:, 0], cells[:, 1]].any()
+
+
+def test_a_map_without_free_ground_is_refused():
+    with pytest.raises(MapError, match="no free ground"):
+        ParticleFilter(GridMap(np.ones((20, 20), dtype=np.bool_), 0.05, (0.0, 0.0)), FilterOptions())
 
 
 def test_equal_seeds_give_equal_particles_and_others_do_not():

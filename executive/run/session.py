@@ -258,7 +258,6 @@ class Session:
                 },
                 "yaw_rad": flat.yaw_rad,
                 "covariance": estimate.covariance.ravel().tolist(),
-                "health": round(estimate.health, 3),
             },
         )
 
@@ -273,6 +272,7 @@ class Session:
                 "charge": round(robot.battery().charge, 4),
                 "speed_m_s": round(math.hypot(*robot.odometry().velocity[:2]), 3),
                 "localised": estimate.localised,
+                "localisation_health": round(estimate.health, 3),
                 "position_sigma_m": round(math.sqrt(estimate.covariance[0, 0] + estimate.covariance[1, 1]), 4),
             },
         )

@@ -74,6 +74,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
             self._filter.scatter()
         else:
             self._filter.place(initial, self._covariance)
+        self._lost_covariance = self._filter.covariance
         self._weighed_at: Pose2D | None = None
         self._scans = self._at_rest = self._rival_updates = 0
         self._agreeing = 0 if initial is None else self._own.sure_updates
@@ -87,7 +88,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
     def estimate(self) -> LocalisationEstimate:
         """The latest estimate; while the place is not known its covariance is that of all particles."""
         estimate = super().estimate()
-        return estimate if self._localised else replace(estimate, covariance=self._filter.covariance)
+        return estimate if self._localised else replace(estimate, covariance=self._lost_covariance.copy())
 
     def accept(self, estimate: LocalisationEstimate) -> None:
         """Believe an estimate from now on; all particles go there."""
@@ -146,6 +147,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         particles.weigh(beams)
         self._judge(points_F)
         particles.resample(self._injected(points_F, beams))
+        self._lost_covariance = particles.covariance
 
     def _judge(self, points_F: FloatArray) -> None:
         """Go to where the particles are; know the place, or not any more."""

@@ -167,14 +167,15 @@ class Simulation:
         charge: float = 1.0,
         locomotion: FloatingBaseLimits | None = None,
         extra_models: Sequence[LooseModel] = (),
+        start: Pose2D | None = None,
     ) -> None:
         """Build the plant of `world`; things and people stand where the seed puts them.
 
-        The first robot stands at the world's start pose, others a robot's length behind one another. Batteries begin at
-        `charge` (0 to 1). `extra_models` stand in the world though no map knows them; `locomotion` limits what bears
-        the robots. Raises WorldError when the things do not fit into the world.
+        The first robot stands at `start`, by default the world's start pose, others a robot's length behind one
+        another. Batteries begin at `charge` (0 to 1). `extra_models` stand in the world though no map knows them;
+        `locomotion` limits what bears the robots. Raises WorldError when the things do not fit into the world.
         """
-        self.seed, self.world = seed, world
+        self.seed, self.world, self.start = seed, world, start or world.start
         things, people = place_objects(world, seed), place_people(world, seed)
         built = build_diagram(
             directives=world.directives_path,
@@ -188,7 +189,7 @@ class Simulation:
             locomotion=locomotion,
             renderer_parameters=render_parameters(),
         )
-        self.engine = Engine(built, _starts(world.start, robot_names), seed=seed, dock=world.dock, charge=charge)
+        self.engine = Engine(built, _starts(self.start, robot_names), seed=seed, dock=world.dock, charge=charge)
         self.referee = Referee(
             built.plant,
             [*things, *people],

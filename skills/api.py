@@ -120,12 +120,17 @@ class ObjectObservation:
 
 @dataclass(frozen=True)
 class LocalisationEstimate:
-    """The robot's pose: X_WO corrects odometry, so that X_WB = X_WO @ X_OB. Covariance over x, y (m), yaw (rad)."""
+    """The robot's pose: X_WO corrects odometry, so that X_WB = X_WO @ X_OB. Covariance over x, y (m), yaw (rad).
+
+    `health` is how far it can be trusted, from 0 to 1: the share of what the robot sees that the map explains at this
+    pose, less what speaks for other poses.
+    """
 
     stamp_s: float
     X_WO: RigidTransform
     covariance: NDArray[np.float64]
     localised: bool
+    health: float = 1.0
 
 
 class Localiser(Protocol):

@@ -68,8 +68,11 @@ DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
 class LocaliserComponent(Protocol):
     """Makes the localiser of one robot."""
 
-    def build(self, grid: GridMap, start: Pose2D, *, surely: bool) -> Localiser:
-        """A localiser on a surveyed grid, told where the robot starts; not `surely` when it may have been moved."""
+    def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> Localiser:
+        """A localiser on a surveyed grid, told where the robot starts, or not (None).
+
+        Not `surely` when the robot may have been moved since it was at the start.
+        """
 
 
 class CostmapComponent(Protocol):

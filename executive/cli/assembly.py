@@ -3,32 +3,83 @@
 from __future__ import annotations
 
 import logging
+import math
 from functools import cache
 from pathlib import Path
+from typing import Final
+
+import numpy as np
 
 from executive.cli.goal_conditions import verdict_of
 from executive.mission.errors import InputError
+from executive.mission.request import Start
 from executive.run.outcome import RobotResult
 from executive.run.runner import RunEntry
 from executive.tree.compiler import CompiledTree
 from plant.referee import Verdict
 from plant.simulation import Simulation
 from plant.snapshot.file import SnapshotError
+from plant.worlds.placement import place_people
 from plant.worlds.world import World, WorldError
 from skills.detection import Detector
-from skills.estimate.grid_map import MapError, load_grid_map
+from skills.estimate.grid_map import GridMap, MapError, load_grid_map
 from skills.perception.detector.network_file import ModelFileError
 from skills.robot import Pose2D
 from skills.stack import DetectorComponent, RobotStack, default_stack
 
+STANDING_M: Final = 0.3
+TURNING_M: Final = 0.7
+FROM_PEOPLE_M: Final = 1.2
+_START_STREAM: Final = 7
 
-def simulate(world: World, *, seed: int, robot_name: str, record: bool, stack: RobotStack | None = None) -> Simulation:
+
+def simulate(
+    world: World,
+    *,
+    seed: int,
+    robot_name: str,
+    record: bool,
+    stack: RobotStack | None = None,
+    start: Pose2D | None = None,
+) -> Simulation:
     """The plant of a world, things set by the seed. Raises InputError when they do not fit into it."""
     logging.getLogger("drake").setLevel(logging.WARNING)  # Drake sets its own level when it is imported
     locomotion = (stack or default_stack()).locomotion
     try:
-        return Simulation(world, seed=seed, robot_names=(robot_name,), record=record, locomotion=locomotion)
+        return Simulation(
+            world, seed=seed, robot_names=(robot_name,), record=record, locomotion=locomotion, start=start
+        )
     except WorldError as error:
+        raise InputError(str(error)) from error
+
+
+def stand_at(world: World, start: Start, seed: int) -> Pose2D:
+    """The pose of a start: its own, or a free one with room to turn, away from people, that the seed chooses.
+
+    Raises InputError: the robot cannot stand there, or nowhere.
+    """
+    keepout = _grid(world.keepout_map_path).with_unknown_blocked()
+    if start.pose is not None:
+        x, y = start.pose.x_m, start.pose.y_m
+        if keepout.distance_m(np.array([[x, y]]))[0] < STANDING_M:
+            raise InputError(
+                f"there is no room for the robot at ({x:g}, {y:g}) in {world.name}", hint="start elsewhere"
+            )
+        return start.pose
+    places = keepout.centres(np.argwhere(keepout.distance > TURNING_M))
+    for person in place_people(world, seed):
+        places = places[np.hypot(*(places - person.X_WO.translation()[:2]).T) > FROM_PEOPLE_M]
+    if not len(places):
+        raise InputError(f"there is nowhere in {world.name} where the robot can turn", hint="give --start X Y YAW")
+    rng = np.random.default_rng([seed, _START_STREAM])
+    x, y = places[rng.integers(len(places))]
+    return Pose2D(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
+
+
+def _grid(path: Path) -> GridMap:
+    try:
+        return load_grid_map(path)
+    except (MapError, OSError) as error:
         raise InputError(str(error)) from error
 
 
@@ -39,10 +90,12 @@ def run_entry(
     stack: RobotStack | None = None,
     *,
     believed: Pose2D | None = None,
+    told: bool = True,
 ) -> RunEntry:
     """The robot of a tree's name with the components of its stack.
 
-    `believed` is where the robot believed to be before a restart; it looks for its place in a wide circle then.
+    `believed` is where the robot believed to be before a restart; it looks for its place in a wide circle then. When it
+    is not `told` where it stands either, it looks everywhere.
 
     Raises:
         InputError: there is no such robot, or the world's maps or the detector's model cannot be read.
@@ -51,14 +104,16 @@ def run_entry(
     if tree.robot_name not in simulation.robots:
         known = ", ".join(simulation.robots)
         raise InputError(f"there is no robot '{tree.robot_name}' in {world.name}", hint=f"known: {known}")
+    scan_map, keepout_map = _grid(world.scan_map_path), _grid(world.keepout_map_path)
+    start = believed or (simulation.start if told else None)
     try:
-        scan_map, keepout_map = load_grid_map(world.scan_map_path), load_grid_map(world.keepout_map_path)
-    except (MapError, OSError) as error:
-        raise InputError(str(error)) from error
+        localiser = stack.localiser.build(scan_map, start, surely=told and believed is None)
+    except MapError as error:
+        raise InputError(f"{world.scan_map_path}: {error}") from error
     return RunEntry(
         tree=tree,
         robot=simulation.robots[tree.robot_name],
-        localiser=stack.localiser.build(scan_map, believed or world.start, surely=believed is None),
+        localiser=localiser,
         costmap=stack.costmap.build(keepout_map),
         detector=shared_detector(stack),
         stack=stack,

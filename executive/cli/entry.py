@@ -5,6 +5,7 @@ Help and start-up would otherwise import the plant, the sentence parser and the 
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -55,6 +56,8 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "new-skill": _Command("new_skill_command", "new_skill", "Write an installable package with a skill and tests."),
 }
 """The commands by name, in the order of the help."""
+START: Final = "--start"
+_NUMBER: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def loaded(name: str) -> Any:
@@ -64,8 +67,20 @@ def loaded(name: str) -> Any:
     if isinstance(found, typer.Typer):
         return get_command(found)
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-    alone.command(name=name)(found)
+    alone.command(name=name, cls=_JoinsStart)(found)
     return get_command(alone)
+
+
+class _JoinsStart(TyperCommand):
+    """Takes `--start X Y YAW` as well as `--start unknown`: an option has a fixed number of values otherwise."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The usual, after three numbers behind the option have become one value."""
+        at = args.index(START) if START in args else len(args)
+        values = args[at + 1 : at + 4]
+        if len(values) == 3 and all(_NUMBER.fullmatch(value) for value in values):
+            args = [*args[:at], f"{START}={' '.join(values)}", *args[at + 4 :]]
+        return super().parse_args(ctx, args)
 
 
 class _LazyGroup(TyperGroup):

@@ -23,7 +23,7 @@ from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.language.questions import QuestionPolicy
-from executive.mission.request import Request
+from executive.mission.request import Request, Start
 from executive.record.profile import Profile, lines
 from executive.store.missions import MissionStore
 
@@ -43,6 +43,10 @@ Questions = Annotated[
 ]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 Anyway = Annotated[bool, typer.Option("--anyway", help="Begin although `errand check` would refuse it.")]
+StartAt = Annotated[
+    str | None,
+    typer.Option(metavar="X Y YAW", help="Where the robot stands (m, rad); 'unknown': anywhere, and it finds out."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 PageOf = Callable[[Prepared], PageView | None]
 
@@ -64,6 +68,7 @@ def run(
     profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: Store = None,
     stack: STACK = None,
+    start: StartAt = None,
     anyway: Anyway = False,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
@@ -82,7 +87,8 @@ def run(
     with refusals():
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
-        asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
+        at = None if start is None else Start.of(start)
+        asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack, at)
         finished, page = _run_kept(
             asked,
             kept_in,

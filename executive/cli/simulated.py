@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from executive.cli.artifacts import Artifacts, draw_artifacts
-from executive.cli.assembly import judge, run_entry, simulate, take_up_plant
+from executive.cli.assembly import judge, run_entry, simulate, stand_at, take_up_plant
 from executive.cli.backend import Scene
 from executive.cli.durable import Durable
 from executive.cli.mission_run import Finished, run_request
 from executive.cli.page_view import PageView
 from executive.cli.report import RefereeReport
 from executive.cli.requests import Prepared
+from executive.mission.request import Start
 from executive.mission.stack_file import load_stack
 from executive.record.profile import Profile
 from executive.run.control import Control
@@ -30,10 +31,21 @@ __all__ = ["SimulatedBackend", "run_simulated"]
 class SimulatedBackend:
     """One robot in the plant of a world (`executive.cli.backend.Backend`)."""
 
-    def __init__(self, world: World, stack: RobotStack, *, seed: int, robot_name: str, record: bool) -> None:
+    def __init__(
+        self,
+        world: World,
+        stack: RobotStack,
+        *,
+        seed: int,
+        robot_name: str,
+        record: bool,
+        start: Start | None = None,
+    ) -> None:
         """Build the plant, things set by the seed. Raises InputError when they do not fit into the world."""
         self._world, self._stack, self._robot_name, self._record = world, stack, robot_name, record
-        self._simulation = simulate(world, seed=seed, robot_name=robot_name, record=record, stack=stack)
+        self._told = start is None or start.pose is not None
+        pose = None if start is None else stand_at(world, start, seed)
+        self._simulation = simulate(world, seed=seed, robot_name=robot_name, record=record, stack=stack, start=pose)
 
     @property
     def clock(self) -> Clock:
@@ -43,8 +55,9 @@ class SimulatedBackend:
     def entry(self, tree: CompiledTree, durable: Durable | None) -> RunEntry:
         """The robot with its estimators; the plant's state is taken up and kept where `durable` says so."""
         if durable is None:
-            return run_entry(self._simulation, self._world, tree, self._stack)
-        entry = run_entry(self._simulation, self._world, tree, self._stack, believed=durable.pose)
+            return run_entry(self._simulation, self._world, tree, self._stack, told=self._told)
+        told, believed = self._told and not durable.take_up, durable.pose
+        entry = run_entry(self._simulation, self._world, tree, self._stack, believed=believed, told=told)
         if durable.take_up:
             take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
         durable.journal.keep_world = self._simulation.keep_in(durable.plant, label=durable.label)
@@ -101,6 +114,7 @@ def run_simulated(
         seed=request.seed,
         robot_name=prepared.mission.robot_name,
         record=request.record,
+        start=request.start,
     )
     return run_request(
         prepared, backend, observer=observer, control=control, page=page, durable=durable, profile=profile

@@ -2,12 +2,45 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 from executive.language.questions import QuestionPolicy
+from executive.mission.errors import InputError
+from skills.robot import Pose2D
 
-__all__ = ["Request"]
+__all__ = ["Request", "Start"]
+
+_UNKNOWN: Final = "unknown"
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the robot really stands, in place of the world's start.
+
+    Without a `pose`, it stands at a free pose that the seed chooses, and is not told where.
+    """
+
+    pose: Pose2D | None = None
+
+    def __str__(self) -> str:
+        return _UNKNOWN if self.pose is None else f"{self.pose.x_m!r} {self.pose.y_m!r} {self.pose.yaw_rad!r}"
+
+    @staticmethod
+    def of(text: str) -> Start:
+        """What `str` wrote, or a user. Raises InputError."""
+        if text == _UNKNOWN:
+            return Start()
+        try:
+            x, y, yaw = map(float, text.split())
+            if not math.isfinite(x + y + yaw):
+                raise ValueError
+        except ValueError:
+            hint = f"give x and y in metres and the heading in radians, or '{_UNKNOWN}'"
+            raise InputError(f"'{text}' is no start", hint=hint) from None
+        return Start(Pose2D(x, y, yaw))
 
 
 @dataclass(frozen=True)
@@ -16,9 +49,10 @@ class Request:
 
     `world` is as it was said, if it was; `require_wake` tells whether the robot's name must be said (None: the world
     decides); `answers` are to the questions that it leaves open, in their order, and `questions` says what becomes of
-    further ones. `out` is the folder for the run's files, `stack` the file that says what the robot uses.
+    further ones. `out` is the folder for the run's files, `stack` the file that says what the robot uses, `start` where
+    it stands when not at the world's start.
 
-    What stands below `stack` is filled once it is understood. Then another process can take it up: a sentence has the
+    What stands below `start` is filled once it is understood. Then another process can take it up: a sentence has the
     answers in their places, and `text` is that of the file.
     """
 
@@ -32,6 +66,7 @@ class Request:
     out: Path = Path("out")
     record: bool = True
     stack: Path | None = None
+    start: Start | None = None
     name: str = ""
     world_name: str = ""
     robot: str = ""

@@ -243,7 +243,7 @@ class Session:
         self.context.publish(OUTCOME, {**end, "answers": result.answers, **more})
 
     def _publish_pose(self) -> None:
-        X_WB = self.context.X_WB()
+        X_WB, estimate = self.context.X_WB(), self.context.localiser.estimate()
         p, q = X_WB.translation(), X_WB.rotation().ToQuaternion()
         flat = Pose2D.from_transform(X_WB)
         self.context.publish(
@@ -257,6 +257,7 @@ class Session:
                     "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
                 },
                 "yaw_rad": flat.yaw_rad,
+                "covariance": estimate.covariance.ravel().tolist(),
             },
         )
 
@@ -271,6 +272,7 @@ class Session:
                 "charge": round(robot.battery().charge, 4),
                 "speed_m_s": round(math.hypot(*robot.odometry().velocity[:2]), 3),
                 "localised": estimate.localised,
+                "localisation_health": round(estimate.health, 3),
                 "position_sigma_m": round(math.sqrt(estimate.covariance[0, 0] + estimate.covariance[1, 1]), 4),
             },
         )

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
-from executive.mission.request import Request
+from executive.mission.request import Request, Start
 from skills.api import Cause
 from skills.robot import Pose2D
 
@@ -50,7 +50,8 @@ def row_of(request: Request) -> dict[str, Any]:
     own = {name: getattr(request, name) for name in _AS_THEY_ARE}
     paths = {name: None if (path := getattr(request, name)) is None else str(path) for name in ("file", "stack")}
     flags = {"require_wake": _WORLD if request.require_wake is None else request.require_wake, "record": request.record}
-    return {**own, **flags, **paths, "commands": json.dumps(request.commands), "out": str(request.out)}
+    start = None if request.start is None else str(request.start)
+    return {**own, **flags, **paths, "start": start, "commands": json.dumps(request.commands), "out": str(request.out)}
 
 
 def request_of(row: Mapping[str, Any]) -> Request:
@@ -60,6 +61,7 @@ def request_of(row: Mapping[str, Any]) -> Request:
         commands=tuple(json.loads(row["commands"])),
         file=None if row["file"] is None else Path(row["file"]),
         stack=None if row["stack"] is None else Path(row["stack"]),
+        start=None if row["start"] is None else Start.of(row["start"]),
         out=Path(row["out"]),
         require_wake=None if row["require_wake"] == _WORLD else bool(row["require_wake"]),
         record=bool(row["record"]),

@@ -18,6 +18,8 @@ from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 _HEIGHTS_M = (0.7, 1.3)
 """The band of a grid that does not name its own."""
+_FROZEN_M, _FROZEN_RAD = 0.02, 0.02
+"""Equal scans farther apart than this by odometry come from a LiDAR that is frozen."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +52,9 @@ class LocaliserOptions:
     search_every_scans: Count = 10
     matching: MatchOptions = field(default_factory=MatchOptions)
 
-    def build(self, grid: GridMap, start: Pose2D, *, surely: bool) -> ScanMatchingLocaliser:
-        """A localiser that starts at a pose; not `surely` when the robot may have been moved since it was there."""
-        if surely:
+    def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> ScanMatchingLocaliser:
+        """A localiser that starts at a pose, not `surely` when the robot may have been moved since, or anywhere."""
+        if surely or start is None:
             return ScanMatchingLocaliser(grid, start, self)
         wide = replace(self, initial_sigma=self.unsure_sigma, search_radius_m=self.unsure_radius_m)
         return ScanMatchingLocaliser(grid, start, wide)
@@ -61,19 +63,23 @@ class LocaliserOptions:
 class ScanMatchingLocaliser:
     """Follows the pose by odometry and corrects it with every new scan; implements `skills.api.Localiser`.
 
-    `initial` is X_WB when the localiser first sees the robot. The estimate says `localised` once a scan has agreed
-    with the map, and no longer when several on end do not; it then searches around where it believes to be.
+    `initial` is X_WB when the localiser first sees the robot, None where it is not known: then it waits to `accept` an
+    estimate. The estimate says `localised` once a scan has agreed with the map, and no longer when several on end do
+    not; it then searches around where it believes to be.
     """
 
-    def __init__(self, grid: GridMap, initial: Pose2D, options: LocaliserOptions | None = None) -> None:
+    def __init__(self, grid: GridMap, initial: Pose2D | None, options: LocaliserOptions | None = None) -> None:
         self._grid = grid
         self._options = options or LocaliserOptions()
         self._heights_m = self._options.height_band_m or grid.height_band_m or _HEIGHTS_M
-        self._initial: Pose2D | None = initial
-        self._X_WO = initial
+        self._initial = initial
+        self._placed = initial is not None
+        self._X_WO = initial or _middle(grid)
         self._X_OB: Pose2D | None = None
-        self._covariance = np.diag(np.square(self._options.initial_sigma))
+        self._covariance = np.diag(np.square(self._options.initial_sigma if initial else _anywhere_sigma(grid)))
+        self._inlier_share = 0.0
         self._stamp_s = -math.inf
+        self._scan: Scan | None = None
         self._poor_scans = 0
         self._localised = False
         self._transformed: tuple[Pose2D, RigidTransform] | None = None
@@ -87,7 +93,8 @@ class ScanMatchingLocaliser:
         """The latest estimate; its stamp is that of the scan that it rests on (minus infinity before the first)."""
         if self._transformed is None or self._transformed[0] is not self._X_WO:
             self._transformed = self._X_WO, self._X_WO.transform()
-        return LocalisationEstimate(self._stamp_s, self._transformed[1], self._covariance.copy(), self._localised)
+        covariance = self._covariance.copy()
+        return LocalisationEstimate(self._stamp_s, self._transformed[1], covariance, self._localised, self._health())
 
     def update(self, robot: Robot) -> None:
         """Take in the newest scan, if it is new."""
@@ -95,16 +102,15 @@ class ScanMatchingLocaliser:
             self._X_WO = compose(self._initial, inverse(robot.odometry().pose))
             self._initial = None
         scan = robot.scan()
-        if scan is None or scan.stamp_s <= self._stamp_s:
+        if scan is None or scan.stamp_s <= self._stamp_s or self._frozen(scan):
             return
         self._stamp_s = scan.stamp_s
         self._predict(Pose2D.from_transform(scan.X_OB))
         points_F = self._points(scan)
         if len(points_F) < self._options.min_points:
+            self._note_poor(0.0)
             return
-        self._correct(points_F)
-        if not self._localised and self._poor_scans > 0 and self._poor_scans % self._options.search_every_scans == 0:
-            self._search(points_F, self._options.search_radius_m)
+        self._take_in(points_F)
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
         """Where a scan fits the map, within radius_m of a belief or anywhere (None); changes nothing.
@@ -122,7 +128,19 @@ class ScanMatchingLocaliser:
         """Believe an estimate from now on; the next scans tell whether it holds."""
         self._X_WO = Pose2D.from_transform(estimate.X_WO)
         self._covariance = estimate.covariance.copy()
-        self._poor_scans, self._localised = 0, True
+        self._poor_scans, self._localised, self._placed = 0, True, True
+
+    def _take_in(self, points_F: FloatArray) -> None:
+        """Correct the belief by a scan; where scans do not agree any more, search around it."""
+        if not self._placed:
+            return
+        self._correct(points_F)
+        if not self._localised and self._poor_scans > 0 and self._poor_scans % self._options.search_every_scans == 0:
+            self._search(points_F, self._options.search_radius_m)
+
+    def _health(self) -> float:
+        """How far the estimate can be trusted, 0 to 1."""
+        return self._inlier_share if self._localised else 0.0
 
     def _points(self, scan: Scan) -> FloatArray:
         """At most max_points returns of a scan, evenly chosen, in the levelled body frame."""
@@ -152,15 +170,30 @@ class ScanMatchingLocaliser:
         prior = compose(self._X_WO, self._X_OB)
         found = match(self._grid, points_F, prior, self._covariance, self._options.matching)
         if found.inlier_share < self._options.lost_share:
-            self._poor_scans += 1
-            self._localised = self._localised and self._poor_scans < self._options.lost_scans
+            self._note_poor(found.inlier_share)
             return
+        self._inlier_share = found.inlier_share
         if self._localised or found.inlier_share >= self._options.found_share:
             self._poor_scans = 0
             self._localised = True
         else:
             self._poor_scans += 1
         self._believe(found)
+
+    def _note_poor(self, inlier_share: float) -> None:
+        """Count a scan of which the map explains too little."""
+        self._inlier_share = inlier_share
+        self._poor_scans += 1
+        self._localised = self._localised and self._poor_scans < self._options.lost_scans
+
+    def _frozen(self, scan: Scan) -> bool:
+        """Whether a scan repeats an earlier one, noise and all, although the robot has moved since."""
+        last = self._scan
+        if last is None or not np.array_equal(scan.ranges_m, last.ranges_m, equal_nan=True):
+            self._scan = scan
+            return False
+        step = relative(Pose2D.from_transform(last.X_OB), Pose2D.from_transform(scan.X_OB))
+        return math.hypot(step.x_m, step.y_m) > _FROZEN_M or abs(step.yaw_rad) > _FROZEN_RAD
 
     def _believe(self, found: Match) -> None:
         assert self._X_OB is not None
@@ -176,23 +209,39 @@ class ScanMatchingLocaliser:
             self._poor_scans, self._localised = 0, True
 
     def _best_match(self, points_F: FloatArray, centre: Pose2D, radius_m: float | None) -> Match | None:
-        """Score many poses, refine the best few: the one that explains most, None when it explains too little.
+        """The match that explains most, None when it explains too little.
 
         Of several that explain about as much the one nearest to the centre.
         """
-        options = self._options
-        if len(points_F) < options.min_points:
-            return None
-        poses = candidate_poses(self._grid, centre, radius_m)
-        few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // 120)])
-        best = poses[np.argsort(-score_poses(self._grid, few, poses), kind="stable")[:20]]
-        spread = np.diag([0.2**2, 0.2**2, 0.15**2])
-        matches = [match(self._grid, points_F, Pose2D(*pose), spread, options.matching) for pose in best.tolist()]
+        options, matches = self._options, self._matches(points_F, centre, radius_m)
         most = max((found.inlier_share for found in matches), default=0.0)
         if most < options.found_share:
             return None
         alike = (found for found in matches if found.inlier_share >= most - options.alike_share)
         return min(alike, key=lambda m: math.hypot(m.pose.x_m - centre.x_m, m.pose.y_m - centre.y_m))
+
+    def _matches(self, points_F: FloatArray, centre: Pose2D, radius_m: float | None) -> list[Match]:
+        """Score many poses, refine the best few."""
+        options = self._options
+        if len(points_F) < options.min_points:
+            return []
+        poses = candidate_poses(self._grid, centre, radius_m)
+        few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // 120)])
+        best = poses[np.argsort(-score_poses(self._grid, few, poses), kind="stable")[:20]]
+        spread = np.diag([0.2**2, 0.2**2, 0.15**2])
+        return [match(self._grid, points_F, Pose2D(*pose), spread, options.matching) for pose in best.tolist()]
+
+
+def _middle(grid: GridMap) -> Pose2D:
+    """The middle of a grid."""
+    (x, y), (width, height) = grid.origin_m, grid.size_m
+    return Pose2D(x + 0.5 * width, y + 0.5 * height, 0.0)
+
+
+def _anywhere_sigma(grid: GridMap) -> tuple[float, float, float]:
+    """The standard deviations of a pose that may be anywhere on a grid."""
+    width, height = grid.size_m
+    return width / math.sqrt(12.0), height / math.sqrt(12.0), math.pi / math.sqrt(3.0)
 
 
 def candidate_poses(grid: GridMap, centre: Pose2D, radius_m: float | None) -> FloatArray:

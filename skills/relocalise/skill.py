@@ -1,36 +1,55 @@
-"""The skill that finds the robot's place on the whole map: standing still first, then turning slowly."""
+"""The skill that finds the robot's place on the whole map: standing still, then turning, then driving a little."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
+
+import numpy as np
 
 from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, SkillContext, Succeeded
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.navigate.base import Base
-from skills.quantities import Delay, Tries, Turn, TurnRate
-from skills.robot import Scan
+from skills.navigate.low_obstacles import WatchOptions, low_points
+from skills.quantities import Delay, Length, Share, Speed, Tries, Turn, TurnRate
+from skills.relocalise.free_space import FreeSpaceOptions, can_turn, free_m, obstacles_B
+from skills.robot import FloatArray, Scan
 
 _SCAN_PATIENCE_S = 2.0
+_LEAST_STEP_M = 0.15
 
 
 @dataclass(frozen=True)
 class RelocaliseInputs:
-    """`turns`: the most headings to search in, an eighth of a turn apart."""
+    """`turns`: the most headings to search in, an eighth of a turn apart.
+
+    `drives`: how often it then drives a little and begins anew.
+    """
 
     turns: Tries = 8
+    drives: Tries = 3
 
 
 @dataclass(frozen=True)
 class RelocaliseOptions:
-    """How long a search takes (s), how fast and how far the robot turns between searches."""
+    """How long a search takes (s), how fast and how far the robot turns between searches.
+
+    Between rounds of turns it drives up to `drive_m`, in steps of `step_m` with a look ahead before each. It knows the
+    place once scans have agreed for `agree_s` and the estimate's health is at least `good_health`.
+    """
 
     search_latency_s: Delay = 1.0
     turn_rad_s: TurnRate = 0.4
     turn_rad: Turn = math.pi / 4
     agree_s: Delay = 1.0
+    good_health: Share = 0.5
+    drive_m: Length = 2.0
+    step_m: Length = 0.5
+    drive_m_s: Speed = 0.3
+    free_space: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
+    low: WatchOptions = field(default_factory=WatchOptions)
 
 
 class Relocalise(RoutineSkill[RelocaliseInputs]):
@@ -42,10 +61,10 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
     options: RelocaliseOptions
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "there are no new scans, or this robot's localiser cannot search",
-        Cause.EXECUTION: "the robot refuses to turn",
+        Cause.EXECUTION: "the robot refuses to move",
         Cause.POSTCONDITION: "no pose on the map fits what the robot sees",
     }
-    default_timeout_s: ClassVar[float] = 120.0
+    default_timeout_s: ClassVar[float] = 240.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
 
     def __init__(self, context: SkillContext) -> None:
@@ -53,19 +72,22 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         self._base = Base(context)
 
     def run(self, inputs: RelocaliseInputs) -> Routine[Succeeded]:
-        """Search the whole map; turn a little, and again."""
+        """Search the whole map; turn a little, and again; after a round of that, from somewhere else."""
         self._base = Base(self.context)
         localiser = self.context.localiser
         if not isinstance(localiser, SearchingLocaliser):
             raise SkillFailure(Cause.PRECONDITION, "the localiser of this robot cannot search the map")
         if (yield from self._agreed(localiser)):
             return Succeeded("the scans agree with the map already")
-        for turn in range(max(1, inputs.turns)):
-            if (yield from self._found(localiser)):
-                pose = self.context.pose()
-                return Succeeded(f"found itself at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
-            if turn + 1 < inputs.turns:
-                yield from self._turn()
+        for drive in range(inputs.drives + 1):
+            if drive and not (yield from self._drive()):
+                break
+            for turn in range(max(1, inputs.turns)):
+                if (yield from self._agreed(localiser)) or (yield from self._found(localiser)):
+                    pose = self.context.pose()
+                    return Succeeded(f"found itself at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+                if turn + 1 < inputs.turns:
+                    yield from self._turn(self.options.turn_rad)
         raise SkillFailure(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
 
     def end(self) -> None:
@@ -96,7 +118,7 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         begun_s = context.clock.now()
         while (estimate := localiser.estimate()).localised:
             if estimate.stamp_s >= begun_s + self.options.agree_s:
-                return True
+                return estimate.health >= self.options.good_health
             if context.clock.now() > begun_s + self.options.agree_s + _SCAN_PATIENCE_S:
                 raise SkillFailure(Cause.PRECONDITION, "there are no new scans to find the place by")
             yield Running("seeing whether scans agree")
@@ -112,15 +134,75 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
             yield Running(message)
         return scan
 
-    def _turn(self) -> Routine[None]:
-        """An eighth of a turn, slowly, on the spot; then rest."""
+    def _turn(self, turn_rad: float) -> Routine[None]:
+        """Turn slowly on the spot by a signed angle, where there is room for it; then rest."""
+        scan = yield from self._new_scan("looking for room to turn")
+        capabilities, free_space = self.context.robot.capabilities(), self.options.free_space
+        if not can_turn(obstacles_B(scan, capabilities, free_space), capabilities, free_space):
+            return
+        rate = math.copysign(self.options.turn_rad_s, turn_rad)
+        yield from self._move((0.0, 0.0, rate), abs(turn_rad / rate), "turning slowly to see more")
+
+    def _drive(self) -> Routine[bool]:
+        """Face the direction with the most room and go there step by step; False when there is no room at all."""
+        options = self.options
+        scan = yield from self._new_scan("looking for room to drive")
+        body, free_space = self.context.robot.capabilities(), options.free_space
+        seen = obstacles_B(scan, body, free_space)
+        turns = range(-3, 5) if can_turn(seen, body, free_space) else (0,)
+        headings = sorted((turn * options.turn_rad for turn in turns), key=abs)
+        heading = max(headings, key=lambda each: min(options.drive_m, free_m(seen, each, body, free_space)))
+        if abs(heading) > 0.0:
+            yield from self._turn(heading)
+        left_m, driven_m = options.drive_m, 0.0
+        while left_m > 0.05:
+            room_m = yield from self._room_ahead()
+            step_m = min(options.step_m, left_m, room_m)
+            if step_m < min(_LEAST_STEP_M, left_m):
+                break
+            yield from self._move((options.drive_m_s, 0.0, 0.0), step_m / options.drive_m_s, "driving to see more")
+            left_m, driven_m = left_m - step_m, driven_m + step_m
+        return driven_m > 0.0
+
+    def _room_ahead(self) -> Routine[float]:
+        """How far (m) the robot can go straight on, by a new scan and a depth picture of each front camera."""
+        message, robot, low = "looking ahead", self.context.robot, self.options.low
+        scan = yield from self._new_scan(message)
+        capabilities, free_space = robot.capabilities(), self.options.free_space
+        points = [obstacles_B(scan, capabilities, free_space)]
+        for camera in capabilities.body_cameras:
+            if camera.looks_towards(0.0):
+                X_BO = robot.odometry().X_OB.inverse()
+                points_O = yield from self._low_points(camera.source, low)
+                points.append(X_BO.multiply(points_O.T).T[:, :2])
+        return free_m(np.concatenate(points), 0.0, capabilities, free_space)
+
+    def _low_points(self, source: str, low: WatchOptions) -> Routine[FloatArray]:
+        """What a depth camera sees low above the floor, (N, 3) in the odom frame."""
+        robot = self.context.robot
+        job = self.context.worker.sense(
+            lambda: robot.image(source, visual=False),
+            lambda image: low_points(image, low),
+            latency_s=low.latency_s,
+            name=f"look for low things by {source}",
+        )
+        while not job.done():
+            yield Running("looking ahead")
+        return job.result()
+
+    def _move(self, velocity: tuple[float, float, float], for_s: float, message: str) -> Routine[None]:
+        """Move at a velocity for a time, or until the place is known; then rest."""
         context = self.context
-        end_s = context.clock.now() + self.options.turn_rad / self.options.turn_rad_s
-        while context.clock.now() < end_s:
-            self._base.drive((0.0, 0.0, self.options.turn_rad_s))
-            yield Running("turning slowly to see more")
+        end_s = context.clock.now() + for_s
+        while context.clock.now() < end_s and not self._well_localised():
+            self._base.drive(velocity)
+            yield Running(message)
             refusal = self._base.refusal()
             if refusal is not None:
-                raise SkillFailure(Cause.EXECUTION, f"the robot refused to turn: {refusal}")
+                raise SkillFailure(Cause.EXECUTION, f"the robot refused to move: {refusal}")
         self._base.stop()
         yield from self.pause(0.5, "coming to rest")
+
+    def _well_localised(self) -> bool:
+        estimate = self.context.localiser.estimate()
+        return estimate.localised and estimate.health >= self.options.good_health

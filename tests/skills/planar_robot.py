@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from executive.run.worker import LockStepWorker
 from skills.api import Job, SkillContext
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.localiser import ScanMatchingLocaliser
+from skills.estimate.localiser import LocaliserOptions
 from skills.geometry import compose, inverse
 from skills.robot import (
     CameraCapabilities,
@@ -30,6 +30,7 @@ from skills.robot import (
     Pose2D,
     Scan,
 )
+from skills.stack import LocaliserComponent
 from skills.testing.blocks import Block as Box
 from skills.testing.blocks import block_array, cast_rays, grid_of
 
@@ -265,7 +266,10 @@ class NamingWorker(LockStepWorker):
 
 
 class Bench:
-    """A robot among boxes with its estimators, advanced as the runner would do it. `surveyed` is what the maps know."""
+    """A robot among boxes with its estimators, advanced as the runner would do it. `surveyed` is what the maps know.
+
+    `component` makes the localiser, which is `told` where it starts, or not.
+    """
 
     def __init__(
         self,
@@ -276,10 +280,13 @@ class Bench:
         believed_start: Pose2D | None = None,
         seed: int = 0,
         cameras: bool = True,
+        component: LocaliserComponent | None = None,
+        told: bool = True,
     ) -> None:
         self.clock = PlanarClock()
         self.robot = PlanarRobot(self.clock, [*surveyed, *unmapped], start, seed=seed, cameras=cameras)
-        self.localiser = ScanMatchingLocaliser(grid_of(surveyed, (0.7, 1.3)), believed_start or start)
+        believed = (believed_start or start) if told else None
+        self.localiser = (component or LocaliserOptions()).build(grid_of(surveyed, (0.7, 1.3)), believed, surely=told)
         self.costmap = LayeredCostmap(grid_of(surveyed, (0.05, 1.0)))
         self.worker = NamingWorker(self.clock)
         self.published: list[tuple[str, Mapping[str, Any]]] = []

@@ -2,12 +2,18 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from tiny_detector import CLASSES, model_bytes, write_model
 
-from executive.cli.assembly import shared_detector
+from executive.cli.assembly import TURNING_M, shared_detector, stand_at
 from executive.mission.errors import InputError
+from executive.mission.request import Start
+from plant.worlds.placement import place_people
+from plant.worlds.world import load_world
+from skills.estimate.grid_map import load_grid_map
 from skills.perception.cascade import Cascade
+from skills.robot import Pose2D
 from skills.stack import default_stack
 
 
@@ -31,3 +37,24 @@ def test_a_model_that_cannot_be_used_is_named_before_anything_moves(tmp_path, co
         shared_detector(with_detector(file))
     assert error.value.file == file
     assert error.value.hint == "make a new one: errand dataset train --data DIR --out DIR"
+
+
+def test_an_unknown_start_is_free_ground_that_the_seed_chooses():
+    world = load_world("flat")
+    keepout = load_grid_map(world.keepout_map_path).with_unknown_blocked()
+    poses = [stand_at(world, Start(), seed) for seed in range(20)]
+    assert poses[3] == stand_at(world, Start(), 3)
+    assert len(set(poses)) == 20
+    for seed, pose in enumerate(poses):
+        here = np.array([[pose.x_m, pose.y_m]])
+        assert keepout.distance_m(here)[0] > TURNING_M - 0.03
+        people = [person.X_WO.translation()[:2] for person in place_people(world, seed)]
+        assert all(np.linalg.norm(here - person) > 1.0 for person in people)
+
+
+def test_a_start_in_a_wall_or_outside_is_refused():
+    world = load_world("flat")
+    assert stand_at(world, Start(world.start), 1) == world.start
+    for x, y in ((0.0, 0.0), (-30.0, 4.0)):
+        with pytest.raises(InputError, match="no room for the robot"):
+            stand_at(world, Start(Pose2D(x, y, 0.0)), 1)

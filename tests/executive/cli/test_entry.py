@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from executive.cli.entry import loaded
+
 MISSIONS = Path(__file__).parents[3] / "missions"
 TRAINING = (
     "plant.dataset",
@@ -60,3 +62,19 @@ def test_a_command_imports_no_heavy_library_that_it_does_not_use(arguments, expe
             [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment
         )
     assert set(run.stdout.splitlines()[-1].split()) == expected
+
+
+@pytest.mark.parametrize(
+    ("words", "value"),
+    [
+        (["--start", "unknown"], "unknown"),
+        (["--start", "1.5", "-2", "3e-1"], "1.5 -2 3e-1"),
+        (["--start", "-1", "2", "0", "--quiet"], "-1 2 0"),
+        (["--quiet"], None),
+    ],
+)
+def test_a_start_is_one_word_or_three_numbers(words, value):
+    command = loaded("run")
+    context = command.make_context("run", ["missions/go_to_pose.yaml", *words])
+    assert context.params["start"] == value
+    assert str(context.params["file"]) == "missions/go_to_pose.yaml"

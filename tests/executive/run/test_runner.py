@@ -227,6 +227,14 @@ def test_poses_are_logged_twice_a_second(compiled, run_tree, published, script):
     assert sum(topic == "pose" for topic, _ in published) == 7  # 0.05 s to 3.0 s
 
 
+def test_how_well_the_place_is_known_is_logged(compiled, run_tree, published):
+    run_tree(compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"))
+    pose = next(message for topic, message in published if topic == "pose")
+    state = next(message for topic, message in published if topic == "state")
+    assert len(pose["covariance"]) == 9
+    assert (state["localised"], state["localisation_health"]) == (True, 1.0)
+
+
 def test_overruns_are_counted(compiled, run_tree, make, script, published):
     script.steps = 1
     script.ends["stow"] = lambda skill: (time.sleep(0.02), _placed())[1]

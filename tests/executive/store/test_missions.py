@@ -9,7 +9,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.mission.errors import InputError
-from executive.mission.request import Request
+from executive.mission.request import Request, Start
 from executive.run.journal import TickNote
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
@@ -44,6 +44,15 @@ def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose
         assert (kept, store.mission(mission).pose) == ([], Pose2D(1.0, 2.0, 0.5))
         journal.note(note(changed("a/b", Status.RUNNING), now_s=1.1))
         assert (kept, store.has_steps(mission)) == ([False], True)
+
+
+@pytest.mark.parametrize("start", [None, Start(), Start(Pose2D(1.25, -3.0, 0.1))])
+def test_a_mission_keeps_where_it_starts(path, start):
+    request = replace(REQUEST, start=start)
+    with MissionStore(path) as store:
+        store.add(request, queued=True)
+    with MissionStore(path, create=False) as store:
+        assert store.missions()[0].request == request
 
 
 def test_missions_keep_their_order_and_states(path):
@@ -188,7 +197,7 @@ def test_a_store_of_another_version_is_refused(path):
     with sqlite3.connect(path) as other:
         other.execute("PRAGMA user_version = 9")
     other.close()
-    with pytest.raises(InputError, match="version 9, and this errand reads 2"):
+    with pytest.raises(InputError, match="version 9, and this errand reads 3"):
         MissionStore(path)
 
 

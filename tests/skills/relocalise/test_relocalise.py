@@ -4,14 +4,31 @@ import dataclasses
 import math
 
 import numpy as np
+import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
 from skills.api import Cause, Failed, Running, Succeeded
+from skills.estimate.monte_carlo import MonteCarloOptions
+from skills.estimate.particle_filter import FilterOptions
 from skills.relocalise.skill import Relocalise, RelocaliseInputs
 from skills.robot import Pose2D
+from skills.testing.estimators import KnownPlace
 
 START = Pose2D(1.5, 2.0, 0.0)
 FAR = Pose2D(8.0, 2.3, 2.0)
+CLOSET = (Box(-1, -1, 1, -0.6), Box(-1, 0.6, 1, 1), Box(-1, -0.6, -0.8, 0.6), Box(0.8, -0.6, 1, 0.6))
+TWIN_ROOMS = (
+    Box(-0.1, -0.1, 10.1, 0.0),
+    Box(-0.1, 7.0, 10.1, 7.1),
+    Box(-0.1, 0.0, 0.0, 7.0),
+    Box(10.0, 0.0, 10.1, 7.0),
+    Box(4.95, 0.0, 5.05, 4.0),
+    Box(0.0, 4.0, 2.0, 4.1),
+    Box(3.0, 4.0, 7.0, 4.1),
+    Box(8.0, 4.0, 10.0, 4.1),
+    Box(1.0, 6.0, 2.4, 7.0),
+)
+"""Two rooms alike, turned by nothing, under a corridor that has a cupboard at one end; wide doors."""
 
 
 def outcome(bench, inputs=None, context=None):
@@ -69,18 +86,67 @@ def strange_bench():
 
 def test_where_nothing_fits_it_turns_slowly_and_gives_up():
     bench = strange_bench()
-    step, said = outcome(bench, RelocaliseInputs(turns=3))
+    step, said = outcome(bench, RelocaliseInputs(turns=3, drives=0))
     assert step == Failed(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
     assert "turning slowly to see more" in said
     assert abs(bench.robot.pose.yaw_rad - 0.3 - math.pi / 2) < 0.2
     assert not bench.robot.driving
 
 
-def test_a_robot_that_refuses_to_turn_is_an_execution_failure():
+class Nowhere(KnownPlace):
+    """A localiser that never finds the place."""
+
+    def __init__(self):
+        super().__init__()
+        self.localised = False
+
+    def search(self, scan, belief, radius_m):
+        return None
+
+
+def never_localised(bench):
+    bench.localiser = Nowhere()
+    for _ in range(20):
+        bench.tick()
+    return bench
+
+
+def test_after_a_round_of_turns_it_drives_elsewhere_and_keeps_clear():
+    bench = never_localised(Bench(START))
+    step, said = outcome(bench, RelocaliseInputs(turns=2, drives=2))
+    assert step.cause is Cause.POSTCONDITION
+    assert "driving to see more" in said
+    assert bench.robot.travelled_m > 0.3
+    assert bench.robot.least_clearance_m > 0.05
+    assert bench.robot.images_taken > 0
+    assert not bench.robot.driving
+
+
+def test_where_there_is_no_room_it_neither_turns_nor_drives():
+    bench = never_localised(Bench(Pose2D(0.0, 0.0, 0.0), surveyed=CLOSET))
+    step, _ = outcome(bench, RelocaliseInputs(turns=3, drives=3))
+    assert step.cause is Cause.POSTCONDITION
+    assert bench.robot.travelled_m == 0.0
+    assert bench.robot.pose.yaw_rad == 0.0
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_started_in_one_of_two_rooms_that_look_alike_it_finds_out_which(seed):
+    component = MonteCarloOptions(particles=FilterOptions(seed=seed))
+    bench = Bench(Pose2D(2.0, 1.5, 0.3), surveyed=TWIN_ROOMS, component=component, told=False)
+    bench.tick()
+    step, said = outcome(bench)
+    assert isinstance(step, Succeeded), step
+    assert "turning slowly to see more" in said
+    assert bench.pose_error()[0] < 0.05
+    assert bench.robot.least_clearance_m > 0.05
+
+
+def test_a_robot_that_refuses_to_move_is_an_execution_failure():
     bench = strange_bench()
     bench.robot.refuse_because = "it sits"
     step, _ = outcome(bench)
-    assert step == Failed(Cause.EXECUTION, "the robot refused to turn: it sits")
+    assert step == Failed(Cause.EXECUTION, "the robot refused to move: it sits")
 
 
 def test_without_new_scans_it_says_so():

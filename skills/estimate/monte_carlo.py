@@ -1,0 +1,201 @@
+"""Where the robot is, by adaptive Monte Carlo localisation; scan matching refines the estimate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import LocalisationEstimate
+from skills.estimate.grid_map import GridMap
+from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
+from skills.estimate.matching import Match, match
+from skills.estimate.particle_filter import MODE_RADIUS_M, MODE_TURN_RAD, FilterOptions, Mode, ParticleFilter
+from skills.geometry import compose, inverse, relative, wrap
+from skills.quantities import Count, Length, Share, Turn
+from skills.robot import FloatArray, Pose2D, Scan
+
+_SPREAD = np.diag([0.05**2, 0.05**2, 0.03**2])
+_BASIN = np.diag([0.2**2, 0.2**2, 0.15**2])
+_MOST_AT_REST = 3
+
+
+@dataclass(frozen=True)
+class MonteCarloOptions:
+    """A particle filter says in which place the robot is, scan matching where in it.
+
+    Particles are weighed after each `update_m` of the way or `update_rad` of a turn; at rest, while the place is not
+    known, every `patience_scans` scans, but a few times only, since all these scans err alike. The place is known once
+    `sure_mass` of the weight is in one mode for `sure_updates` on end. When less than `unsure_mass` is left there, it
+    is given up for a mode where the scan fits better by `better_share`; while scan matching still explains most of the
+    scan, only after `better_updates` of that. Where scans surprise by more than `surprise`, or the place is not known,
+    particles are injected: of `draws` random poses, the best `hypotheses`, refined by scan matching; about each
+    `injected` particles. Two places alike but for `alike_share` are none that a search finds.
+    """
+
+    tracking: LocaliserOptions = field(default_factory=LocaliserOptions)
+    particles: FilterOptions = field(default_factory=FilterOptions)
+    update_m: Length = 0.1
+    update_rad: Turn = 0.1
+    patience_scans: Count = 5
+    sure_mass: Share = 0.85
+    sure_updates: Count = 3
+    unsure_mass: Share = 0.4
+    better_share: Share = 0.1
+    better_updates: Count = 10
+    surprise: Share = 0.25
+    draws: Count = 10_000
+    hypotheses: Count = 12
+    injected: Count = 25
+    alike_share: Share = 0.05
+
+    def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> MonteCarloLocaliser:
+        """A localiser that starts at a pose, not `surely` when the robot may have been moved since, or anywhere."""
+        if surely or start is None:
+            return MonteCarloLocaliser(grid, start, self)
+        wide = replace(self.tracking, initial_sigma=self.tracking.unsure_sigma)
+        return MonteCarloLocaliser(grid, start, replace(self, tracking=wide))
+
+
+class MonteCarloLocaliser(ScanMatchingLocaliser):
+    """Adaptive Monte Carlo localisation; implements `skills.api.SearchingLocaliser`.
+
+    A belief that is carried by scan matching stands as long as the particles about it have the weight; where they
+    gather elsewhere, the belief goes there. `initial` None: it may be anywhere.
+    """
+
+    def __init__(self, grid: GridMap, initial: Pose2D | None, options: MonteCarloOptions | None = None) -> None:
+        self._own = options or MonteCarloOptions()
+        super().__init__(grid, initial, self._own.tracking)
+        self._filter = ParticleFilter(grid, self._own.particles)
+        if initial is None:
+            self._filter.scatter()
+        else:
+            self._filter.place(initial, self._covariance)
+        self._lost_covariance = self._filter.covariance
+        self._weighed_at: Pose2D | None = None
+        self._scans = self._at_rest = self._rival_updates = 0
+        self._agreeing = 0 if initial is None else self._own.sure_updates
+        self._mass = 0.0 if initial is None else 1.0
+
+    @property
+    def particles(self) -> ParticleFilter:
+        """The particles."""
+        return self._filter
+
+    def estimate(self) -> LocalisationEstimate:
+        """The latest estimate; while the place is not known its covariance is that of all particles."""
+        estimate = super().estimate()
+        return estimate if self._localised else replace(estimate, covariance=self._lost_covariance.copy())
+
+    def accept(self, estimate: LocalisationEstimate) -> None:
+        """Believe an estimate from now on; all particles go there."""
+        super().accept(estimate)
+        if self._X_OB is not None:
+            self._filter.place(compose(self._X_WO, self._X_OB), estimate.covariance + _SPREAD)
+            self._weighed_at = self._X_OB
+        self._mass, self._agreeing = 1.0, self._own.sure_updates
+
+    def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
+        """Where a scan fits the map, as the scan matching has it; None also where two places fit equally well."""
+        X_OB = Pose2D.from_transform(scan.X_OB)
+        found = self._matches(self._points(scan), compose(Pose2D.from_transform(belief.X_WO), X_OB), radius_m)
+        best = max(found, key=lambda each: each.inlier_share, default=None)
+        if best is None or best.inlier_share < self._options.found_share:
+            return None
+        rivals = (each for each in found if each.inlier_share > best.inlier_share - self._own.alike_share)
+        if not all(_same_place(each.pose, best.pose) for each in rivals):
+            return None
+        X_WO: RigidTransform = compose(best.pose, inverse(X_OB)).transform()
+        return LocalisationEstimate(scan.stamp_s, X_WO, best.covariance, True, best.inlier_share)
+
+    def _take_in(self, points_F: FloatArray) -> None:
+        """Carry the belief on by scan matching; when it is time, weigh the particles, and see what they say."""
+        if self._placed:
+            knew = self._localised
+            self._correct(points_F)
+            self._localised = self._localised and knew
+        self._scans += 1
+        if self._due():
+            self._weigh(points_F)
+
+    def _health(self) -> float:
+        return self._mass * self._inlier_share if self._placed else 0.0
+
+    def _due(self) -> bool:
+        """Whether the robot has moved enough since the last time, or waits to know where it is."""
+        assert self._X_OB is not None
+        if self._weighed_at is None:
+            return True
+        step = relative(self._weighed_at, self._X_OB)
+        if math.hypot(step.x_m, step.y_m) > self._own.update_m or abs(step.yaw_rad) > self._own.update_rad:
+            self._at_rest = 0
+            return True
+        waits = not self._localised and self._scans >= self._own.patience_scans
+        return waits and self._at_rest < _MOST_AT_REST
+
+    def _weigh(self, points_F: FloatArray) -> None:
+        """One update of the filter, and what follows from it."""
+        assert self._X_OB is not None
+        particles, self._scans = self._filter, 0
+        self._at_rest += 1
+        particles.move(relative(self._weighed_at or self._X_OB, self._X_OB))
+        self._weighed_at = self._X_OB
+        beams = _thinned(points_F, self._own.particles.beams)
+        particles.weigh(beams)
+        self._judge(points_F)
+        particles.resample(self._injected(points_F, beams))
+        self._lost_covariance = particles.covariance
+
+    def _judge(self, points_F: FloatArray) -> None:
+        """Go to where the particles are; know the place, or not any more."""
+        assert self._X_OB is not None
+        options = self._own
+        self._mass = self._filter.mass_near(compose(self._X_WO, self._X_OB)) if self._placed else 0.0
+        if self._mass < options.unsure_mass:
+            self._go_to(self._filter.mode(), points_F)
+        sure = self._mass >= options.sure_mass and self._inlier_share >= self._options.found_share
+        self._agreeing = self._agreeing + 1 if sure or (self._localised and self._mass >= options.unsure_mass) else 0
+        if sure and self._agreeing >= options.sure_updates:
+            self._localised, self._poor_scans = True, 0
+
+    def _go_to(self, mode: Mode, points_F: FloatArray) -> None:
+        """Believe in a mode where the scan fits; in place of a belief that fits well only if it is better for long."""
+        found = match(self._grid, points_F, mode.mean, mode.covariance + _SPREAD, self._options.matching)
+        fits = mode.mass > self._mass and found.inlier_share >= self._options.lost_share
+        better = fits and found.inlier_share > self._inlier_share + self._own.better_share
+        self._rival_updates = self._rival_updates + 1 if better else 0
+        doubted = self._inlier_share < self._options.found_share or self._rival_updates >= self._own.better_updates
+        if fits and (not self._localised or (better and doubted)):
+            self._believe(found)
+            self._placed, self._localised, self._rival_updates = True, False, 0
+            self._mass, self._inlier_share = mode.mass, found.inlier_share
+
+    def _injected(self, points_F: FloatArray, beams: FloatArray) -> FloatArray | None:
+        """Particles for hypotheses that the filter may not have: the belief, and when scans surprise, any other."""
+        assert self._X_OB is not None
+        options, particles = self._own, self._filter
+        hypotheses = [compose(self._X_WO, self._X_OB)] if self._placed else []
+        if particles.surprise > options.surprise or not self._localised:
+            hypotheses += [each.pose for each in self._hypotheses(points_F, beams)]
+        drawn = [particles.around(pose, _SPREAD, options.injected) for pose in hypotheses]
+        return np.concatenate(drawn) if drawn else None
+
+    def _hypotheses(self, points_F: FloatArray, beams: FloatArray) -> list[Match]:
+        """The best of some random poses, refined."""
+        best = self._filter.likely(self._own.draws, self._own.hypotheses, beams)
+        found = [match(self._grid, points_F, Pose2D(*pose), _BASIN, self._options.matching) for pose in best.tolist()]
+        return [each for each in found if each.inlier_share >= self._options.lost_share]
+
+
+def _thinned(points_F: FloatArray, count: int) -> FloatArray:
+    """So many of the points, evenly chosen."""
+    chosen = np.linspace(0, len(points_F) - 1, min(count, len(points_F))).astype(np.int64)
+    return np.ascontiguousarray(points_F[chosen])
+
+
+def _same_place(a: Pose2D, b: Pose2D) -> bool:
+    near = math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) < MODE_RADIUS_M
+    return near and abs(wrap(a.yaw_rad - b.yaw_rad)) < MODE_TURN_RAD

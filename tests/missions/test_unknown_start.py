@@ -1,0 +1,25 @@
+"""A mission that starts where the robot was not told to be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from executive.cli.requests import prepare
+from executive.cli.simulated import run_simulated
+from executive.mission.request import Request, Start
+
+MISSION = Path(__file__).parents[2] / "missions" / "go_to_pose.yaml"
+
+pytestmark = pytest.mark.mission
+
+
+@pytest.mark.parametrize("localiser", ["scan_matching", "monte_carlo"])
+def test_it_finds_out_where_it_is_and_then_does_the_mission(localiser, tmp_path):
+    stack = tmp_path / "stack.yaml"
+    stack.write_text(f"localiser: {{use: {localiser}}}\n", encoding="utf-8")
+    request = Request(file=MISSION, seed=3, out=tmp_path, record=False, stack=stack, start=Start())
+    report = run_simulated(prepare(request)).report
+    assert report.achieved, (report.message, report.referee.why)
+    assert report.referee.collisions == 0

@@ -15,6 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
+from executive.cli.start_pose import joined
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.errors import InputError
 
@@ -52,6 +53,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "dataset": _Command("dataset_command", "dataset", "Labelled pictures rendered in the plant; scores, training."),
     "stack": _Command("stack_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
+    "world": _Command("world_command", "world", "Worlds made of any map, and how a world looks."),
     "new-skill": _Command("new_skill_command", "new_skill", "Write an installable package with a skill and tests."),
 }
 """The commands by name, in the order of the help."""
@@ -80,7 +82,7 @@ class _LazyGroup(TyperGroup):
         """The command that the first argument names, imported."""
         if args and args[0] in COMMANDS:
             self.add_command(loaded(args[0]), args[0])
-        return super().resolve_command(ctx, args)
+        return super().resolve_command(ctx, joined(args))
 
 
 app = typer.Typer(

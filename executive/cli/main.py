@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
@@ -21,8 +22,10 @@ from executive.cli.requests import Prepared, prepare
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
+from executive.cli.start_pose import START, start_pose
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.language.questions import QuestionPolicy
+from executive.mission.file.parameters import given_values
 from executive.mission.request import Request
 from executive.record.profile import Profile, lines
 from executive.store.missions import MissionStore
@@ -44,6 +47,9 @@ Questions = Annotated[
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 Anyway = Annotated[bool, typer.Option("--anyway", help="Begin although `errand check` would refuse it.")]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
+Given = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
+]
 PageOf = Callable[[Prepared], PageView | None]
 
 
@@ -52,6 +58,8 @@ def run(
     say: Say = None,
     listen_to: Annotated[Path | None, typer.Option("--listen", help="A wav file that says it.")] = None,
     world: World = None,
+    start: START = None,
+    given: Given = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
     wake: Wake = None,
     answer: Answer = None,
@@ -83,6 +91,7 @@ def run(
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
+        asked = replace(asked, given=given_values(given or ()), start=start_pose(start))
         finished, page = _run_kept(
             asked,
             kept_in,

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from executive.language.questions import QuestionPolicy
+from skills.robot import Pose2D
 
 __all__ = ["Request"]
 
@@ -16,9 +19,10 @@ class Request:
 
     `world` is as it was said, if it was; `require_wake` tells whether the robot's name must be said (None: the world
     decides); `answers` are to the questions that it leaves open, in their order, and `questions` says what becomes of
-    further ones. `out` is the folder for the run's files, `stack` the file that says what the robot uses.
+    further ones. `given` are values for a file's parameters; the robot stands at `start`, where the world's own is not
+    meant. `out` is the folder for the run's files, `stack` the file that says what the robot uses.
 
-    What stands below `stack` is filled once it is understood. Then another process can take it up: a sentence has the
+    What stands below `start` is filled once it is understood. Then another process can take it up: a sentence has the
     answers in their places, and `text` is that of the file.
     """
 
@@ -32,6 +36,8 @@ class Request:
     out: Path = Path("out")
     record: bool = True
     stack: Path | None = None
+    given: Mapping[str, Any] = field(default_factory=dict)
+    start: Pose2D | None = None
     name: str = ""
     world_name: str = ""
     robot: str = ""

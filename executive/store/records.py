@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -50,7 +51,9 @@ def row_of(request: Request) -> dict[str, Any]:
     own = {name: getattr(request, name) for name in _AS_THEY_ARE}
     paths = {name: None if (path := getattr(request, name)) is None else str(path) for name in ("file", "stack")}
     flags = {"require_wake": _WORLD if request.require_wake is None else request.require_wake, "record": request.record}
-    return {**own, **flags, **paths, "commands": json.dumps(request.commands), "out": str(request.out)}
+    start = None if request.start is None else json.dumps(dataclasses.astuple(request.start))
+    told = {"given": json.dumps(dict(request.given)), "start": start}
+    return {**own, **flags, **paths, **told, "commands": json.dumps(request.commands), "out": str(request.out)}
 
 
 def request_of(row: Mapping[str, Any]) -> Request:
@@ -60,6 +63,8 @@ def request_of(row: Mapping[str, Any]) -> Request:
         commands=tuple(json.loads(row["commands"])),
         file=None if row["file"] is None else Path(row["file"]),
         stack=None if row["stack"] is None else Path(row["stack"]),
+        given=json.loads(row["given"]),
+        start=None if row["start"] is None else Pose2D(*json.loads(row["start"])),
         out=Path(row["out"]),
         require_wake=None if row["require_wake"] == _WORLD else bool(row["require_wake"]),
         record=bool(row["record"]),

@@ -39,10 +39,12 @@ class _Strict(BaseModel):
 class Rules(_Strict):
     """How objects lie on surfaces, in metres; see `objects.yaml`."""
 
-    from_edge_m: Span = Field(description="least and greatest distance of an object's centre from the front edge")
-    clear_m: float = Field(description="between objects, and from an object to a keep-clear outline")
-    rim_m: float = Field(description="between an object's outline and the surface's own outline")
-    drop_m: float = Field(description="objects start this high above the surface")
+    from_edge_m: Span = Field(
+        default=(0.08, 0.25), description="least and greatest distance of an object's centre from the front edge"
+    )
+    clear_m: float = Field(default=0.12, description="between objects, and from an object to a keep-clear outline")
+    rim_m: float = Field(default=0.03, description="between an object's outline and the surface's own outline")
+    drop_m: float = Field(default=0.001, description="objects start this high above the surface")
 
 
 class ObjectRule(_Strict):
@@ -66,12 +68,13 @@ class PersonRule(_Strict):
 class SeedRules(_Strict):
     """The schema of `objects.yaml`."""
 
-    rules: Rules = Field(description="distances for all objects")
+    rules: Rules = Field(default=Rules(), description="distances for all objects")
     fronts: dict[str, tuple[tuple[Point, Point], ...]] = Field(
-        description="for each surface, the edges (from and to, x and y) that the robot can stand before"
+        default_factory=dict,
+        description="for each surface, the edges (from and to, x and y) that the robot can stand before",
     )
     keep_clear: tuple[Polygon, ...] = Field(default=(), description="outlines where no object may lie, corners (x, y)")
-    objects: tuple[ObjectRule, ...] = Field(description="the loose objects")
+    objects: tuple[ObjectRule, ...] = Field(default=(), description="the loose objects")
     people: tuple[PersonRule, ...] = Field(default=(), description="the people")
 
 
@@ -96,9 +99,9 @@ class _Top(BaseModel):
 
 class _Knowledge(BaseModel):
     start: _Pose
-    dock: _Pose
-    places: dict[str, _Place]
-    surfaces: dict[str, _Top]
+    dock: _Pose | None = None
+    places: dict[str, _Place] = Field(default_factory=dict)
+    surfaces: dict[str, _Top] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -112,16 +115,26 @@ class SurfaceTop:
 
 @dataclass(frozen=True)
 class World:
-    """A world's files and what the plant needs to know of them. Lengths in metres, world frame."""
+    """A world's files and what the plant needs to know of them. Lengths in metres, world frame.
+
+    Only its geometry and a start are needed: no dock, rooms, surfaces or seed rules.
+    """
 
     name: str
     folder: Path
     start: Pose2D
-    dock: Pose2D
+    dock: Pose2D | None
     rooms: dict[str, Polygon]
     surfaces: dict[str, SurfaceTop]
     surface_places: dict[str, str]
     seed_rules: SeedRules
+
+    @property
+    def corners(self) -> Polygon:
+        """Points between which all of it lies, as far as its rooms tell; else the surroundings of the start."""
+        x, y, reach_m = self.start.x_m, self.start.y_m, 5.0
+        rooms = [corner for room in self.rooms.values() for corner in room]
+        return tuple(rooms) or ((x - reach_m, y - reach_m), (x + reach_m, y + reach_m))
 
     @property
     def directives_path(self) -> Path:
@@ -158,14 +171,15 @@ def load_world(name_or_path: str | Path) -> World:
     """Load a world by its name, or by the path of its folder. Raises WorldError."""
     folder = _find_folder(name_or_path)
     knowledge = _read(folder / "knowledge.yaml", _Knowledge)
-    rules = _read(folder / "objects.yaml", SeedRules)
+    objects = folder / "objects.yaml"
+    rules = _read(objects, SeedRules) if objects.exists() or objects.is_symlink() else SeedRules()
     surfaces = {name: SurfaceTop(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
-    _check_surfaces(folder / "objects.yaml", rules, surfaces)
+    _check_surfaces(objects, rules, surfaces)
     return World(
         name=folder.name,
         folder=folder,
         start=knowledge.start.pose(),
-        dock=knowledge.dock.pose(),
+        dock=None if knowledge.dock is None else knowledge.dock.pose(),
         rooms={name: place.polygon for name, place in knowledge.places.items()},
         surfaces=surfaces,
         surface_places={name: top.place for name, top in knowledge.surfaces.items()},

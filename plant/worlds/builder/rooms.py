@@ -1,7 +1,8 @@
 """Rooms and doors in the free space of a grid: what opens up around a place, as far as it does not narrow to a door.
 
 Cells are flooded from the most open one down. Where two basins meet at a saddle that is much narrower than both, there
-is a door; else they are one. Clearance is measured along the axes, so that a crossing of corridors is no wider than they.
+is a door; else they are one. Clearance is measured along the axes, so that a crossing of corridors is no wider than
+they; where that is equal the plain distance decides, which is least in the plane of a door.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def body_margin_m(grid: Grid, clearance: FloatArray, pose: Pose2D) -> float:
 def find_rooms(grid: Grid, start: Pose2D) -> tuple[tuple[Room, ...], tuple[Door, ...]]:
     """The rooms that can be reached from the start, the largest first, and the doors between them."""
     clearance = clearance_m(grid)
-    labels, saddles = _segmented(grid)
+    labels, saddles = _segmented(grid, clearance)
     reached = _reached(clearance, grid, start)
     sizes = np.bincount(labels[reached], minlength=int(labels.max()) + 1)
     sizes[0] = 0
@@ -89,11 +90,10 @@ def find_rooms(grid: Grid, start: Pose2D) -> tuple[tuple[Room, ...], tuple[Door,
     doors = []
     for a, b, width, row, column in saddles:
         if a in rooms and b in rooms:
-            at = tuple(
-                round((i + 0.5) * grid.resolution_m + low, 3)
-                for i, low in zip((column, row), grid.origin_m, strict=True)
+            x, y = (
+                i * grid.resolution_m + low for i, low in zip((column + 0.5, row + 0.5), grid.origin_m, strict=True)
             )
-            doors.append(Door((rooms[a].name, rooms[b].name), (at[0], at[1]), round(width, 2)))
+            doors.append(Door((rooms[a].name, rooms[b].name), (round(x, 3), round(y, 3)), round(width, 2)))
     return tuple(rooms.values()), tuple(doors)
 
 
@@ -118,11 +118,11 @@ def _room(name: str, cells: Bools, grid: Grid, clearance: FloatArray, reached: B
     return Room(name, tuple((round(float(x), 3), round(float(y), 3)) for x, y in corners), pose)
 
 
-def _segmented(grid: Grid) -> tuple[NDArray[np.int64], list[tuple[int, int, float, int, int]]]:
+def _segmented(grid: Grid, clearance: FloatArray) -> tuple[NDArray[np.int64], list[tuple[int, int, float, int, int]]]:
     """Labels of the cells (0: not free), and the saddles between them: labels, width (m), row, column."""
     free = np.pad((grid.cells == FREE).astype(np.uint8), 1)
     far = cv2.distanceTransform(free, cv2.DIST_C, 3) - 0.5
-    order = np.argsort(-far, axis=None, kind="stable")[: int(np.count_nonzero(free))]
+    order = np.lexsort((-np.pad(clearance, 1, constant_values=-1.0).ravel(), -far.ravel()))[: np.count_nonzero(free)]
     cell_m2 = grid.resolution_m**2
     parent, labels, meetings = _flooded(
         far, order, NARROWER, WIDEST_DOOR_M / 2.0 / grid.resolution_m, LEAST_BASIN_M2 / cell_m2

@@ -71,4 +71,5 @@ def _pixels(view: MapView, points: Sequence[Point]) -> NDArray[np.int32]:
 
 def _arrow(start: Pose2D) -> FloatArray:
     ahead = np.array([np.cos(start.yaw_rad), np.sin(start.yaw_rad)])
-    return np.array([start.x_m, start.y_m]) + np.array([[0.0], [_ARROW_M / 2.0], [_ARROW_M]]) * ahead
+    steps = np.array([[0.0], [_ARROW_M / 2.0], [_ARROW_M]])
+    return np.asarray(np.array([start.x_m, start.y_m]) + steps * ahead)

@@ -182,6 +182,8 @@ def _key_lines(path: Path) -> dict[str, int]:
         node = yaml.compose(path.read_text(), Loader=yaml.SafeLoader)
     except OSError as error:
         raise MapError(f"{path}:1: cannot be read ({error.strerror}); check the map's path") from error
+    except (UnicodeDecodeError, yaml.reader.ReaderError) as error:
+        raise MapError(f"{path}:1: it is no text; give the map's YAML file") from error
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise MapError(f"{path}:{line}: {error.problem}; correct the YAML there") from error

@@ -22,9 +22,12 @@ BODY_M = (1.10, 0.50)
 NARROWER = 0.8
 WIDEST_DOOR_M = 1.5
 LEAST_BASIN_M2, LEAST_ROOM_M2 = 0.4, 1.5
+_TIE = 1e-3
 _YAWS = np.arange(8) * np.pi / 8
 
 Point = tuple[float, float]
+_Saddle = tuple[int, int, float, float, float]
+"""Two labels, the width (m) between them, and where: row and column as lengths in cells."""
 
 
 @dataclass(frozen=True)
@@ -89,10 +92,8 @@ def find_rooms(grid: Grid, start: Pose2D) -> tuple[tuple[Room, ...], tuple[Door,
             rooms[int(label)] = room
     doors = []
     for a, b, width, row, column in saddles:
-        if a in rooms and b in rooms:
-            x, y = (
-                i * grid.resolution_m + low for i, low in zip((column + 0.5, row + 0.5), grid.origin_m, strict=True)
-            )
+        if a in rooms and b in rooms and width >= BODY_M[1]:
+            x, y = (i * grid.resolution_m + low for i, low in zip((column, row), grid.origin_m, strict=True))
             doors.append(Door((rooms[a].name, rooms[b].name), (round(x, 3), round(y, 3)), round(width, 2)))
     return tuple(rooms.values()), tuple(doors)
 
@@ -118,18 +119,18 @@ def _room(name: str, cells: Bools, grid: Grid, clearance: FloatArray, reached: B
     return Room(name, tuple((round(float(x), 3), round(float(y), 3)) for x, y in corners), pose)
 
 
-def _segmented(grid: Grid, clearance: FloatArray) -> tuple[NDArray[np.int64], list[tuple[int, int, float, int, int]]]:
+def _segmented(grid: Grid, clearance: FloatArray) -> tuple[NDArray[np.int64], list[_Saddle]]:
     """Labels of the cells (0: not free), and the saddles between them: labels, width (m), row, column."""
     free = np.pad((grid.cells == FREE).astype(np.uint8), 1)
-    far = cv2.distanceTransform(free, cv2.DIST_C, 3) - 0.5
-    order = np.lexsort((-np.pad(clearance, 1, constant_values=-1.0).ravel(), -far.ravel()))[: np.count_nonzero(free)]
+    far = cv2.distanceTransform(free, cv2.DIST_C, 3) - 0.5 + _TIE * np.pad(clearance, 1) / grid.resolution_m
+    order = np.argsort(-far, axis=None, kind="stable")[: np.count_nonzero(free)]
     cell_m2 = grid.resolution_m**2
     parent, labels, meetings = _flooded(
         far, order, NARROWER, WIDEST_DOOR_M / 2.0 / grid.resolution_m, LEAST_BASIN_M2 / cell_m2
     )
     roots = _roots(parent)
     labels = roots[labels][1:-1, 1:-1]
-    widest: dict[tuple[int, int], tuple[int, int, float, int, int]] = {}
+    widest: dict[tuple[int, int], _Saddle] = {}
     small = {int(each) for each in np.flatnonzero(np.bincount(labels.ravel()) * cell_m2 < LEAST_ROOM_M2)}
     joined = np.arange(len(parent))
     for first, second, cell in meetings:  # the widest first
@@ -142,13 +143,13 @@ def _segmented(grid: Grid, clearance: FloatArray) -> tuple[NDArray[np.int64], li
             joined[gone] = keep
             continue
         width = 2.0 * (float(far[row, column]) + 0.5) * grid.resolution_m
-        widest.setdefault((a, b), (a, b, width, row - 1, column - 1))
+        widest.setdefault((a, b), (a, b, width, row - 0.5, column - 0.5))
     joined = _roots(joined)
-    saddles = {}
+    saddles: dict[tuple[int, int], _Saddle] = {}
     for a, b, *rest in widest.values():
-        pair = tuple(sorted((int(joined[a]), int(joined[b]))))
-        if pair[0] != pair[1]:
-            saddles.setdefault(pair, (pair[0], pair[1], *rest))
+        first, second = sorted((int(joined[a]), int(joined[b])))
+        if first != second:
+            saddles.setdefault((first, second), (first, second, *rest))
     return joined[labels], list(saddles.values())
 
 
@@ -170,7 +171,7 @@ def _root(parent: Any, label: Any) -> Any:
 _root_of = numba.njit(cache=True)(_root)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True)
 def _flooded(far: Any, order: Any, narrower: float, widest: float, least: float) -> Any:
     """Parents of the labels, the label of each cell, and the cells where two labels meet and stay apart."""
     rows, columns = far.shape
@@ -181,13 +182,15 @@ def _flooded(far: Any, order: Any, narrower: float, widest: float, least: float)
     meetings = [(0, 0, 0)]
     for cell in order:
         row, column = cell // columns, cell % columns
-        here, own = far[row, column], 0
+        here, own, steepest, label = far[row, column], 0, -1.0, 0
         for dr in range(-1, 2):
             for dc in range(-1, 2):
                 other = labels[row + dr, column + dc]
                 if other == 0:
                     continue
                 other = _root_of(parent, other)
+                if far[row + dr, column + dc] > steepest:
+                    steepest, label = far[row + dr, column + dc], other
                 if own == 0:
                     own = other
                 elif other != own:
@@ -198,11 +201,11 @@ def _flooded(far: Any, order: Any, narrower: float, widest: float, least: float)
                         own = high
                     else:
                         meetings.append((own, other, cell))
-        if own == 0:
-            own = len(parent)
-            parent.append(own)
+        if label == 0:
+            label = len(parent)
+            parent.append(label)
             peaks.append(here)
             sizes.append(0)
-        labels[row, column] = own
-        sizes[own] += 1
+        labels[row, column] = label
+        sizes[_root_of(parent, label)] += 1
     return np.array(parent), labels, meetings[1:]

@@ -142,14 +142,14 @@ def _segmented(grid: Grid, clearance: FloatArray) -> tuple[NDArray[np.int64], li
             keep, gone = (b, a) if a in small else (a, b)
             joined[gone] = keep
             continue
-        width = 2.0 * (float(far[row, column]) + 0.5) * grid.resolution_m
-        widest.setdefault((a, b), (a, b, width, row - 0.5, column - 0.5))
+        across_m = 2.0 * (float(far[row, column]) + 0.5) * grid.resolution_m
+        widest.setdefault((a, b), (a, b, across_m, row - 0.5, column - 0.5))
     joined = _roots(joined)
     saddles: dict[tuple[int, int], _Saddle] = {}
-    for a, b, *rest in widest.values():
+    for a, b, width, row, column in widest.values():
         first, second = sorted((int(joined[a]), int(joined[b])))
         if first != second:
-            saddles.setdefault((first, second), (first, second, *rest))
+            saddles.setdefault((first, second), (first, second, width, row, column))
     return joined[labels], list(saddles.values())
 
 

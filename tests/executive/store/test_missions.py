@@ -188,7 +188,7 @@ def test_a_store_of_another_version_is_refused(path):
     with sqlite3.connect(path) as other:
         other.execute("PRAGMA user_version = 9")
     other.close()
-    with pytest.raises(InputError, match="version 9, and this errand reads 2"):
+    with pytest.raises(InputError, match="version 9, and this errand reads 3"):
         MissionStore(path)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -39,12 +39,10 @@ class _Strict(BaseModel):
 class Rules(_Strict):
     """How objects lie on surfaces, in metres; see `objects.yaml`."""
 
-    from_edge_m: Span = Field(
-        default=(0.08, 0.25), description="least and greatest distance of an object's centre from the front edge"
-    )
-    clear_m: float = Field(default=0.12, description="between objects, and from an object to a keep-clear outline")
-    rim_m: float = Field(default=0.03, description="between an object's outline and the surface's own outline")
-    drop_m: float = Field(default=0.001, description="objects start this high above the surface")
+    from_edge_m: Span = Field(description="least and greatest distance of an object's centre from the front edge")
+    clear_m: float = Field(description="between objects, and from an object to a keep-clear outline")
+    rim_m: float = Field(description="between an object's outline and the surface's own outline")
+    drop_m: float = Field(description="objects start this high above the surface")
 
 
 class ObjectRule(_Strict):
@@ -68,14 +66,19 @@ class PersonRule(_Strict):
 class SeedRules(_Strict):
     """The schema of `objects.yaml`."""
 
-    rules: Rules = Field(default=Rules(), description="distances for all objects")
+    rules: Rules = Field(description="distances for all objects")
     fronts: dict[str, tuple[tuple[Point, Point], ...]] = Field(
-        default_factory=dict,
-        description="for each surface, the edges (from and to, x and y) that the robot can stand before",
+        description="for each surface, the edges (from and to, x and y) that the robot can stand before"
     )
     keep_clear: tuple[Polygon, ...] = Field(default=(), description="outlines where no object may lie, corners (x, y)")
-    objects: tuple[ObjectRule, ...] = Field(default=(), description="the loose objects")
+    objects: tuple[ObjectRule, ...] = Field(description="the loose objects")
     people: tuple[PersonRule, ...] = Field(default=(), description="the people")
+
+
+NO_SEED_RULES: Final = SeedRules(
+    rules=Rules(from_edge_m=(0.0, 0.0), clear_m=0.0, rim_m=0.0, drop_m=0.0), fronts={}, objects=()
+)
+"""Nothing loose, and nobody."""
 
 
 class _Pose(BaseModel):
@@ -172,7 +175,7 @@ def load_world(name_or_path: str | Path) -> World:
     folder = _find_folder(name_or_path)
     knowledge = _read(folder / "knowledge.yaml", _Knowledge)
     objects = folder / "objects.yaml"
-    rules = _read(objects, SeedRules) if objects.exists() or objects.is_symlink() else SeedRules()
+    rules = _read(objects, SeedRules) if objects.exists() or objects.is_symlink() else NO_SEED_RULES
     surfaces = {name: SurfaceTop(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
     _check_surfaces(objects, rules, surfaces)
     return World(

@@ -31,7 +31,7 @@ world = typer.Typer(name="world", help="Worlds made of any map, and how a world 
 
 
 class _Cylinders(BaseModel):
-    """What is used of a file of cylinders: x, y, radius, height of each, and where the robot starts (x, y, yaw)."""
+    """What is used of a file of cylinders: x, y, radius, height of each, where the robot starts (x, y, yaw), its goal."""
 
     model_config = ConfigDict(allow_inf_nan=False)
 
@@ -39,6 +39,7 @@ class _Cylinders(BaseModel):
         tuple[float, float, Annotated[float, Field(gt=0, le=10)], Annotated[float, Field(gt=0, le=10)]], ...
     ] = Field(min_length=1, max_length=20_000)
     start: tuple[float, float, float] | None = None
+    goal: tuple[float, float] | None = None
 
 
 @world.callback()
@@ -78,7 +79,9 @@ def from_cylinders(
     with refusals():
         read = _cylinders(file)
         pose = start_pose(start) or (None if read.start is None else Pose2D(*read.start))
-        _made(file, out, lambda folder: world_from_cylinders(folder, read.cylinders, start=pose))
+        around = [] if pose is None else [(pose.x_m, pose.y_m)]
+        around += [] if read.goal is None else [read.goal]
+        _made(file, out, lambda folder: world_from_cylinders(folder, read.cylinders, start=pose, around=around))
         _told(out)
 
 

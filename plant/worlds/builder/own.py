@@ -43,17 +43,21 @@ def world_from_grid(folder: Path, grid: Grid, *, start: Pose2D | None, wall_heig
 
 
 def world_from_cylinders(
-    folder: Path, cylinders: Sequence[tuple[float, float, float, float]], *, start: Pose2D | None
+    folder: Path,
+    cylinders: Sequence[tuple[float, float, float, float]],
+    *,
+    start: Pose2D | None,
+    around: Sequence[tuple[float, float]] = (),
 ) -> None:
-    """Write a world of upright cylinders (x, y, radius, height). Raises WorldError: the robot finds no place in it."""
+    """Write a world of upright cylinders (x, y, radius, height), and 2 m around some points.
+
+    Raises WorldError: the robot finds no place in it.
+    """
     shapes = [Cylinder(radius=r, length=h, p=(x, y, h / 2.0)) for x, y, r, h in cylinders]
     places, reach = np.array(cylinders)[:, :2], max(r for _, _, r, _ in cylinders) + _MARGIN_M / 2.0
     low, high = places.min(axis=0) - reach, places.max(axis=0) + reach
-    if start is not None:
-        low, high = (
-            np.minimum(low, [start.x_m - 2.0, start.y_m - 2.0]),
-            np.maximum(high, [start.x_m + 2, start.y_m + 2]),
-        )
+    for here in map(np.array, around):
+        low, high = np.minimum(low, here - 2.0), np.maximum(high, here + 2.0)
     step = 0.025
     shape = tuple(int(n) for n in np.ceil((high - low) / step))[::-1]
     if shape[0] * shape[1] > _MOST_CELLS:

@@ -86,11 +86,13 @@ def test_a_start_that_is_not_free_is_refused_with_a_free_one(tmp_path: Path, sta
 
 def test_cylinders_stand_in_both_grids_as_far_as_they_reach(tmp_path: Path) -> None:
     cylinders = [(0.0, 0.0, 0.4, 1.0), (6.0, 0.0, 0.4, 0.5)]
-    world_from_cylinders(tmp_path, cylinders, start=Pose2D(3.0, 0.0, 0.0))
+    world_from_cylinders(tmp_path, cylinders, start=Pose2D(3.0, 0.0, 0.0), around=[(3.0, 9.0)])
     areas = {}
     for name in ("scan", "keepout"):
         data = (tmp_path / "map" / f"{name}.pgm").read_bytes()
         areas[name] = np.count_nonzero(np.frombuffer(data.split(b"255\n", 1)[1], np.uint8) == OCCUPIED) * 0.025**2
     assert areas["keepout"] == pytest.approx(2 * np.pi * 0.16, rel=0.03)
     assert areas["scan"] == pytest.approx(np.pi * 0.16, rel=0.03)
+    rows = int(data.split()[2])
+    assert rows * 0.025 == pytest.approx(0.9 + 11.0, abs=0.05)  # to 2 m beyond the point
     assert (tmp_path / "walls.sdf").read_text().count("<cylinder>") == 2

@@ -31,7 +31,7 @@ world = typer.Typer(name="world", help="Worlds made of any map, and how a world 
 
 
 class _Cylinders(BaseModel):
-    """What is used of a file of cylinders: x, y, radius, height of each, where the robot starts (x, y, yaw), its goal."""
+    """What is used of a file of cylinders: x, y, radius, height of each; start (x, y, yaw) and goal (x, y)."""
 
     model_config = ConfigDict(allow_inf_nan=False)
 

@@ -32,6 +32,8 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
 from pydrake.systems.framework import DiagramBuilder
 
+OWN_PACKAGE = "world"
+"""The package of a world's own folder, wherever that lies."""
 _RELATIVE_URI = re.compile(r"<uri>\s*(?![a-z]+://)([^<\s]+)\s*</uri>")
 
 
@@ -39,13 +41,19 @@ def add_scenery(
     plant: MultibodyPlant, directives: Path, parser_of: Callable[[MultibodyPlant], Parser]
 ) -> dict[GeometryId, str]:
     """Add the directives' world to `plant` (before Finalize); returns the model each collision shape comes from."""
+
+    def parser_in(into: MultibodyPlant) -> Parser:
+        parser = parser_of(into)
+        parser.package_map().Add(OWN_PACKAGE, directives.parent)
+        return parser
+
     scratch, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
-    parser = parser_of(scratch)
+    parser = parser_in(scratch)
     flat = FlattenModelDirectives(LoadModelDirectives(directives), parser.package_map()).directives
     _process(flat, scratch, parser)
     scratch.Finalize()
     moving = _moving_models(scratch, flat)
-    _process([each for each in flat if _models_of(each) <= moving], plant, parser_of(plant))
+    _process([each for each in flat if _models_of(each) <= moving], plant, parser_in(plant))
     return _copy_fixed(scratch, scene_graph.model_inspector(), moving, plant)
 
 

@@ -289,7 +289,7 @@ class Simulation:
         save_html(self.engine.world, self.recorder.frames, path, self._overview())
 
     def _overview(self) -> View:
-        return View.over([corner for room in self.world.rooms.values() for corner in room])
+        return View.over(self.world.corners)
 
 
 def _loose(placement: Placement, *, fixed: bool = False) -> LooseModel:

@@ -34,7 +34,7 @@ TRAINING = (
     "skills.perception.training",
     "executive.speech.training",
 )
-"""What makes pictures, models and networks; nothing at run time imports it."""
+"""What makes pictures, models, worlds and networks; nothing at run time imports it."""
 TRAINS = (
     "dataset_command",
     "learning",
@@ -42,6 +42,7 @@ TRAINS = (
     "score_command",
     "score_report",
     "train_command",
+    "world_command",
     "worst_sheet",
 )
 """The modules of executive.cli that serve it."""

@@ -116,14 +116,14 @@ def _detection(message: Mapping[str, Any]) -> Picture:
 
 def _map(simulation: Simulation, robot_name: str) -> Picture:
     rooms = simulation.world.rooms
-    view = top_view(simulation.query_at(simulation.clock.now()), _bounds(list(rooms.values())))
+    view = top_view(simulation.query_at(simulation.clock.now()), _bounds(simulation.world.corners))
     centres = {name: tuple(np.mean(polygon, axis=0)) for name, polygon in rooms.items()}
     start = simulation.world.start
     return draw_map(view, simulation.referee.path(robot_name), labels=centres, marks={"start": (start.x_m, start.y_m)})
 
 
-def _bounds(polygons: Sequence[Sequence[tuple[float, float]]]) -> Bounds:
-    corners = np.array([corner for polygon in polygons for corner in polygon])
+def _bounds(points: Sequence[tuple[float, float]]) -> Bounds:
+    corners = np.array(points)
     low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 

@@ -5,7 +5,6 @@ Help and start-up would otherwise import the plant, the sentence parser and the 
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
+from executive.cli.start_pose import joined
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.errors import InputError
 
@@ -53,11 +53,10 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "dataset": _Command("dataset_command", "dataset", "Labelled pictures rendered in the plant; scores, training."),
     "stack": _Command("stack_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
+    "world": _Command("world_command", "world", "Worlds made of any map, and how a world looks."),
     "new-skill": _Command("new_skill_command", "new_skill", "Write an installable package with a skill and tests."),
 }
 """The commands by name, in the order of the help."""
-START: Final = "--start"
-_NUMBER: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 def loaded(name: str) -> Any:
@@ -67,20 +66,8 @@ def loaded(name: str) -> Any:
     if isinstance(found, typer.Typer):
         return get_command(found)
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-    alone.command(name=name, cls=_JoinsStart)(found)
+    alone.command(name=name)(found)
     return get_command(alone)
-
-
-class _JoinsStart(TyperCommand):
-    """Takes `--start X Y YAW` as well as `--start unknown`: an option has a fixed number of values otherwise."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """The usual, after three numbers behind the option have become one value."""
-        at = args.index(START) if START in args else len(args)
-        values = args[at + 1 : at + 4]
-        if len(values) == 3 and all(_NUMBER.fullmatch(value) for value in values):
-            args = [*args[:at], f"{START}={' '.join(values)}", *args[at + 4 :]]
-        return super().parse_args(ctx, args)
 
 
 class _LazyGroup(TyperGroup):
@@ -95,7 +82,7 @@ class _LazyGroup(TyperGroup):
         """The command that the first argument names, imported."""
         if args and args[0] in COMMANDS:
             self.add_command(loaded(args[0]), args[0])
-        return super().resolve_command(ctx, args)
+        return super().resolve_command(ctx, joined(args))
 
 
 app = typer.Typer(

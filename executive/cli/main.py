@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
@@ -23,6 +24,7 @@ from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
 from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.language.questions import QuestionPolicy
+from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
 from executive.record.profile import Profile, lines
 from executive.store.missions import MissionStore
@@ -48,6 +50,9 @@ StartAt = Annotated[
     typer.Option(metavar="X Y YAW", help="Where the robot stands (m, rad); 'unknown': anywhere, and it finds out."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
+Given = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
+]
 PageOf = Callable[[Prepared], PageView | None]
 
 
@@ -56,6 +61,7 @@ def run(
     say: Say = None,
     listen_to: Annotated[Path | None, typer.Option("--listen", help="A wav file that says it.")] = None,
     world: World = None,
+    given: Given = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
     wake: Wake = None,
     answer: Answer = None,
@@ -89,6 +95,7 @@ def run(
             say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack, at)
+        asked = replace(asked, given=given_values(given or ()))
         finished, page = _run_kept(
             asked,
             kept_in,

@@ -9,7 +9,7 @@ from pathlib import Path
 from executive.cli.answers import answerer, ask_at_terminal
 from executive.cli.missions_command import mission_file
 from executive.cli.plugins import usable_skills
-from executive.cli.worlds import knowledge_of, open_world
+from executive.cli.worlds import knowledge_of, open_world, refuse_blocked
 from executive.language import Understanding, load_parser
 from executive.language.questions import Answerer
 from executive.mission.command import parse_command
@@ -18,7 +18,7 @@ from executive.mission.file.model import DEFAULT_WORLD, Mission
 from executive.mission.file.overrides import overridden
 from executive.mission.file.resolve import load_mission, mission_from_file
 from executive.mission.file.schema import MissionFile
-from executive.mission.knowledge import Knowledge
+from executive.mission.knowledge import Knowledge, Pose
 from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
@@ -59,11 +59,12 @@ def prepare(
     """
     if not request.only_commands and (request.file is None) == (request.sentence is None):
         raise InputError("a mission file or --say is needed, and not both", hint='try: --say "Hey Alice, ..."')
+    if request.given and request.file is None:
+        raise InputError("--set gives values to a mission file, and there is none", hint="name the file as well")
     if request.file is not None:
         file = mission_file(request.file)
         return _filed(replace(request, file=file), file, ask)
-    world = open_world(request.world or request.world_name or DEFAULT_WORLD)
-    knowledge = knowledge_of(world)
+    world, knowledge = _standing(request, open_world(request.world or request.world_name or DEFAULT_WORLD))
     if request.sentence is None:
         return _prepared(request, _commanded(request, world), world, knowledge)
     robot = knowledge.robot
@@ -81,13 +82,25 @@ def prepare(
 
 def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:
     """That of a mission file; the request's world stands in for the file's own."""
-    loaded = load_mission(file)
+    loaded = load_mission(file, request.given)
     world = open_world(request.world) if request.world is not None else _own_world(loaded)
-    knowledge = overridden(loaded, knowledge_of(world))
+    world, knowledge = _standing(request, world)
+    knowledge = overridden(loaded, knowledge)
     answer = answerer(request.answers, request.questions or loaded.questions, ask)
     mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
     text = file.read_text(encoding="utf-8")
     return _prepared(replace(request, text=text), mission, world, knowledge)
+
+
+def _standing(request: Request, world: World) -> tuple[World, Knowledge]:
+    """The world and what is known of it, with the robot where the request has it. Raises InputError: it is not free."""
+    knowledge = knowledge_of(world)
+    start = None if request.start is None else request.start.pose
+    if start is None:
+        return world, knowledge
+    refuse_blocked(world, start)
+    told = Pose(x=start.x_m, y=start.y_m, yaw=start.yaw_rad)
+    return replace(world, start=start), knowledge.model_copy(update={"start": told})
 
 
 def _own_world(loaded: MissionFile) -> World:

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from executive.mission.errors import InputError, known_names, suggestion
 from executive.mission.knowledge import Knowledge, load_knowledge
+from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
+from skills.estimate.grid_map import MapError, load_grid_map
+from skills.navigate.footprint import Footprint
+from skills.robot import Pose2D
 
 
 def open_world(name: str) -> World:
@@ -21,6 +29,21 @@ def _world_error(name: str, error: Exception) -> InputError:
         return InputError(str(error))
     known = f"{known_names(name, known_worlds())}, and folders with a world.dmd.yaml"
     return InputError(f"unknown world '{name[:60]}'", hint=suggestion(name, known_worlds(), known))
+
+
+def refuse_blocked(world: World, pose: Pose2D) -> None:
+    """Raise InputError unless the robot's body is free at a pose on the world's map, which must be there."""
+    try:
+        grid = load_grid_map(world.keepout_map_path).with_unknown_blocked()
+    except (MapError, OSError) as error:
+        raise InputError(str(error)) from error
+    discs = Footprint.of(spot_capabilities()).discs
+    c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    middles = discs[:, :2] @ np.array([[c, s], [-s, c]]) + [pose.x_m, pose.y_m]
+    if float(np.min(grid.distance_m(middles) - discs[:, 2])) < 0.0:
+        there = f"({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g})"
+        hint = "give a free pose; `errand world show` draws the world"
+        raise InputError(f"at the start {there} the robot stands in something or outside of {world.name}", hint=hint)
 
 
 def knowledge_of(world: World) -> Knowledge:

@@ -138,7 +138,9 @@ def _waited(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) 
     return None if command.goal is None else _went(command, knowledge, elsewhere)
 
 
-def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondition:
+def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondition | None:
+    if knowledge.dock is None:
+        return None
     return GoalCondition(GoalKind.WENT, goal=(_square("the dock", knowledge.dock, POSE_NEAR_M),))
 
 

@@ -18,6 +18,7 @@ __all__ = [
     "ANYBODY",
     "ANYTHING",
     "BatteryFacts",
+    "Door",
     "Knowledge",
     "Person",
     "Place",
@@ -79,6 +80,14 @@ class Place(_Facts):
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
 
 
+class Door(_Facts):
+    """A narrow passage between two rooms: its middle (world frame, m) and clear width (m)."""
+
+    between: tuple[str, str] = Field(description="the rooms on its two sides")
+    at: Corner = Field(description="its middle (x, y)")
+    width: Annotated[float, Field(gt=0.0, le=10.0, description="clear width, m")]
+
+
 class SurfaceFacts(_Facts):
     """A flat top in a room: other names, height above the floor (m), outline, and poses from which it is seen whole."""
 
@@ -108,13 +117,16 @@ class Person(_Facts):
 class Knowledge(_Facts):
     """All that is known of one world. Names are matched without regard to case."""
 
-    robot: RobotFacts = Field(description="the robot")
+    robot: RobotFacts = Field(default=RobotFacts(name="Alice"), description="the robot")
     start: Pose = Field(description="where it stands at the beginning")
-    dock: Pose = Field(description="where it stands to charge")
+    dock: Pose | None = Field(default=None, description="where it stands to charge; without one it cannot charge")
     battery: BatteryFacts = Field(default=BatteryFacts(), description="when it charges, and until when")
-    places: dict[Name, Place] = Field(description="the rooms by name")
-    surfaces: dict[Name, SurfaceFacts] = Field(description="the flat tops where objects lie, by name")
-    things: dict[Name, ThingFacts] = Field(description="the classes of objects by name")
+    places: dict[Name, Place] = Field(default_factory=dict, description="the rooms by name")
+    doors: tuple[Door, ...] = Field(default=(), description="the narrow passages between rooms")
+    surfaces: dict[Name, SurfaceFacts] = Field(
+        default_factory=dict, description="the flat tops where objects lie, by name"
+    )
+    things: dict[Name, ThingFacts] = Field(default_factory=dict, description="the classes of objects by name")
     people: dict[Name, Person] = Field(default_factory=dict, description="the people by name")
     defaults: dict[str, dict[str, str]] = Field(
         default_factory=dict, description="for a task, the room for each class or category when the request names none"
@@ -228,6 +240,9 @@ def knowledge_of_source(source: YamlSource) -> Knowledge:
 def _cross_errors(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
     """Errors in what refers to something else in the file."""
     tasks = [task.value for task in Task]
+    for index, door in enumerate(knowledge.doors):
+        for side, room in enumerate(door.between):
+            yield from _unless_known(source, ("doors", index, "between", side), room, knowledge.places)
     for name, surface in knowledge.surfaces.items():
         yield from _unless_known(source, ("surfaces", name, "place"), surface.place, knowledge.places)
     for name, person in knowledge.people.items():

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from executive.language.questions import QuestionPolicy
 from executive.mission.errors import InputError
@@ -49,8 +50,8 @@ class Request:
 
     `world` is as it was said, if it was; `require_wake` tells whether the robot's name must be said (None: the world
     decides); `answers` are to the questions that it leaves open, in their order, and `questions` says what becomes of
-    further ones. `out` is the folder for the run's files, `stack` the file that says what the robot uses, `start` where
-    it stands when not at the world's start.
+    further ones. `given` are values for a file's parameters; the robot stands at `start`, where the world's own is not
+    meant. `out` is the folder for the run's files, `stack` the file that says what the robot uses.
 
     What stands below `start` is filled once it is understood. Then another process can take it up: a sentence has the
     answers in their places, and `text` is that of the file.
@@ -67,6 +68,7 @@ class Request:
     record: bool = True
     stack: Path | None = None
     start: Start | None = None
+    given: Mapping[str, Any] = field(default_factory=dict)
     name: str = ""
     world_name: str = ""
     robot: str = ""

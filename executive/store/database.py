@@ -30,6 +30,7 @@ CREATE TABLE mission (
     out TEXT NOT NULL,
     record INTEGER NOT NULL,
     stack TEXT,
+    given TEXT NOT NULL,
     start TEXT,
     commands TEXT NOT NULL,
     fingerprint TEXT NOT NULL,

@@ -51,7 +51,8 @@ def row_of(request: Request) -> dict[str, Any]:
     paths = {name: None if (path := getattr(request, name)) is None else str(path) for name in ("file", "stack")}
     flags = {"require_wake": _WORLD if request.require_wake is None else request.require_wake, "record": request.record}
     start = None if request.start is None else str(request.start)
-    return {**own, **flags, **paths, "start": start, "commands": json.dumps(request.commands), "out": str(request.out)}
+    told = {"given": json.dumps(dict(request.given)), "start": start}
+    return {**own, **flags, **paths, **told, "commands": json.dumps(request.commands), "out": str(request.out)}
 
 
 def request_of(row: Mapping[str, Any]) -> Request:
@@ -61,6 +62,7 @@ def request_of(row: Mapping[str, Any]) -> Request:
         commands=tuple(json.loads(row["commands"])),
         file=None if row["file"] is None else Path(row["file"]),
         stack=None if row["stack"] is None else Path(row["stack"]),
+        given=json.loads(row["given"]),
         start=None if row["start"] is None else Start.of(row["start"]),
         out=Path(row["out"]),
         require_wake=None if row["require_wake"] == _WORLD else bool(row["require_wake"]),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -75,6 +75,12 @@ class SeedRules(_Strict):
     people: tuple[PersonRule, ...] = Field(default=(), description="the people")
 
 
+NO_SEED_RULES: Final = SeedRules(
+    rules=Rules(from_edge_m=(0.0, 0.0), clear_m=0.0, rim_m=0.0, drop_m=0.0), fronts={}, objects=()
+)
+"""Nothing loose, and nobody."""
+
+
 class _Pose(BaseModel):
     x: float
     y: float
@@ -96,9 +102,9 @@ class _Top(BaseModel):
 
 class _Knowledge(BaseModel):
     start: _Pose
-    dock: _Pose
-    places: dict[str, _Place]
-    surfaces: dict[str, _Top]
+    dock: _Pose | None = None
+    places: dict[str, _Place] = Field(default_factory=dict)
+    surfaces: dict[str, _Top] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -112,16 +118,26 @@ class SurfaceTop:
 
 @dataclass(frozen=True)
 class World:
-    """A world's files and what the plant needs to know of them. Lengths in metres, world frame."""
+    """A world's files and what the plant needs to know of them. Lengths in metres, world frame.
+
+    Only its geometry and a start are needed: no dock, rooms, surfaces or seed rules.
+    """
 
     name: str
     folder: Path
     start: Pose2D
-    dock: Pose2D
+    dock: Pose2D | None
     rooms: dict[str, Polygon]
     surfaces: dict[str, SurfaceTop]
     surface_places: dict[str, str]
     seed_rules: SeedRules
+
+    @property
+    def corners(self) -> Polygon:
+        """Points between which all of it lies, as far as its rooms tell; else the surroundings of the start."""
+        x, y, reach_m = self.start.x_m, self.start.y_m, 5.0
+        rooms = [corner for room in self.rooms.values() for corner in room]
+        return tuple(rooms) or ((x - reach_m, y - reach_m), (x + reach_m, y + reach_m))
 
     @property
     def directives_path(self) -> Path:
@@ -158,14 +174,15 @@ def load_world(name_or_path: str | Path) -> World:
     """Load a world by its name, or by the path of its folder. Raises WorldError."""
     folder = _find_folder(name_or_path)
     knowledge = _read(folder / "knowledge.yaml", _Knowledge)
-    rules = _read(folder / "objects.yaml", SeedRules)
+    objects = folder / "objects.yaml"
+    rules = _read(objects, SeedRules) if objects.exists() or objects.is_symlink() else NO_SEED_RULES
     surfaces = {name: SurfaceTop(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
-    _check_surfaces(folder / "objects.yaml", rules, surfaces)
+    _check_surfaces(objects, rules, surfaces)
     return World(
         name=folder.name,
         folder=folder,
         start=knowledge.start.pose(),
-        dock=knowledge.dock.pose(),
+        dock=None if knowledge.dock is None else knowledge.dock.pose(),
         rooms={name: place.polygon for name, place in knowledge.places.items()},
         surfaces=surfaces,
         surface_places={name: top.place for name, top in knowledge.surfaces.items()},

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Final, Literal
 
 import cv2
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from skills.estimate.compiled import distances
 from skills.robot import FloatArray
 
 BoolGrid = NDArray[np.bool_]
+MOST_CELLS: Final = 16_000_000
+_PGM: Final = re.compile(rb"P[25](?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)\s")
+_HEAD_BYTES: Final = 4096
 
 
 class MapError(ValueError):
@@ -92,12 +96,12 @@ class _MapFile(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     image: str
-    resolution: PositiveFloat
+    resolution: float = Field(ge=0.005, le=1.0)
     origin: tuple[float, float, float]
     occupied_thresh: float = Field(le=1.0)
     free_thresh: float = Field(ge=0.0)
     negate: float = 0.0
-    mode: Any = None
+    mode: Literal["trinary", "scale"] = "trinary"
     height_band_m: tuple[float, float] | None = None
 
 
@@ -114,16 +118,62 @@ def load_grid_map(path: Path) -> GridMap:
         first = error.errors()[0]
         why = f"{first['msg']}; known keys are {', '.join(_MapFile.model_fields)}"
         raise refused(str(first["loc"][0]), why) from error
-    if told.origin[2] != 0.0:
-        raise refused("origin", "the map is turned; give it again with yaw 0")
     if not told.free_thresh < told.occupied_thresh:
         raise refused("free_thresh", "must lie below occupied_thresh, both in 0..1")
     picture = path.parent / told.image
-    grey = cv2.imread(str(picture), cv2.IMREAD_GRAYSCALE) if picture.is_file() else None
-    if grey is None:
-        raise refused("image", f"no picture can be read from {picture}; put a PGM file there")
-    occupied, unknown = _classify(np.asarray(grey, dtype=np.uint8), told)
+    try:
+        occupied, unknown = _classify(_grey(picture), told)
+    except (OSError, ValueError, cv2.error) as error:
+        raise refused("image", f"no picture can be read from {picture}: {error}") from error
+    if told.origin[2] != 0.0:
+        return _turned(occupied, unknown, told)
     return GridMap(occupied, told.resolution, told.origin[:2], unknown, told.height_band_m)
+
+
+def _grey(picture: Path) -> NDArray[np.uint8]:
+    """The grey values of a PGM or PNG file, whose head is looked at first. Raises OSError and ValueError."""
+    if not picture.is_file():
+        raise ValueError("there is no such file; put the map's PGM or PNG there")
+    with picture.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+    pgm = _PGM.match(head)
+    if pgm:
+        columns, rows, depth = (int(value) for value in pgm.groups())
+    elif head.startswith(b"\x89PNG") and len(head) >= 26:
+        columns, rows, depth = int.from_bytes(head[16:20]), int.from_bytes(head[20:24]), 255
+        if head[25] != 0:
+            raise ValueError("it has colours or is transparent; save it as a grey picture")
+    else:
+        raise ValueError("it is neither PGM nor PNG; save it as one of these, in grey")
+    if not 4 <= rows * columns <= MOST_CELLS:
+        raise ValueError(f"it has {columns} x {rows} cells; cut it or make it coarser, to at most {MOST_CELLS}")
+    size = picture.stat().st_size
+    if pgm and head.startswith(b"P5") and size - pgm.end() != (said := rows * columns * (1 if depth < 256 else 2)):
+        raise ValueError(f"it says {columns} x {rows} cells, {said} bytes, and has {size - pgm.end()}; save it again")
+    grey = cv2.imread(str(picture), cv2.IMREAD_GRAYSCALE)
+    if grey is None or grey.shape != (rows, columns):
+        raise ValueError(f"it says {columns} x {rows} cells and is damaged; save it again")
+    return np.asarray(grey, dtype=np.uint8)
+
+
+def _turned(occupied: BoolGrid, unknown: BoolGrid, told: _MapFile) -> GridMap:
+    """The grid of a turned map with axes parallel to the world's, in cells half as long, so that thin walls stay."""
+    x, y, yaw = told.origin
+    c, s = math.cos(yaw), math.sin(yaw)
+    rows, columns = occupied.shape
+    ends = np.array([(0, 0), (columns, 0), (0, rows), (columns, rows)]) * told.resolution @ np.array([[c, s], [-s, c]])
+    low, step = ends.min(axis=0), told.resolution / 2.0
+    count = np.ceil((ends.max(axis=0) - low) / step - 1e-6).astype(int)
+    if count[0] * count[1] > 4 * MOST_CELLS:
+        raise MapError(f"the map at {told.origin} becomes too large when it is turned; cut it")
+    across, up = np.meshgrid(*(edge + (np.arange(n) + 0.5) * step for edge, n in zip(low, count, strict=True)))
+    column, row = (
+        np.floor(along / told.resolution).astype(int) for along in (c * across + s * up, c * up - s * across)
+    )
+    inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    column, row = column.clip(0, columns - 1), row.clip(0, rows - 1)
+    origin_m = (x + float(low[0]), y + float(low[1]))
+    return GridMap(occupied[row, column] & inside, step, origin_m, unknown[row, column] | ~inside, told.height_band_m)
 
 
 def _key_lines(path: Path) -> dict[str, int]:
@@ -132,6 +182,8 @@ def _key_lines(path: Path) -> dict[str, int]:
         node = yaml.compose(path.read_text(), Loader=yaml.SafeLoader)
     except OSError as error:
         raise MapError(f"{path}:1: cannot be read ({error.strerror}); check the map's path") from error
+    except (UnicodeDecodeError, yaml.reader.ReaderError) as error:
+        raise MapError(f"{path}:1: it is no text; give the map's YAML file") from error
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise MapError(f"{path}:{line}: {error.problem}; correct the YAML there") from error
@@ -141,8 +193,14 @@ def _key_lines(path: Path) -> dict[str, int]:
 
 
 def _classify(grey: NDArray[np.uint8], told: _MapFile) -> tuple[BoolGrid, BoolGrid]:
-    """Occupied and unknown cells, row 0 at the bottom, by the thresholds of the map_server's trinary mode."""
+    """Occupied and unknown cells, row 0 at the bottom, by the thresholds of the map_server.
+
+    What lies between them is unknown in trinary mode; in scale mode it is what is likelier.
+    """
     share = grey.astype(np.float64) / 255.0
     probability = np.flipud(share if told.negate else 1.0 - share)
+    if told.mode == "scale":
+        occupied = probability >= (told.free_thresh + told.occupied_thresh) / 2.0
+        return occupied, np.zeros_like(occupied)
     occupied = probability > told.occupied_thresh
     return occupied, ~occupied & (probability >= told.free_thresh)

@@ -7,15 +7,17 @@ within a longer text the parameter's text is put in.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final
+
+import yaml
 
 from executive.mission.errors import InputError, did_you_mean, listing, suggestion
 from executive.mission.file.model import KeyPath
 from executive.mission.yaml_source import YamlSource
 
-__all__ = ["Given", "with_parameters"]
+__all__ = ["Given", "given_values", "with_parameters"]
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -23,6 +25,22 @@ _SCALARS: Final = (str, bool, int, float)
 DECLARED: Final = "parameters"
 
 Given = Mapping[str, Any]
+
+
+def given_values(settings: Iterable[str]) -> dict[str, Any]:
+    """Values in the form NAME=VALUE, each as YAML has it: `2.5` is a number. Raises InputError."""
+    values: dict[str, Any] = {}
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        try:
+            value = yaml.safe_load(text)
+        except yaml.YAMLError:
+            value = None
+        if not equals or not _NAME.fullmatch(name) or not isinstance(value, _SCALARS):
+            hint = "give a name, =, and a text, a number, true or false"
+            raise InputError(f"--set {setting[:60]}: it is not NAME=VALUE", hint=hint)
+        values[name] = value
+    return values
 
 
 def with_parameters(source: YamlSource, given: Given) -> YamlSource:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from executive.mission.knowledge import Pose
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import BatteryForWork, KnowsPlace, NoStopButton, OwnLease
 from executive.tree.behaviours.recovery import Recovery
@@ -31,15 +32,15 @@ def watched(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
     watches = (
         below.node("monitor", "stop button released", part="stop-button", condition=NoStopButton()),
         below.node("monitor", "lease held", part="lease", condition=OwnLease()),
-        _battery_plan(below.at("battery")),
+        *([] if builder.knowledge.dock is None else [_battery_plan(below.at("battery"), builder.knowledge.dock)]),
         _lost_plan(below.at("lost")),
     )
     return below.node("interrupts", f"{mission.name}, watched", *watches, mission)
 
 
-def _battery_plan(builder: PlanBuilder) -> NodeSpec:
+def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
     """To the dock, charge, and back to where it was; urgent when half of what it is called for is left."""
-    facts, dock = builder.knowledge.battery, pose_2d(builder.knowledge.dock)
+    facts, dock = builder.knowledge.battery, pose_2d(place)
     key = f"{builder.path_id}/where"
     work = builder.at("charge").sequence(
         f"charge to {facts.charged:.0%}",

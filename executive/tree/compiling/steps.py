@@ -173,6 +173,8 @@ def charge_plan(builder: PlanBuilder) -> NodeSpec:
     command, facts = builder.command, builder.knowledge
     if any(part is not None for part in (command.item, command.goal, command.object)):
         raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")
+    if facts.dock is None:
+        raise builder.error("this world has no dock to charge at", "add 'dock' to its knowledge")
     return dock_plan(builder, pose_2d(facts.dock), facts.battery.charged)
 
 

@@ -10,12 +10,11 @@ from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture,
 from plant.models.builder.sdf import Model, model_sdf
 from plant.pictures import save_png
 from plant.worlds.builder.furniture import Piece
-from plant.worlds.builder.maps import Placement, pgm_bytes, rasterise, yaml_text
+from plant.worlds.builder.maps import BANDS_M, Placement, pgm_bytes, rasterise, yaml_text
 from plant.worlds.builder.materials import materials, pictures
 from plant.worlds.builder.plan import Placed, load_plan
 from plant.worlds.builder.shell import shell_collisions, shell_mesh
 
-BANDS_M = {"scan": (0.70, 1.30), "keepout": (0.05, 1.00)}
 PACKAGE = "package://errand/worlds/flat/furniture"
 
 

@@ -13,6 +13,8 @@ from skills.robot import FloatArray
 
 Bools = NDArray[np.bool_]
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
+BANDS_M = {"scan": (0.70, 1.30), "keepout": (0.05, 1.00)}
+"""The heights that each grid speaks of."""
 
 
 @dataclass(frozen=True)

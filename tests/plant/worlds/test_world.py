@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from plant.worlds.placement import place_objects, place_people
 from plant.worlds.world import WORLDS_FOLDER, World, WorldError, known_worlds, load_world
+from skills.robot import Pose2D
 
 
 @pytest.fixture
@@ -87,9 +89,19 @@ def test_what_is_no_yaml_is_told_with_its_file(copy: Path, text: bytes) -> None:
 
 
 def test_a_missing_file_is_named(copy: Path) -> None:
-    (copy / "objects.yaml").unlink()
-    with pytest.raises(WorldError, match=r"objects\.yaml: cannot be read"):
+    (copy / "knowledge.yaml").unlink()
+    with pytest.raises(WorldError, match=r"knowledge\.yaml: cannot be read"):
         load_world(copy)
+
+
+def test_geometry_and_a_start_are_enough(copy: Path) -> None:
+    (copy / "objects.yaml").unlink()
+    (copy / "knowledge.yaml").write_text("start: {x: 1.0, y: 2.0, yaw: 0.5}")
+    world = load_world(copy)
+    assert world.start == Pose2D(1.0, 2.0, 0.5)
+    assert (world.dock, world.rooms, world.surfaces, world.seed_rules.objects) == (None, {}, {}, ())
+    assert place_objects(world, 1) == place_people(world, 1) == ()
+    assert world.corners == ((-4.0, -3.0), (6.0, 7.0))
 
 
 def test_a_surface_that_nobody_knows_is_refused(copy: Path) -> None:

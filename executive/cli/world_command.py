@@ -1,0 +1,170 @@
+"""`errand world`: worlds made of any map, and how a world looks."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Final
+
+import numpy as np
+import typer
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from executive.cli.output import refusals
+from executive.cli.start_pose import START, start_pose
+from executive.cli.worlds import knowledge_of, open_world
+from executive.mission.errors import InputError
+from plant.worlds.world import WorldError
+from skills.estimate.grid_map import GridMap, MapError, load_grid_map
+from skills.robot import Picture, Pose2D
+
+__all__ = ["world"]
+
+MAX_BYTES: Final = 20_000_000
+Out = Annotated[Path, typer.Option("--out", help="The world's folder; it is made.")]
+
+world = typer.Typer(name="world", help="Worlds made of any map, and how a world looks.", rich_markup_mode=None)
+
+
+class _Cylinders(BaseModel):
+    """What is used of a file of cylinders: x, y, radius, height of each; start (x, y, yaw) and goal (x, y)."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
+
+    cylinders: tuple[
+        tuple[float, float, Annotated[float, Field(gt=0, le=10)], Annotated[float, Field(gt=0, le=10)]], ...
+    ] = Field(min_length=1, max_length=20_000)
+    start: tuple[float, float, float] | None = None
+    goal: tuple[float, float] | None = None
+
+
+@world.callback()
+def _group() -> None:
+    """Worlds made of any map."""
+
+
+@world.command()
+def from_map(
+    map_file: Annotated[Path, typer.Argument(metavar="MAP.yaml", help="A map in the form of ROS map_server.")],
+    out: Out,
+    start: START = None,
+    wall_height: Annotated[float, typer.Option(min=1.3, max=10.0, help="Height of the walls, m.")] = 2.5,
+) -> None:
+    """Make a world of a map: walls, both grids, rooms and doors to be named."""
+    from plant.worlds.builder.maps import FREE, OCCUPIED, UNKNOWN, Grid
+    from plant.worlds.builder.own import world_from_grid
+
+    with refusals():
+        read = _grid_map(map_file)
+        unknown = np.zeros_like(read.occupied) if read.unknown is None else read.unknown
+        cells = np.where(read.occupied, OCCUPIED, np.where(unknown, UNKNOWN, FREE)).astype(np.uint8)
+        grid, pose = Grid(cells, read.origin_m, read.resolution_m), start_pose(start)
+        _made(map_file, out, lambda folder: world_from_grid(folder, grid, start=pose, wall_height_m=wall_height))
+        _told(out)
+
+
+@world.command()
+def from_cylinders(
+    file: Annotated[Path, typer.Argument(metavar="FILE.json", help="Cylinders, as BARN's worlds have them.")],
+    out: Out,
+    start: START = None,
+) -> None:
+    """Make a world of upright cylinders: a JSON object with `cylinders` [[x, y, radius, height], ...] and `start`."""
+    from plant.worlds.builder.own import world_from_cylinders
+
+    with refusals():
+        read = _cylinders(file)
+        pose = start_pose(start) or (None if read.start is None else Pose2D(*read.start))
+        around = [] if pose is None else [(pose.x_m, pose.y_m)]
+        around += [] if read.goal is None else [read.goal]
+        _made(file, out, lambda folder: world_from_cylinders(folder, read.cylinders, start=pose, around=around))
+        _told(out)
+
+
+@world.command()
+def show(
+    folder: Annotated[str, typer.Argument(metavar="WORLD", help="A world by name or folder.")],
+    out: Annotated[Path, typer.Option("--out", help="The picture, PNG.")] = Path("world.png"),
+) -> None:
+    """Draw a world's plan: rooms, doors, walls, surfaces and the start."""
+    from plant.pictures import save_png
+    from plant.worlds.drawing import draw_world
+
+    with refusals():
+        drawn = open_world(folder)
+        facts = knowledge_of(drawn)
+        grid = _grid_map(drawn.keepout_map_path)
+        picture = draw_world(
+            drawn,
+            _grey(grid),
+            grid.origin_m,
+            grid.resolution_m,
+            labels={name: (place.pose.x, place.pose.y) for name, place in facts.places.items()},
+            doors=[(door.at, door.width) for door in facts.doors],
+        )
+        try:
+            save_png(out, picture)
+        except OSError as error:
+            raise InputError(f"the picture cannot be written ({error.strerror})", file=out) from error
+    typer.echo(f"{out}: {len(facts.places)} rooms, {len(facts.doors)} doors, {len(facts.surfaces)} surfaces")
+
+
+def _grey(grid: GridMap) -> Picture:
+    """Grey values of a grid, rows from the south."""
+    unknown = np.zeros_like(grid.occupied) if grid.unknown is None else grid.unknown
+    return np.where(grid.occupied, 0, np.where(unknown, 150, 255)).astype(np.uint8)
+
+
+def _grid_map(path: Path) -> GridMap:
+    try:
+        return load_grid_map(path)
+    except (MapError, OSError) as error:
+        raise InputError(str(error)) from error
+
+
+def _cylinders(path: Path) -> _Cylinders:
+    """Raises InputError: it is no such file."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"it is larger than {MAX_BYTES} bytes", hint="give a smaller one", file=path)
+        return TypeAdapter(_Cylinders).validate_python(json.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", hint="check the path", file=path) from error
+    except json.JSONDecodeError as error:
+        raise InputError(f"damaged JSON, {error.msg}", hint="correct it there", file=path, line=error.lineno) from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "it"
+        hint = "it must have 'cylinders': [[x, y, radius, height], ...]"
+        raise InputError(f"{where}: {first['msg']}", hint=hint, file=path) from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"it is no JSON ({type(error).__name__})", hint="correct it", file=path) from error
+
+
+def _made(source: Path, out: Path, make: Callable[[Path], None]) -> None:
+    """Make a world beside its place, and put it there when it is whole. Raises InputError."""
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError("there is something already", hint="name a new folder by --out", file=out)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as draft:
+            make(Path(draft))
+            shutil.copytree(draft, out, dirs_exist_ok=True)
+    except WorldError as error:
+        raise InputError(str(error), file=source) from error
+    except OSError as error:
+        raise InputError(
+            f"the world cannot be written ({error.strerror})", hint="name another --out", file=out
+        ) from error
+
+
+def _told(out: Path) -> None:
+    """Say what was made; it is read once more, so that what is said is so."""
+    made = open_world(str(out))
+    facts = knowledge_of(made)
+    start = f"{made.start.x_m:.2f} {made.start.y_m:.2f} {math.degrees(made.start.yaw_rad):.0f} degrees"
+    typer.echo(f"{out}: {len(facts.places)} rooms, {len(facts.doors)} doors, start at {start}")

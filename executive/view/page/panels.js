@@ -31,14 +31,15 @@
     return root.children.map(missionOf).find((node) => node.id.split("/").length === 2) || root;
   }
 
-  // The leaf that decided a failure: the one whose sentence the outcome tells, or the last that failed.
+  // The leaf that decided a failure: the one whose sentence the outcome tells first, or the last that failed.
   function decisive(store, view) {
     const outcome = view.outcomes[view.outcomes.length - 1];
     if (!outcome || outcome.outcome === "success" || outcome.outcome === "cancelled") return null;
-    const failed = [...view.states].filter(([id, state]) => state.status === "FAILURE" && (store.known.get(id) || {}).leaf);
-    const told = failed.filter(([, state]) => state.message && (outcome.message || "").includes(state.message));
-    const latest = (told.length ? told : failed).reduce((best, each) => (best && best[1].t > each[1].t ? best : each), null);
-    return latest && latest[0];
+    const placeOf = (message) => (message ? (outcome.message || "").indexOf(message) : -1);
+    const failed = [...view.failures].filter(([id]) => (store.known.get(id) || {}).leaf).map(([id, { message, t }]) => ({ id, t, place: placeOf(message) }));
+    const told = failed.filter((each) => each.place >= 0);
+    const [first] = (told.length ? told : failed).sort((one, other) => one.place - other.place || other.t - one.t);
+    return first ? first.id : null;
   }
 
   // What an operator looks at first: what is held, the battery, how well the place is known, the speed.

@@ -16,7 +16,7 @@
   }
 
   function emptyView() {
-    return { t: 0, trees: [], spans: new Map(), states: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [], particles: null };
+    return { t: 0, trees: [], spans: new Map(), states: new Map(), failures: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [], particles: null };
   }
 
   function robotOf(view, name) {
@@ -27,11 +27,14 @@
   const APPLY = {
     tree(view, data) {
       view.trees = view.trees.filter((tree) => tree.root.id !== data.root.id).concat([data]);
-      const forget = (node) => { view.states.delete(node.id); node.children.forEach(forget); };
+      const forget = (node) => { view.states.delete(node.id); view.failures.delete(node.id); node.children.forEach(forget); };
       forget(data.root);
     },
     transitions(view, data, t) {
-      view.states.set(data.node, { status: data.to, cause: data.cause, message: data.message, t });
+      const state = { status: data.to, cause: data.cause, message: data.message, t };
+      view.states.set(data.node, state);
+      if (data.to === "FAILURE") view.failures.set(data.node, state); // it stays when a retry resets the node
+      if (data.to === "SUCCESS") view.failures.delete(data.node);
       const span = view.spans.get(data.node);
       if (span && !span.over) Object.assign(span, { to: t, over: data.to !== "RUNNING" });
       else view.spans.set(data.node, { from: span ? span.from : t, to: t, over: data.to !== "RUNNING" });

@@ -86,13 +86,16 @@
       return li;
     }
 
+    // What decided a failure shows it, also when a retry has reset the node since.
+    stateOf(id) { return (id === this.decisive && this.view.failures.get(id)) || this.view.states.get(id); }
+
     forgetFolds() { for (const entry of this.nodes.values()) entry.chosen = undefined; }
 
     choose(entry, open) { entry.chosen = open; this.redraw(); }
 
     // Open what runs, failed or was cancelled, and the first levels; fold the rest of a large tree.
     interesting(entry, whole) {
-      let alive = ["running", "failure", "cancelled"].includes(lookOf(this.view.states.get(entry.node.id)));
+      let alive = ["running", "failure", "cancelled"].includes(lookOf(this.stateOf(entry.node.id)));
       let level = 0;
       for (let up = entry.parent; up; up = up.parent) level += 1;
       for (const child of entry.node.children) alive = this.interesting(this.nodes.get(child.id), whole) || alive;
@@ -112,7 +115,7 @@
     }
 
     paint(entry) {
-      const state = this.view.states.get(entry.node.id), look = lookOf(state);
+      const state = this.stateOf(entry.node.id), look = lookOf(state);
       const progress = this.progress && this.progress.node === entry.node.id && look === "running" ? this.progress : null;
       const note = this.noteOf(entry, state, progress), cause = (state && state.cause) || "";
       const done = progress && typeof progress.progress === "number" ? progress.progress : null;
@@ -145,7 +148,7 @@
     noteOf(entry, state, progress) {
       if (progress && progress.message) return progress.message;
       if (!state || !state.message) return "";
-      const told = entry.node.children.some((child) => (this.view.states.get(child.id) || {}).message === state.message);
+      const told = entry.node.children.some((child) => (this.stateOf(child.id) || {}).message === state.message);
       return told || !(state.cause || entry.node.children.length === 0) ? "" : state.message;
     }
 

@@ -437,6 +437,35 @@ def test_the_leaf_that_decided_a_failure_is_in_view_and_its_sentence_stands_on_t
         playwright_api.expect(leaf).to_be_in_viewport()
 
 
+def test_the_first_cause_told_decides_although_a_retry_has_reset_its_leaf(page, live):
+    feed, tree, url = live
+    detect, grasp = (
+        next(id for id in leaf_ids(tree) if id.rsplit("/", 1)[-1].startswith(n)) for n in ("detect", "grasp")
+    )
+    page.goto(url)
+    change(feed, grasp, "FAILURE", 1.0, "the gripper closed on nothing", "POSTCONDITION")
+    change(feed, grasp, "INVALID", 1.5)
+    change(feed, detect, "FAILURE", 2.0, "no coke seen", "POSTCONDITION")
+    message = "the gripper closed on nothing, then: no coke seen (after 2 attempts)"
+    feed("outcome", 2.5, {"robot": "Alice", "outcome": "failure", "cause": "POSTCONDITION", "message": message})
+    playwright_api.expect(page.locator(".row.decisive")).to_have_count(1)
+    leaf = page.locator(f'li[data-id="{grasp}"] > .row.decisive')
+    playwright_api.expect(leaf).to_contain_text("the gripper closed on nothing")
+    playwright_api.expect(leaf).to_be_in_viewport()
+
+
+def test_a_leaf_that_succeeded_in_the_end_decides_no_failure(page, live):
+    feed, tree, url = live
+    one, other = leaf_ids(tree)[:2]
+    page.goto(url)
+    change(feed, one, "FAILURE", 1.0, "it slipped", "EXECUTION")
+    change(feed, one, "SUCCESS", 2.0, "done")
+    change(feed, other, "FAILURE", 3.0, "it fell", "EXECUTION")
+    told = "it slipped; it fell"
+    feed("outcome", 3.5, {"robot": "Alice", "outcome": "failure", "cause": "EXECUTION", "message": told})
+    playwright_api.expect(page.locator(".row.decisive")).to_contain_text("it fell")
+
+
 def test_a_run_that_goes_well_has_no_failure_on_top(page, live):
     feed, _, url = live
     page.goto(url)

@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from executive.cli.start_pose import joined
+from executive.cli.start_pose import StartCommand
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.errors import InputError
 
@@ -66,7 +66,7 @@ def loaded(name: str) -> Any:
     if isinstance(found, typer.Typer):
         return get_command(found)
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-    alone.command(name=name)(found)
+    alone.command(name=name, cls=StartCommand)(found)
     return get_command(alone)
 
 
@@ -82,7 +82,7 @@ class _LazyGroup(TyperGroup):
         """The command that the first argument names, imported."""
         if args and args[0] in COMMANDS:
             self.add_command(loaded(args[0]), args[0])
-        return super().resolve_command(ctx, joined(args))
+        return super().resolve_command(ctx, args)
 
 
 app = typer.Typer(

@@ -4,19 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
-from executive.mission.request import Start
-from skills.robot import Pose2D
+if TYPE_CHECKING:
+    from skills.robot import Pose2D
 
-__all__ = ["START", "joined", "start_pose"]
+__all__ = ["START", "StartCommand", "joined", "start_pose"]
 
 _NAME = "--start"
 START = Annotated[
     str | None, typer.Option(_NAME, metavar="X Y YAW", help="Where the robot stands: metres and radians.")
 ]
+
+
+class StartCommand(TyperCommand):
+    """A command whose `--start` takes three numbers, or one word."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As click's, after the numbers are joined."""
+        return super().parse_args(ctx, joined(args))
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
@@ -38,6 +47,8 @@ def _joined(arguments: list[str]) -> Iterator[str]:
 
 def start_pose(text: str | None) -> Pose2D | None:
     """The pose in `X Y YAW`; None where none is said. Raises InputError."""
+    from executive.mission.request import Start
+
     return None if text is None else Start.of(text).pose
 
 

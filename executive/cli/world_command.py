@@ -15,7 +15,7 @@ import typer
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from executive.cli.output import refusals
-from executive.cli.start_pose import START, start_pose
+from executive.cli.start_pose import START, StartCommand, start_pose
 from executive.cli.worlds import knowledge_of, open_world
 from executive.mission.errors import InputError
 from plant.worlds.world import WorldError
@@ -47,7 +47,7 @@ def _group() -> None:
     """Worlds made of any map."""
 
 
-@world.command()
+@world.command(cls=StartCommand)
 def from_map(
     map_file: Annotated[Path, typer.Argument(metavar="MAP.yaml", help="A map in the form of ROS map_server.")],
     out: Out,
@@ -67,7 +67,7 @@ def from_map(
         _told(out)
 
 
-@world.command()
+@world.command(cls=StartCommand)
 def from_cylinders(
     file: Annotated[Path, typer.Argument(metavar="FILE.json", help="Cylinders, as BARN's worlds have them.")],
     out: Out,

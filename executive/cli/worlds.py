@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from executive.mission.errors import InputError, known_names, suggestion
 from executive.mission.knowledge import Knowledge, load_knowledge
-from plant.spot.capabilities import spot_capabilities
 from plant.worlds.world import World, WorldError, known_worlds, load_world
-from skills.estimate.grid_map import MapError, load_grid_map
-from skills.navigate.footprint import Footprint
-from skills.robot import Pose2D
+
+if TYPE_CHECKING:
+    from skills.robot import Pose2D
 
 
 def open_world(name: str) -> World:
@@ -33,6 +30,14 @@ def _world_error(name: str, error: Exception) -> InputError:
 
 def refuse_blocked(world: World, pose: Pose2D) -> None:
     """Raise InputError unless the robot's body is free at a pose on the world's map, which must be there."""
+    import math
+
+    import numpy as np
+
+    from plant.spot.capabilities import spot_capabilities
+    from skills.estimate.grid_map import MapError, load_grid_map
+    from skills.navigate.footprint import Footprint
+
     try:
         grid = load_grid_map(world.keepout_map_path).with_unknown_blocked()
     except (MapError, OSError) as error:

@@ -7,6 +7,7 @@ import pytest
 from tiny_detector import CLASSES, model_bytes, write_model
 
 from executive.cli.assembly import TURNING_M, shared_detector, stand_at
+from executive.cli.worlds import refuse_blocked
 from executive.mission.errors import InputError
 from executive.mission.request import Start
 from plant.worlds.placement import place_people
@@ -54,7 +55,7 @@ def test_an_unknown_start_is_free_ground_that_the_seed_chooses():
 
 def test_a_start_in_a_wall_or_outside_is_refused():
     world = load_world("flat")
-    assert stand_at(world, Start(world.start), 1) == world.start
+    refuse_blocked(world, world.start)
     for x, y in ((0.0, 0.0), (-30.0, 4.0)):
-        with pytest.raises(InputError, match="no room for the robot"):
-            stand_at(world, Start(Pose2D(x, y, 0.0)), 1)
+        with pytest.raises(InputError, match="stands in something or outside"):
+            refuse_blocked(world, Pose2D(x, y, 0.0))

@@ -55,7 +55,7 @@ def test_a_goal_is_reached_in_a_world_made_of_a_map(map_file, tmp_path):
     ("arguments", "why"),
     [
         (("--start", 2.0, -1.0, 0.0), "room.yaml: the start (2, -1, 0) touches a wall"),
-        (("--start", "here"), "--start takes three numbers, not 'here'"),
+        (("--start", "here"), "'here' is no start"),
         (("--out", "{tmp}"), "there is something already"),
     ],
 )

@@ -131,7 +131,9 @@ def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) ->
         return _carried(command, knowledge, elsewhere)
     assert command.goal is not None
     person = knowledge.person(command.goal)
-    return GoalCondition(GoalKind.WENT, goal=(_place_area(knowledge, command.goal),), person=person)
+    if person is not None:
+        return GoalCondition(GoalKind.WENT, person=person)
+    return GoalCondition(GoalKind.WENT, goal=(_place_area(knowledge, command.goal),))
 
 
 def _waited(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition | None:
@@ -146,8 +148,7 @@ def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondi
 
 def _place_area(knowledge: Knowledge, goal: str) -> Area:
     """A room's outline; for a surface or the start a square about where the robot is to stand."""
-    person = knowledge.person(goal)
-    place = knowledge.people[person].at if person is not None else knowledge.place(goal)
+    place = knowledge.place(goal)
     if place in knowledge.places:
         return Area(place, knowledge.places[place].polygon)
     return _square(goal, knowledge.start if goal == START or place is None else knowledge.place_pose(place))

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from executive.mission.command import Task
 from executive.mission.errors import InputError, suggestion
 from executive.mission.yaml_source import Name, YamlSource, read_yaml, validate
-from skills.perception.class_forms import class_forms
+from skills.perception.class_forms import PERSON, class_forms
 from skills.quantities import Angle, Coordinate
 
 __all__ = [
@@ -32,7 +32,7 @@ __all__ = [
 
 ANYTHING: Final = "object"
 """The name that stands for every class of objects."""
-ANYBODY: Final = "person"
+ANYBODY: Final = PERSON
 """The name that stands for any person at all."""
 _ANYTHING: Final = frozenset({ANYTHING, "thing", "item"})
 Corner = tuple[Coordinate, Coordinate]

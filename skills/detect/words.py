@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 
 from skills.api import ObjectObservation, Surface
+from skills.perception.class_forms import PERSON
 
 SAME_WITHIN_M = 0.12
-_PERSON = "person"
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
@@ -36,7 +36,7 @@ def counted(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> 
     told = " and ".join(numbered(count, kind) for kind, count in numbers.items())
     places = dict.fromkeys(seen.surface for seen in found if seen.surface)
     where = " and ".join(f"the {name}" for name in places) or surface_names(surfaces)
-    return f"there {'is' if len(found) == 1 else 'are'} {told} {'in' if kinds == [_PERSON] else 'on'} {where}"
+    return f"there {'is' if len(found) == 1 else 'are'} {told} {'in' if kinds == [PERSON] else 'on'} {where}"
 
 
 def numbered(count: int, kind: str) -> str:
@@ -47,7 +47,7 @@ def numbered(count: int, kind: str) -> str:
 
 def plural(name: str) -> str:
     """More than one of it; "beer" and "coke" take an s as in "two beers"."""
-    if name.endswith("person"):
+    if name.endswith(PERSON):
         return f"{name.removesuffix('person')}people"
     return f"{name}es" if name.endswith(("ch", "sh", "s", "x")) else f"{name}s"
 

@@ -9,13 +9,14 @@ from typing import ClassVar
 
 import shapely
 
-from skills.api import Cause, ObjectObservation, Running, SkillContext, Succeeded, Thing
-from skills.arm.routine import Routine, RoutineSkill, SkillFailure
+from skills.api import Cause, ObjectObservation, Succeeded, Thing
+from skills.arm.routine import Routine, SkillFailure
 from skills.detect.words import counted
-from skills.navigate.base import Base
+from skills.navigate.moving import MovingSkill
+from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark
 from skills.perception.people import SeenPerson, merged, people_in_scan
-from skills.perception.people_watch import PERSON, people_in_images
+from skills.perception.people_watch import people_in_images
 from skills.quantities import Coordinate, Count, Delay, Length, Share, Tries, Turn, TurnRate
 from skills.robot import Image
 
@@ -51,7 +52,7 @@ class FindPeopleOptions:
     reach_m: Length = 6.0
 
 
-class FindPeople(RoutineSkill[FindPeopleInputs]):
+class FindPeople(MovingSkill[FindPeopleInputs]):
     """Looks for people with body cameras and LiDAR; with the LiDAR alone where the detector knows no people."""
 
     name = "find_people"
@@ -70,18 +71,14 @@ class FindPeople(RoutineSkill[FindPeopleInputs]):
     default_timeout_s = 60.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
 
-    def __init__(self, context: SkillContext) -> None:
-        super().__init__(context)
-        self._base = Base(context)
-
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
         """Look, turn, look again, until enough people were seen twice."""
-        self._base = Base(self.context)
         area, same_m = shapely.Polygon(inputs.area_W), self.options.same_m
+        turn, for_s = (0.0, 0.0, self.options.turn_rad_s), self.options.turn_rad / self.options.turn_rad_s
         seen, echoes, found = tuple[SeenPerson, ...](), list[SeenPerson](), list[SeenPerson]()
         for look in range(self.options.looks):
             if look:
-                yield from self._turn()
+                yield from self.move(turn, for_s, "turning to see more", settle_s=self.options.settle_s)
             by_lidar = self._in_scan()
             by_camera = yield from self._in_pictures(f"looking for people in the {inputs.place}")
             echoes += [] if by_camera is None else by_lidar
@@ -99,11 +96,6 @@ class FindPeople(RoutineSkill[FindPeopleInputs]):
             raise SkillFailure(Cause.POSTCONDITION, few)
         told = _told(found[0]) if inputs.count == 1 else counted(found, ())
         return Succeeded(told, {"observation": found[0], "observations": found})
-
-    def end(self) -> None:
-        """Stop what this skill set in motion."""
-        self._base.stop()
-        super().end()
 
     def _in_pictures(self, message: str) -> Routine[Sequence[SeenPerson] | None]:
         """Who is in the pictures of the body cameras now; None where the detector knows no people.
@@ -138,26 +130,15 @@ class FindPeople(RoutineSkill[FindPeopleInputs]):
         X_WB = self.context.localiser.estimate().X_WO @ robot.odometry().X_OB
         return people_in_scan(scan, X_WB, robot.capabilities().footprint_m)
 
-    def _turn(self) -> Routine[None]:
-        """A little turn on the spot; then rest."""
-        end_s = self.context.clock.now() + self.options.turn_rad / self.options.turn_rad_s
-        while self.context.clock.now() < end_s:
-            self._base.drive((0.0, 0.0, self.options.turn_rad_s))
-            yield Running("turning to see more")
-            if (refusal := self._base.refusal()) is not None:
-                raise SkillFailure(Cause.EXECUTION, f"the robot refused to turn: {refusal}")
-        self._base.stop()
-        yield from self.pause(self.options.settle_s, "coming to rest")
-
 
 def _apart_m(one: SeenPerson, other: SeenPerson) -> float:
     return math.dist(one.place_W, other.place_W)
 
 
 def _told(seen: ObjectObservation) -> str:
-    """ "saw Robin in the kitchen at (1.00, 2.00)"."""
+    """ "saw Robin in the kitchen"."""
     who = "somebody" if seen.thing.name == PERSON else seen.thing.name
-    return f"saw {who} in the {seen.surface} at ({seen.position_W[0]:.2f}, {seen.position_W[1]:.2f})"
+    return f"saw {who} in the {seen.surface}"
 
 
 def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservation:

@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal
+from typing import Final, Literal
 
 import yaml
 from pydantic import BaseModel, ConfigDict, TypeAdapter
+
+PERSON: Final = "person"
+"""The class of people."""
 
 
 class ClassForm(BaseModel):

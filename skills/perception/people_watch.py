@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform
 
 from skills.api import Detection, Detector, Job, LayeredView, SkillContext
 from skills.geometry import relative
+from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import found_in_grey
 from skills.perception.people import SeenPerson, merged
 from skills.perception.position import position_of
@@ -19,7 +20,6 @@ from skills.quantities import Count, Delay, Duration, Length, Margin, Share, Tur
 from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
 
 PEOPLE_TOPIC: Final = "people"
-PERSON: Final = "person"
 _HEIGHTS_M: Final = (0.2, 0.6, 1.0)
 _NEAREST_M: Final = 0.3
 _WELL_INSIDE: Final = 0.35

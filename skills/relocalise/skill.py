@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, SkillContext, Succeeded
-from skills.arm.routine import Routine, RoutineSkill, SkillFailure
-from skills.navigate.base import Base
+from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, Succeeded
+from skills.arm.routine import Routine, SkillFailure
 from skills.navigate.low_obstacles import WatchOptions, low_points
+from skills.navigate.moving import MovingSkill
 from skills.quantities import Delay, Length, Share, Speed, Tries, Turn, TurnRate
 from skills.relocalise.free_space import FreeSpaceOptions, can_turn, free_m, obstacles_B
 from skills.robot import FloatArray, Scan
@@ -52,7 +52,7 @@ class RelocaliseOptions:
     low: WatchOptions = field(default_factory=WatchOptions)
 
 
-class Relocalise(RoutineSkill[RelocaliseInputs]):
+class Relocalise(MovingSkill[RelocaliseInputs]):
     """Finds the robot's pose on the map again. A pose counts once new scans agree with it for a second."""
 
     name: ClassVar[str] = "relocalise"
@@ -67,13 +67,8 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
     default_timeout_s: ClassVar[float] = 240.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
 
-    def __init__(self, context: SkillContext) -> None:
-        super().__init__(context)
-        self._base = Base(context)
-
     def run(self, inputs: RelocaliseInputs) -> Routine[Succeeded]:
         """Search the whole map; turn a little, and again; after a round of that, from somewhere else."""
-        self._base = Base(self.context)
         localiser = self.context.localiser
         if not isinstance(localiser, SearchingLocaliser):
             raise SkillFailure(Cause.PRECONDITION, "the localiser of this robot cannot search the map")
@@ -89,11 +84,6 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
                 if turn + 1 < inputs.turns:
                     yield from self._turn(self.options.turn_rad)
         raise SkillFailure(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
-
-    def end(self) -> None:
-        """Stop what this skill set in motion."""
-        self._base.stop()
-        super().end()
 
     def _found(self, localiser: Localiser) -> Routine[bool]:
         """Search with a new scan, believe what is found, and see whether the next scans agree."""
@@ -141,7 +131,8 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         if not can_turn(obstacles_B(scan, capabilities, free_space), capabilities, free_space):
             return
         rate = math.copysign(self.options.turn_rad_s, turn_rad)
-        yield from self._move((0.0, 0.0, rate), abs(turn_rad / rate), "turning slowly to see more")
+        enough = self._well_localised
+        yield from self.move((0.0, 0.0, rate), abs(turn_rad / rate), "turning slowly to see more", enough=enough)
 
     def _drive(self) -> Routine[bool]:
         """Face the direction with the most room and go there step by step; False when there is no room at all."""
@@ -160,7 +151,8 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
             step_m = min(options.step_m, left_m, room_m)
             if step_m < min(_LEAST_STEP_M, left_m):
                 break
-            yield from self._move((options.drive_m_s, 0.0, 0.0), step_m / options.drive_m_s, "driving to see more")
+            ahead, message = (options.drive_m_s, 0.0, 0.0), "driving to see more"
+            yield from self.move(ahead, step_m / options.drive_m_s, message, enough=self._well_localised)
             left_m, driven_m = left_m - step_m, driven_m + step_m
         return driven_m > 0.0
 
@@ -189,19 +181,6 @@ class Relocalise(RoutineSkill[RelocaliseInputs]):
         while not job.done():
             yield Running("looking ahead")
         return job.result()
-
-    def _move(self, velocity: tuple[float, float, float], for_s: float, message: str) -> Routine[None]:
-        """Move at a velocity for a time, or until the place is known; then rest."""
-        context = self.context
-        end_s = context.clock.now() + for_s
-        while context.clock.now() < end_s and not self._well_localised():
-            self._base.drive(velocity)
-            yield Running(message)
-            refusal = self._base.refusal()
-            if refusal is not None:
-                raise SkillFailure(Cause.EXECUTION, f"the robot refused to move: {refusal}")
-        self._base.stop()
-        yield from self.pause(0.5, "coming to rest")
 
     def _well_localised(self) -> bool:
         estimate = self.context.localiser.estimate()

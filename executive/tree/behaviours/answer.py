@@ -34,7 +34,7 @@ class Answer(ExplainedDecorator):
     """
 
     question: str
-    denied: str = ""
+    denied: str
     looks: Mapping[str, Sequence[str]]
     key: str
     board: Board
@@ -77,7 +77,7 @@ class Answer(ExplainedDecorator):
 
     def _answered(self, answer: bool, found: str) -> Status:
         self.answer, self.cause = answer, None
-        told = f"yes: {self.question}" if answer else f"no: {self.denied or self.question}"
+        told = f"yes: {self.question}" if answer else f"no: {self.denied}"
         self.message = told + (f"; {found}" if found else "")
         self.board.put(self.key, answer)
         note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}

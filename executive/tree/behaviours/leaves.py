@@ -40,9 +40,8 @@ class RememberPose(ExplainedLeaf):
             self.message = "began before"
             return Status.SUCCESS
         if self.context.localiser.estimate().localised:
-            pose = self.context.pose()
-            self.context.board.put(self.key, pose)
-            self.message = f"stands at ({pose.x_m:.2f}, {pose.y_m:.2f}) m"
+            self.context.board.put(self.key, self.context.pose())
+            self.message = "knows where it stands"
             return Status.SUCCESS
         if self.context.clock.now() - self._started_s <= self.patience_s:
             self.message = "waits until it knows where it is"

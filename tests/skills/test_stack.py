@@ -35,7 +35,8 @@ def test_the_resolved_stack_reads_back_to_itself():
 
 
 def test_options_are_set_and_the_others_stay():
-    stack = stack_of({"planner": {"use": "lattice", "margin_m": 0.2}, "localiser": {"matching": {"iterations": 3}}})
+    localiser = {"use": "scan_matching", "matching": {"iterations": 3}}
+    stack = stack_of({"planner": {"use": "lattice", "margin_m": 0.2}, "localiser": localiser})
     assert stack.planner == dataclasses.replace(default_stack().planner, margin_m=0.2)
     assert (stack.localiser.matching.iterations, stack.localiser.max_range_m) == (3, 15.0)
 
@@ -58,7 +59,11 @@ def test_a_skill_takes_its_options_from_the_stack():
         ({"planner": {"margin_m": "wide"}}, ("planner", "margin_m"), "'wide'"),
         ({"planner": {"margin_m": float("nan")}}, ("planner", "margin_m"), "nan"),
         ({"skills": {"hand_over": {"gaps_m": [0.5, 1e9]}}}, ("skills", "hand_over", "gaps_m", 1), "1000000000"),
-        ({"localiser": {"matching": {"sigma": 1}}}, ("localiser", "matching", "sigma"), "sigma_m"),
+        (
+            {"localiser": {"use": "scan_matching", "matching": {"sigma": 1}}},
+            ("localiser", "matching", "sigma"),
+            "sigma_m",
+        ),
         ({"skills": {"fly": {}}}, ("skills", "fly"), "navigate"),
         ({"skills": {"navigate": {"people": {"periods": 1}}}}, ("skills", "navigate", "people", "periods"), "period_s"),
         ({"costmap": 3}, ("costmap",), "use"),

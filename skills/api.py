@@ -157,6 +157,14 @@ class SearchingLocaliser(Protocol):
         """Use this estimate from now on."""
 
 
+@runtime_checkable
+class ParticleView(Protocol):
+    """A localiser that says where the robot may be, by sample poses."""
+
+    def particles_W(self, most: int) -> NDArray[np.float64]:
+        """Poses (N, 3) of x, y (m) and yaw (rad), `most` at most, evenly chosen by weight."""
+
+
 class Costmap(Protocol):
     """Free space for the body: the surveyed keep-out grid plus obstacles that the sensors see."""
 

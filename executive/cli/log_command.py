@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+import cv2
 import typer
 from rich.console import Console
 from rich.text import Text
 
 from executive.cli.output import console_for, refusals, show_table
+from executive.mission.errors import InputError
 from executive.record.history import History, read_history
 from executive.record.ros2 import write_ros2
 from executive.record.schemas import ERRORS
 from executive.record.timeline import Entry, timeline
+from executive.view.map_picture import map_picture
 from executive.view.styles import style_of
 from executive.view.text import printable
 
@@ -25,6 +29,10 @@ def log(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
     as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
     ros2: Annotated[Path | None, typer.Option(help="Write it anew as a ROS 2 bag (MCAP), and end.")] = None,
+    map_file: Annotated[
+        Path | None, typer.Option("--map", help="Draw map, way, path and particles as PNG, and end.")
+    ] = None,
+    at: Annotated[float, typer.Option(min=0.0, help="When the map is drawn (s); else at the end.")] = math.inf,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
 ) -> None:
     """Print what happened in a run: what each node did and why, detections, the outcome, tracebacks of defects."""
@@ -33,10 +41,23 @@ def log(
         if ros2 is not None:
             typer.echo(f"{write_ros2(history.events, ros2)} messages in {ros2}", err=True)
             return
+        if map_file is not None:
+            _draw(history, map_file, at)
+            return
         if as_json:
             sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
             return
         _show(history, console_for(as_json=False), every_node=every_node)
+
+
+def _draw(history: History, file: Path, at_s: float) -> None:
+    """Write the map's picture. Raises InputError: it cannot be written."""
+    _, png = cv2.imencode(".png", map_picture(history.events, at_s))
+    try:
+        file.write_bytes(png.tobytes())
+    except OSError as error:
+        raise InputError(f"cannot write it ({error.strerror})", hint="name another file", file=file) from error
+    typer.echo(f"the map is in {file}", err=True)
 
 
 def _show(history: History, console: Console, *, every_node: bool) -> None:

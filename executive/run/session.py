@@ -6,10 +6,13 @@ import math
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Final
+
+import numpy as np
 
 from executive.record.drawable import stamp
 from executive.record.profile import Profile
-from executive.record.schemas import OUTCOME, POSE, STATE
+from executive.record.schemas import NAVIGATION, OUTCOME, POSE, STATE
 from executive.run.control import Control
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.journal import Journal
@@ -22,12 +25,14 @@ from executive.tree.behaviours.skill_leaf import ERROR_TOPIC
 from executive.tree.compiler import CompiledTree
 from executive.tree.compiling.builder import slug, start_key
 from executive.tree.snapshot import NodeState, Snapshot
-from skills.api import Cause, LocalisationEstimate
+from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView
 from skills.robot import Pose2D
 
 POSE_PERIOD_S = 0.5
+MOST_PARTICLES = 60
 LEASE_PATIENCE_S = 60.0
 _EPSILON_S = 1e-9
+_NOTHING: Final = np.empty((0, 2))
 
 
 class Session:
@@ -53,6 +58,7 @@ class Session:
         self._pose_due_s = context.clock.now()
         self._asked_at: Pose2D | None = None
         self._matched_s = -math.inf
+        self._navigation: Mapping[str, object] = {}
 
     @property
     def name(self) -> str:
@@ -108,6 +114,7 @@ class Session:
             self._pose_due_s += POSE_PERIOD_S
             self._publish_pose()
             self._publish_state(estimate)
+            self._publish_navigation()
 
     def may_move(self) -> bool:
         """Whether the lease counts. A lost one suspends the mission until it can be had again.
@@ -276,6 +283,18 @@ class Session:
                 "position_sigma_m": round(math.sqrt(estimate.covariance[0, 0] + estimate.covariance[1, 1]), 4),
             },
         )
+
+    def _publish_navigation(self) -> None:
+        """Where else the robot may be, and what it sees that the map does not have (m); when either is new."""
+        localiser, costmap = self.context.localiser, self.context.costmap
+        particles = localiser.particles_W(MOST_PARTICLES) if isinstance(localiser, ParticleView) else _NOTHING
+        seen = costmap.seen_m() if isinstance(costmap, LayeredView) else _NOTHING
+        columns = np.round(np.concatenate([particles[:, :2].T, seen.T], axis=1), 2)
+        (x, y), count = columns.tolist(), len(particles)
+        new = {"particle_x": x[:count], "particle_y": y[:count], "seen_x": x[count:], "seen_y": y[count:]}
+        if new != self._navigation:
+            self._navigation = new
+            self.context.publish(NAVIGATION, {"robot": self.name, **new})
 
     def _attempt(self, what: str, call: Callable[[], object]) -> None:
         """Do it; a defect goes to the log, since the rest of the end must still happen."""

@@ -85,6 +85,13 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         """The particles."""
         return self._filter
 
+    def particles_W(self, most: int) -> FloatArray:
+        """See `skills.api.ParticleView`."""
+        weights = np.cumsum(self._filter.weights)
+        ends = (np.arange(most) + 0.5) / most * weights[-1]
+        chosen = np.unique(np.searchsorted(weights, ends))
+        return np.asarray(self._filter.poses[chosen])
+
     def estimate(self) -> LocalisationEstimate:
         """The latest estimate; while the place is not known its covariance is that of all particles."""
         estimate = super().estimate()

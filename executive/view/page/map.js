@@ -1,7 +1,8 @@
 "use strict";
-// The surveyed map with the robots, the ways they walked and plan to walk, particles, and the things seen.
+// The map with the robots, the ways they walked and plan to walk, where they may be, what blocks the way, and the things seen.
 (() => {
   const LENGTH_M = 1.1, WIDTH_M = 0.5; // a standing Spot
+  const SEEN_M = 0.05; // a cell
   const OCCUPIED_BELOW = 100, FREE_ABOVE = 230;
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -71,10 +72,11 @@
       const frame = this.frame(width, height);
       this.drawGrid(brush, frame);
       for (const robot of this.view.robots.values()) {
+        this.drawSeen(brush, frame, robot.seen);
+        this.drawParticles(brush, frame, robot.particles);
         this.line(brush, frame, robot.trail, css("--success"), []);
         if (robot.path) this.line(brush, frame, robot.path, css("--accent"), [5, 4]);
       }
-      this.drawParticles(brush, frame);
       this.drawThings(brush, frame);
       const said = [];
       for (const [name, robot] of this.view.robots) if (robot.pose) said.push(this.drawRobot(brush, frame, name, robot));
@@ -108,9 +110,17 @@
       brush.setLineDash([]);
     }
 
-    drawParticles(brush, { at }) {
+    // Where the robot may be.
+    drawParticles(brush, { at }, particles) {
       brush.fillStyle = css("--cancelled");
-      for (const [x, y] of this.view.particles || []) brush.fillRect(...at(x, y), 2, 2);
+      for (const [x, y] of particles) brush.fillRect(...at(x, y), 2, 2);
+    }
+
+    // Cells of the costmap that are blocked by something that the map does not have.
+    drawSeen(brush, { at, scale }, cells) {
+      const side = Math.max(2, SEEN_M * scale);
+      brush.fillStyle = css("--failure");
+      for (const [x, y] of cells) { const [u, v] = at(x, y); brush.fillRect(u - side / 2, v - side / 2, side, side); }
     }
 
     drawThings(brush, { at }) {

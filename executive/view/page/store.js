@@ -16,11 +16,11 @@
   }
 
   function emptyView() {
-    return { t: 0, trees: [], spans: new Map(), states: new Map(), failures: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [], particles: null };
+    return { t: 0, trees: [], spans: new Map(), states: new Map(), failures: new Map(), robots: new Map(), outcomes: [], late: 0, detections: null, destinations: [] };
   }
 
   function robotOf(view, name) {
-    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null });
+    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [] });
     return view.robots.get(name);
   }
 
@@ -61,7 +61,10 @@
     },
     detections(view, data, t) { view.detections = { ...data, t }; },
     object_destination(view, data) { view.destinations.push({ name: data.class_name, x: data.goal_x, y: data.goal_y }); },
-    particles(view, data) { view.particles = data.particles; },
+    navigation(view, data) {
+      const pairs = (xs, ys) => xs.map((x, n) => [x, ys[n]]);
+      Object.assign(robotOf(view, data.robot), { particles: pairs(data.particle_x, data.particle_y), seen: pairs(data.seen_x, data.seen_y) });
+    },
     outcome(view, data) { view.outcomes.push(data); },
     wall(view, data) { view.late = data.overruns; },
   };

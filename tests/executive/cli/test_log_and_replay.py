@@ -42,6 +42,12 @@ def test_log_prints_a_timeline(log_path):
     assert "no room to stand" in re.sub(r"\s+", " ", result.stdout)
 
 
+def test_the_map_of_a_log_without_one_is_refused_in_one_line(log_path, tmp_path):
+    result = invoke("log", log_path, "--map", tmp_path / "map.png")
+    assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
+    assert not (tmp_path / "map.png").exists()
+
+
 BOX = re.compile("[\u2500-\u257f]")
 
 

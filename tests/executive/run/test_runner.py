@@ -235,6 +235,13 @@ def test_how_well_the_place_is_known_is_logged(compiled, run_tree, published):
     assert (state["localised"], state["localisation_health"]) == (True, 1.0)
 
 
+def test_where_the_robot_may_be_and_what_blocks_it_is_logged_once_it_changes(compiled, run_tree, published, script):
+    script.steps = 60
+    run_tree(compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"))
+    (known,) = [message for topic, message in published if topic == "navigation"]
+    assert known == {"robot": "Alice", "particle_x": [], "particle_y": [], "seen_x": [], "seen_y": []}
+
+
 def test_overruns_are_counted(compiled, run_tree, make, script, published):
     script.steps = 1
     script.ends["stow"] = lambda skill: (time.sleep(0.02), _placed())[1]

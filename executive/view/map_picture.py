@@ -1,0 +1,118 @@
+"""What a log knows of a robot's way at one time, drawn on its map."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.mission.errors import InputError
+from executive.record.reader import Event
+from executive.record.schemas import MAP, NAVIGATION, PATH, POSE
+
+WIDTH_PX: Final = 1400
+FOOTPRINT_M: Final = (1.1, 0.5)
+_CELL_M: Final = 0.05
+_TRAIL, _PLAN, _PARTICLE, _SEEN, _ROBOT, _INK = (  # blue, green, red
+    (120, 158, 0),
+    (178, 114, 0),
+    (167, 121, 204),
+    (0, 94, 213),
+    (233, 180, 86),
+    (40, 40, 40),
+)
+Colour = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Pixels of world metres: `height_px` rows, the picture's lower left corner at origin_m."""
+
+    origin_m: tuple[float, float]
+    height_px: int
+    pixels_per_m: float
+
+    def pixels(self, points_W: Sequence[Sequence[float]]) -> NDArray[np.int32]:
+        """Pixels (N, 2), column and row, of (x, y) in metres."""
+        xy = np.asarray(points_W, dtype=np.float64).reshape(-1, 2) - self.origin_m
+        return np.column_stack(
+            [np.round(xy[:, 0] * self.pixels_per_m), np.round(self.height_px - xy[:, 1] * self.pixels_per_m)]
+        ).astype(np.int32)
+
+
+def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.uint8]:
+    """The map (height, width, 3; blue, green, red) as it was known at a time on the robot's clock.
+
+    On it are the way walked, the planned path, the particles of the localiser, the cells of the costmap that something
+    unmapped blocks, and the footprint. Raises InputError: the log has no map.
+    """
+    known = [event for event in events if event.stamp_s <= at_s]
+    maps = [event.data for event in events if event.topic == MAP]
+    if not maps:
+        raise InputError("the log has no map", hint="give the log.mcap of a run with a world that has one")
+    picture, frame = _ground(maps[-1])
+    robots = {event.data["robot"] for event in known if event.topic == POSE}
+    for robot in sorted(robots):
+        _draw_robot(picture, frame, robot, [event for event in known if event.data.get("robot") == robot])
+    return picture
+
+
+def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
+    """The grid, enlarged, with its places' names."""
+    grey = cv2.imdecode(np.frombuffer(base64.b64decode(data["data"]), np.uint8), cv2.IMREAD_GRAYSCALE)
+    if grey is None:
+        raise InputError("the log's map is no picture")
+    scale = WIDTH_PX / grey.shape[1]
+    size = (WIDTH_PX, max(1, round(grey.shape[0] * scale)))
+    enlarged = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+    picture = np.asarray(cv2.cvtColor(enlarged, cv2.COLOR_GRAY2BGR), np.uint8)
+    origin = (float(data["origin_m"]["x"]), float(data["origin_m"]["y"]))
+    frame = _Frame(origin, size[1], scale / float(data["resolution_m"]))
+    for place in data.get("places", ()):
+        _write(picture, place["name"], frame.pixels([(place["x"], place["y"])])[0])
+    return picture, frame
+
+
+def _draw_robot(picture: NDArray[np.uint8], frame: _Frame, name: str, events: Sequence[Event]) -> None:
+    """One robot: what is known of it by these events."""
+    poses = [event.data for event in events if event.topic == POSE]
+    paths = [event.data["poses"] for event in events if event.topic == PATH]
+    views = [event.data for event in events if event.topic == NAVIGATION]
+    if views:
+        side = max(1, round(0.5 * _CELL_M * frame.pixels_per_m))
+        for column, row in frame.pixels(_pairs(views[-1], "seen")).tolist():
+            cv2.rectangle(picture, (column - side, row - side), (column + side, row + side), _SEEN, -1)
+    places = [(pose["pose"]["position"]["x"], pose["pose"]["position"]["y"]) for pose in poses]
+    cv2.polylines(picture, [frame.pixels(places)], False, _TRAIL, 2, cv2.LINE_AA)
+    if paths:
+        plan = [(pose["position"]["x"], pose["position"]["y"]) for pose in paths[-1]]
+        cv2.polylines(picture, [frame.pixels(plan)], False, _PLAN, 3, cv2.LINE_AA)
+    yaw = float(poses[-1]["yaw_rad"])
+    corners = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) * FOOTPRINT_M / 2.0
+    turned = corners @ np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]]) + places[-1]
+    body = frame.pixels(turned.tolist())
+    cv2.fillPoly(picture, [body], _ROBOT, cv2.LINE_AA)
+    cv2.polylines(picture, [body], True, _INK, 2, cv2.LINE_AA)
+    cv2.line(picture, body[0].tolist(), body[1].tolist(), _INK, 5, cv2.LINE_AA)
+    if views:
+        for column, row in frame.pixels(_pairs(views[-1], "particle")).tolist():
+            cv2.circle(picture, (column, row), 2, _PARTICLE, -1, cv2.LINE_AA)
+    _write(picture, name, frame.pixels([places[-1]])[0] + [0, -round(0.6 * frame.pixels_per_m)])
+
+
+def _pairs(data: Mapping[str, Any], name: str) -> list[tuple[float, float]]:
+    return list(zip(data[f"{name}_x"], data[f"{name}_y"], strict=True))
+
+
+def _write(picture: NDArray[np.uint8], text: str, middle: NDArray[np.int32]) -> None:
+    """Dark letters with a light seam, centred."""
+    width = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.6, 1)[0][0]
+    corner = (int(middle[0]) - width // 2, int(middle[1]) + 6)
+    for colour, thick in (((255, 255, 255), 5), (_INK, 1)):
+        cv2.putText(picture, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, thick, cv2.LINE_AA)

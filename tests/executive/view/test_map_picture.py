@@ -1,0 +1,67 @@
+"""A robot's way drawn on its map, from the messages of a log."""
+
+import base64
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from executive.mission.errors import InputError
+from executive.record.reader import Event
+from executive.view.map_picture import WIDTH_PX, map_picture
+
+SCALE = WIDTH_PX / 7.0
+"""Pixels per metre of the map below, 7 m x 3.5 m from (-1, -1)."""
+TRAIL, PLAN, PARTICLE, SEEN = (120, 158, 0), (178, 114, 0), (167, 121, 204), (0, 94, 213)
+
+
+def ground():
+    png = cv2.imencode(".png", np.full((70, 140), 255, np.uint8))[1].tobytes()
+    data = {"resolution_m": 0.05, "origin_m": {"x": -1.0, "y": -1.0}, "data": base64.b64encode(png).decode()}
+    return Event("map", 0.0, data)
+
+
+def pose(stamp_s, x, y):
+    position = {"x": x, "y": y, "z": 0.5}
+    return Event("pose", stamp_s, {"robot": "Alice", "pose": {"position": position}, "yaw_rad": 0.0})
+
+
+EVENTS = (
+    ground(),
+    pose(0.5, 0.0, 0.0),
+    Event("path", 1.0, {"robot": "Alice", "poses": [{"position": {"x": x, "y": 1.5}} for x in (0.0, 5.0)]}),
+    Event("navigation", 1.5, {"robot": "Alice", "particle_x": [1], "particle_y": [2], "seen_x": [5], "seen_y": [0]}),
+    pose(2.0, 4.0, 0.0),
+)
+
+
+def colour_at(picture, x, y):
+    """The colour at a place in the world (m)."""
+    return tuple(int(part) for part in picture[round((2.5 - y) * SCALE), round((x + 1.0) * SCALE)])
+
+
+# What is drawn, somewhere on it (x, y), its colour, and when it came to be known.
+DRAWN = [
+    ("the way walked", (2.0, 0.0), TRAIL, 2.0),
+    ("the planned path", (2.0, 1.5), PLAN, 1.0),
+    ("a particle", (1.0, 2.0), PARTICLE, 1.5),
+    ("a blocked cell", (5.0, 0.0), SEEN, 1.5),
+]
+
+
+@pytest.mark.parametrize(("what", "place", "colour", "known_s"), DRAWN)
+def test_it_is_drawn_where_it_is_once_it_is_known(what, place, colour, known_s):
+    assert colour_at(map_picture(EVENTS), *place) == colour
+    assert colour_at(map_picture(EVENTS, known_s - 0.1), *place) != colour
+
+
+def test_the_footprint_is_where_the_robot_was_at_that_time():
+    then, now = map_picture(EVENTS, 1.0), map_picture(EVENTS)
+    assert colour_at(then, 0.3, 0.1) == colour_at(now, 4.3, 0.1)
+    assert colour_at(then, 4.3, 0.1) == (255, 255, 255)
+
+
+def test_a_log_without_a_map_is_refused():
+    with pytest.raises(InputError, match="no map"):
+        map_picture(EVENTS[1:], math.inf)

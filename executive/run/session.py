@@ -29,7 +29,7 @@ from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView
 from skills.robot import Pose2D
 
 POSE_PERIOD_S = 0.5
-MOST_PARTICLES = 60
+MOST_PARTICLES = 30
 LEASE_PATIENCE_S = 60.0
 _EPSILON_S = 1e-9
 _NOTHING: Final = np.empty((0, 2))

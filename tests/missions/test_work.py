@@ -13,7 +13,7 @@ FETCH = "Hey Alice, can you fetch me a drink from the kitchen"
 BUDGETS = {
     "arm_configuration_checks": 50,
     "arm_edge_checks": 11,
-    "bytes_logged": 368_000,
+    "bytes_logged": 456_000,
     "contact_points": 8_910,
     "depth_pictures_160x120": 234,
     "depth_pictures_640x480": 6,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -12,11 +12,13 @@ from rich.console import Console
 from rich.markup import escape
 
 from executive.cli.feasibility import check_prepared, route_planner_of
-from executive.cli.output import BAD_INPUT, console_for, print_json
+from executive.cli.output import BAD_INPUT, console_for, print_json, refusals
 from executive.cli.requests import prepare
+from executive.cli.run_options import SET, START
 from executive.cli.stack_command import STACK
 from executive.mission.errors import InputError
-from executive.mission.request import Request
+from executive.mission.file.parameters import given_values
+from executive.mission.request import Request, Start
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner
 from executive.tree.node_view import node_view
@@ -48,21 +50,21 @@ class CheckedFile:
 class Checker:
     """Checks files; the routes planned in each world are shared among them.
 
-    `world` stands in for the files' own, and `stack` is the file that says what the robot uses.
+    `like` has what the requests share: the world in place of the files' own, stack, start and values of parameters.
     """
 
-    def __init__(self, world: str | None = None, stack: Path | None = None) -> None:
-        self._world, self._stack = world, stack
+    def __init__(self, like: Request | None = None) -> None:
+        self._like = like or Request()
         self._routes: dict[Path, RoutePlanner] = {}
 
     def check(self, file: Path) -> CheckedFile:
         """Check one file; raises nothing for what stands in it."""
         tree: CompiledTree | None = None
         try:
-            prepared = prepare(Request(file=file, world=self._world, stack=self._stack), ask=None)
+            prepared = prepare(replace(self._like, file=file), ask=None)
             tree, world = prepared.tree, prepared.world
             if world.folder not in self._routes:
-                self._routes[world.folder] = route_planner_of(world, self._stack)
+                self._routes[world.folder] = route_planner_of(world, self._like.stack)
             checked = check_prepared(prepared, self._routes[world.folder])
         except InputError as error:
             return CheckedFile(file, _placed(file, (error, *error.others)), tree)
@@ -78,12 +80,16 @@ def check(
         typer.Argument(metavar="MISSION...", help="Files, or names of `errand missions`.", show_default=False),
     ],
     world: Annotated[str | None, typer.Option(help="World by name or folder, in place of the files' own.")] = None,
+    given: SET = None,
     stack: STACK = None,
+    start: START = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object for all files on standard output.")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show commands and trees, too.")] = False,
 ) -> None:
     """Check mission files without running them: commands, tree, paths on the map, time and battery."""
-    checker = Checker(world, stack)
+    with refusals():
+        at = None if start is None else Start.of(start)
+        checker = Checker(Request(world=world, stack=stack, start=at, given=given_values(given or ())))
     checked = [checker.check(file) for file in files]
     if as_json:
         print_json(to_json(checked))

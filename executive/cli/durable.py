@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -31,6 +32,8 @@ def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
     arguments += ["--world", asked.world] if asked.world else []
     arguments += [] if asked.require_wake is None else ["--wake" if asked.require_wake else "--no-wake"]
     arguments += ["--stack", str(asked.stack)] if asked.stack else []
+    arguments += [] if asked.start is None else [f"--start={asked.start}"]
+    arguments += [f"--set={name}={json.dumps(value)}" for name, value in asked.given.items()]
     if asked.file is None:
         return arguments
     arguments += [part for answer in asked.answers for part in ("--answer", answer)]

@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from executive.cli.start_pose import StartCommand
+from executive.cli.run_options import StartCommand
 from executive.cli.wake_check import refuse_unaddressed
 from executive.mission.errors import InputError
 

@@ -19,6 +19,7 @@ from executive.cli.mission_run import Finished
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Prepared, prepare
+from executive.cli.run_options import SET, START_OR_UNKNOWN
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
@@ -45,14 +46,7 @@ Questions = Annotated[
 ]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 Anyway = Annotated[bool, typer.Option("--anyway", help="Begin although `errand check` would refuse it.")]
-StartAt = Annotated[
-    str | None,
-    typer.Option(metavar="X Y YAW", help="Where the robot stands (m, rad); 'unknown': anywhere, and it finds out."),
-]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
-Given = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
-]
 PageOf = Callable[[Prepared], PageView | None]
 
 
@@ -61,7 +55,7 @@ def run(
     say: Say = None,
     listen_to: Annotated[Path | None, typer.Option("--listen", help="A wav file that says it.")] = None,
     world: World = None,
-    given: Given = None,
+    given: SET = None,
     seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
     wake: Wake = None,
     answer: Answer = None,
@@ -74,7 +68,7 @@ def run(
     profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: Store = None,
     stack: STACK = None,
-    start: StartAt = None,
+    start: START_OR_UNKNOWN = None,
     anyway: Anyway = False,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
@@ -121,12 +115,14 @@ def evaluate(
     file: MissionFile = None,
     say: Say = None,
     world: World = None,
+    given: SET = None,
     seeds: Annotated[str, typer.Option(help="Such as 1-20 or 1,4,7.")] = "1-20",
     jobs: Annotated[int, typer.Option(min=1, help="How many runs at a time.")] = 2,
     wake: Wake = None,
     answer: Answer = None,
     questions: Questions = None,
     stack: STACK = None,
+    start: START_OR_UNKNOWN = None,
     anyway: Anyway = False,
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
     as_json: AsJson = False,
@@ -134,7 +130,9 @@ def evaluate(
     """Run a mission at many seeds and count what the trees claim and what the referee saw."""
     with refusals():
         chosen = seed_range(seeds)
-        asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack)
+        at = None if start is None else Start.of(start)
+        asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack, start=at)
+        asked = replace(asked, given=given_values(given or ()))
         prepared = _prepared(asked, anyway=anyway)
         arguments = run_arguments(asked, prepared)
     console = console_for(as_json)

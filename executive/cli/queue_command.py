@@ -10,7 +10,9 @@ import typer
 from executive.cli.durable import STORE
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.requests import prepare
+from executive.cli.run_options import SET
 from executive.cli.stack_command import STACK
+from executive.mission.file.parameters import given_values
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
 from executive.store.missions import MissionState, MissionStore, StoredMission
@@ -42,6 +44,7 @@ def add(
     wake: Annotated[
         bool | None, typer.Option("--wake/--no-wake", help="Must the robot's name be said? If the world asks for it.")
     ] = None,
+    given: SET = None,
     stack: STACK = None,
     out: Out = Path("out"),
     store: Store = None,
@@ -52,7 +55,8 @@ def add(
     """Queue a sentence or a mission file, checked."""
     with refusals():
         load_stack(stack)
-        asked = Request(say, file, world, wake, seed=seed, out=out, record=not no_record, stack=stack)
+        values = given_values(given or ())
+        asked = Request(say, file, world, wake, seed=seed, out=out, record=not no_record, stack=stack, given=values)
         prepared = prepare(asked)
         if not anyway:
             from executive.cli.feasibility import refuse_impossible

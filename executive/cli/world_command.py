@@ -15,7 +15,7 @@ import typer
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from executive.cli.output import refusals
-from executive.cli.start_pose import START, StartCommand, start_pose
+from executive.cli.run_options import START, StartCommand, start_pose
 from executive.cli.worlds import knowledge_of, open_world
 from executive.mission.errors import InputError
 from plant.worlds.world import WorldError

@@ -37,6 +37,22 @@ def test_each_file_is_one_line_and_the_errors_stand_apart(write):
     assert len(result.stderr.splitlines()) == 2
 
 
+# Where the robot stands and what is given; whether the way is planned without an error, and why not.
+GO = [
+    (("--set", "x=2", "--set", "y=4.5"), ""),
+    (("--start", "2", "4.5", "0"), ""),
+    (("--set", "x=0", "--set", "y=0"), "is blocked"),
+    (("--set", "z=1"), "has no parameter 'z'"),
+    (("--start", "0", "0", "0"), "stands in something"),
+]
+
+
+@pytest.mark.parametrize(("options", "why"), GO)
+def test_values_of_parameters_and_the_start_are_checked(options, why):
+    result = invoke("go_to_pose", *options)
+    assert (result.exit_code, why in result.stderr) == (2 if why else 0, True)
+
+
 def test_the_plan_is_shown_on_demand():
     result = invoke(GOOD, "-v")
     assert result.exit_code == 0

@@ -1,4 +1,4 @@
-"""`--start X Y YAW`: where the robot stands."""
+"""Options that several commands have: `--start`, where the robot stands, and `--set`, values for a mission file."""
 
 from __future__ import annotations
 
@@ -12,11 +12,20 @@ from typer.core import TyperCommand
 if TYPE_CHECKING:
     from skills.robot import Pose2D
 
-__all__ = ["START", "StartCommand", "joined", "start_pose"]
+__all__ = ["SET", "START", "START_OR_UNKNOWN", "StartCommand", "joined", "start_pose"]
 
 _NAME = "--start"
 START = Annotated[
     str | None, typer.Option(_NAME, metavar="X Y YAW", help="Where the robot stands: metres and radians.")
+]
+START_OR_UNKNOWN = Annotated[
+    str | None,
+    typer.Option(
+        _NAME, metavar="X Y YAW", help="Where the robot stands (m, rad); 'unknown': anywhere, and it finds out."
+    ),
+]
+SET = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
 ]
 
 

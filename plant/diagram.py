@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from pydrake.geometry import (
     Box,
+    CollisionFilterDeclaration,
     GeometryId,
     GeometrySet,
     HalfSpace,
@@ -17,10 +19,10 @@ from pydrake.geometry import (
     RenderEngineVtkParams,
     SceneGraph,
 )
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
-from pydrake.multibody.tree import BodyIndex, ModelInstanceIndex
+from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInstanceIndex, PlanarJoint
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.locomotion.floating_base import FloatingBaseLimits
@@ -35,12 +37,17 @@ FLOOR_TOP_M = 0.01
 
 @dataclass(frozen=True)
 class LooseModel:
-    """A model put into the world at the beginning: X_WM is the pose of its base; a fixed one is welded there."""
+    """A model put into the world at the beginning: X_WM is the pose of its base.
+
+    A fixed one is welded there. One that `slides` moves upright in x, y and yaw, as somebody moves it, and touches
+    nothing that is fixed.
+    """
 
     name: str
     path: Path
     X_WM: RigidTransform
     fixed: bool = False
+    slides: bool = False
 
 
 @dataclass(frozen=True)
@@ -105,13 +112,16 @@ def build_diagram(
     }
     plant.Finalize()
     for model in models:
-        if not model.fixed:
+        if not (model.fixed or model.slides):
             (body,) = plant.GetBodyIndices(instances[model.name])[:1]
             plant.SetDefaultFloatingBaseBodyPose(plant.get_body(body), model.X_WM)
     filters = scene_graph.collision_filter_manager()
     floor = GeometrySet(_floor_geometries(plant, scene_graph))
     for robot in robots.values():
         robot.filter_collisions(filters, floor)
+    sliding = GeometrySet([*_shapes_of(plant, [instances[model.name] for model in models if model.slides])])
+    anchored = GeometrySet([*_anchored_shapes(plant)])
+    filters.Apply(CollisionFilterDeclaration().ExcludeWithin(sliding).ExcludeBetween(sliding, anchored))
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
@@ -132,10 +142,36 @@ def parser_of(plant: MultibodyPlant) -> Parser:
 def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> ModelInstanceIndex:
     instance = add_model(parser, model.path)
     plant.RenameModelInstance(instance, model.name)
+    (index,) = plant.GetBodyIndices(instance)[:1]
+    frame = plant.get_body(index).body_frame()
     if model.fixed:
-        (body,) = plant.GetBodyIndices(instance)[:1]
-        plant.WeldFrames(plant.world_frame(), plant.get_body(body).body_frame(), model.X_WM)
+        plant.WeldFrames(plant.world_frame(), frame, model.X_WM)
+    elif model.slides:
+        _let_slide(plant, frame, model)
     return instance
+
+
+def _let_slide(plant: MultibodyPlant, frame: Frame, model: LooseModel) -> None:
+    """Hold a model upright at its height, by a planar joint."""
+    x, y, z = model.X_WM.translation()
+    level = RigidTransform(np.array([0.0, 0.0, z]))
+    floor = plant.AddFrame(FixedOffsetFrame(f"{model.name}_floor", plant.world_frame(), level))
+    joint = plant.AddJoint(PlanarJoint(f"{model.name}_slides", floor, frame))
+    joint.set_default_translation(np.array([x, y]))
+    joint.set_default_rotation(RollPitchYaw(model.X_WM.rotation()).yaw_angle())
+
+
+def _shapes_of(plant: MultibodyPlant, instances: Sequence[ModelInstanceIndex]) -> Iterator[GeometryId]:
+    """The collision shapes of model instances."""
+    for index in (body for instance in instances for body in plant.GetBodyIndices(instance)):
+        yield from plant.GetCollisionGeometriesForBody(plant.get_body(index))
+
+
+def _anchored_shapes(plant: MultibodyPlant) -> Iterator[GeometryId]:
+    """The collision shapes of all that is fixed to the world."""
+    for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
+        if plant.IsAnchored(body):
+            yield from plant.GetCollisionGeometriesForBody(body)
 
 
 def _floor_geometries(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[GeometryId]:

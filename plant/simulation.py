@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from pydrake.geometry import QueryObject
@@ -15,6 +17,7 @@ from pydrake.systems.framework import Context
 from plant.diagram import TIME_STEP_S, LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
 from plant.locomotion.floating_base import FloatingBaseLimits
+from plant.people.walkers import Walkers
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.sleeping import Sleepers
@@ -26,6 +29,7 @@ from plant.spot.robot import SpotRobot
 from plant.spot.sensing import HAND_LINK, SpotSensors
 from plant.worlds.lights import render_parameters
 from plant.worlds.placement import Placement, place_objects, place_people
+from plant.worlds.route import Route
 from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
 
@@ -46,10 +50,12 @@ class Engine:
         seed: int = 0,
         dock: Pose2D | None = None,
         charge: float = 1.0,
+        routes: Mapping[str, Route] = MappingProxyType({}),
     ) -> None:
         """`starts`: where each robot stands at time 0, in the world frame; `seed` gives the sensors' noise.
 
-        Batteries begin at `charge` (0 to 1) and charge at `dock`.
+        Batteries begin at `charge` (0 to 1) and charge at `dock`. `routes` are those of people who walk, by the names
+        of their models. Raises WorldError: a route leads through what stands fast.
         """
         self.world, self._dock, self._charge = world, dock, charge
         self._simulator = Simulator(world.diagram)
@@ -62,6 +68,7 @@ class Engine:
             name: SpotRobot(model, self._sensors(model, seed), self.context)
             for name, model in sorted(world.robots.items())
         }
+        self.walkers = Walkers(world, self.context, routes)
         self._sleepers = Sleepers(world, self.root_context)
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
@@ -106,6 +113,7 @@ class Engine:
                 self._sleepers.update(self.now())
             if self._steps % CONTROL_STEPS == 0:
                 self._command_robots()
+            self.walkers.before_step(TIME_STEP_S)
             self._steps += 1
             self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
             self.work["plant_steps"] += 1
@@ -122,8 +130,9 @@ class Engine:
         self._after_advance.append(listener)
 
     def state(self) -> State:
-        """Time, and what the robots keep."""
-        return {"steps": self._steps, "robots": {name: spot.state() for name, spot in self._spots.items()}}
+        """Time, what the robots keep, and how far the people have walked."""
+        robots = {name: spot.state() for name, spot in self._spots.items()}
+        return {"steps": self._steps, "robots": robots, "walkers": self.walkers.state()}
 
     def world_state(self) -> Mapping[str, FloatArray]:
         """Positions and velocities of all that moves."""
@@ -139,6 +148,7 @@ class Engine:
         if set(world) != set(self.world_state()):
             raise ValueError("the parts of the world are others")
         self._sleepers.wake_all()
+        self.walkers.restore(state["walkers"])
         self._steps = state["steps"]
         self.root_context.SetTime(self.now())
         for group, values in world.items():
@@ -173,7 +183,8 @@ class Simulation:
 
         The first robot stands at `start`, by default the world's start pose, others a robot's length behind one
         another. Batteries begin at `charge` (0 to 1). `extra_models` stand in the world though no map knows them;
-        `locomotion` limits what bears the robots. Raises WorldError when the things do not fit into the world.
+        `locomotion` limits what bears the robots. Raises WorldError when the things do not fit into the world, or
+        a person's route leads through something.
         """
         self.seed, self.world, self.start = seed, world, start or world.start
         things, people = place_objects(world, seed), place_people(world, seed)
@@ -181,7 +192,7 @@ class Simulation:
             directives=world.directives_path,
             models=[
                 *(_loose(each) for each in things),
-                *(_loose(each, fixed=True) for each in people),
+                *(_person(each) for each in people),
                 *extra_models,
             ],
             robot_names=robot_names,
@@ -189,7 +200,14 @@ class Simulation:
             locomotion=locomotion,
             renderer_parameters=render_parameters(),
         )
-        self.engine = Engine(built, _starts(self.start, robot_names), seed=seed, dock=world.dock, charge=charge)
+        self.engine = Engine(
+            built,
+            _starts(self.start, robot_names),
+            seed=seed,
+            dock=world.dock,
+            charge=charge,
+            routes={each.name: each.route for each in people if each.route is not None},
+        )
         self.referee = Referee(
             built.plant,
             [*things, *people],
@@ -292,8 +310,14 @@ class Simulation:
         return View.over(self.world.corners)
 
 
-def _loose(placement: Placement, *, fixed: bool = False) -> LooseModel:
-    return LooseModel(placement.name, placement.model_path, placement.X_WO, fixed)
+def _loose(placement: Placement) -> LooseModel:
+    return LooseModel(placement.name, placement.model_path, placement.X_WO)
+
+
+def _person(placement: Placement) -> LooseModel:
+    """Somebody who stands is welded to the world and costs nothing."""
+    walks = placement.route is not None
+    return replace(_loose(placement), fixed=not walks, slides=walks)
 
 
 def _starts(start: Pose2D, robot_names: Sequence[str]) -> Mapping[str, Pose2D]:

@@ -24,7 +24,7 @@ from skills.robot import FloatArray
 
 _EXACT = 1e-9
 _REACH_M = 2.0
-"""Farther from its body than any link of a robot gets, with an object's own size and the margin."""
+"""Farther from its body than any part of a robot or a person gets, with an object's own size and the margin."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,10 @@ class Sleepers:
         others = [body for body in _moving_bodies(plant) if int(body.index()) not in own]
         self._links = _Spheres(plant, inspector, others)
         of_robots = {int(instance) for robot in world.robots.values() for instance in robot.instances()}
-        self._only_robots_move = all(int(body.model_instance()) in of_robots for body in others)
-        self._robots = [robot.body for robot in world.robots.values()]
+        sliding = [body for body in others if _slides(body, world.models)]
+        known = of_robots | {int(body.model_instance()) for body in sliding}
+        self._only_known_move = all(int(body.model_instance()) in known for body in others)
+        self._known = [*(robot.body for robot in world.robots.values()), *sliding]
         self._bounds = _Spheres(plant, inspector, [each.body for each in self._objects])
         starts = [each.body.floating_positions_start() for each in self._objects]
         self._places = np.array([range(start, start + 7) for start in starts], dtype=np.int64).reshape(-1, 7)
@@ -131,8 +133,8 @@ class Sleepers:
 
     def _reached(self, centres_W: FloatArray) -> NDArray[np.bool_]:
         """For each object, whether a link is about to reach it."""
-        bases = [self._plant.EvalBodyPoseInWorld(self._context, body).translation() for body in self._robots]
-        if self._only_robots_move and all(np.abs(centres_W - p_WB).max(axis=1).min() > _REACH_M for p_WB in bases):
+        bases = [self._plant.EvalBodyPoseInWorld(self._context, body).translation() for body in self._known]
+        if self._only_known_move and all(np.abs(centres_W - p_WB).max(axis=1).min() > _REACH_M for p_WB in bases):
             return np.zeros(len(centres_W), dtype=bool)
         links_W = self._links.centres_W(self._context)
         return self._near(centres_W, links_W, self._links.radii_m, self._limits.margin_m)
@@ -169,6 +171,11 @@ def _objects(plant: MultibodyPlant, models: Mapping[str, ModelInstanceIndex]) ->
             shapes = GeometrySet(plant.GetCollisionGeometriesForBody(bodies[0]))
             start = bodies[0].floating_velocities_start_in_v()
             yield _Object(name, bodies[0], shapes, slice(start, start + 6))
+
+
+def _slides(body: RigidBody, models: Mapping[str, ModelInstanceIndex]) -> bool:
+    """Whether a moving body is a model of its own that is not loose: a person who walks."""
+    return body.model_instance() in models.values() and not body.is_floating_base_body()
 
 
 def _all_shapes(plant: MultibodyPlant) -> Iterator[GeometryId]:

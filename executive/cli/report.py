@@ -13,13 +13,16 @@ from rich.markup import escape
 class RefereeReport:
     """The referee's verdict with its counts, and one sentence for each lift, drop and bump.
 
-    `success` is None when the referee has not judged all that was asked for.
+    `success` is None when the referee has not judged all that was asked for. `people_hit` counts collisions with
+    people, `hit_by_people` how often somebody walked into the robot while it stood: no collision of the robot's.
     """
 
     success: bool | None
     why: str
     collisions: int
     drops: int
+    people_hit: int = 0
+    hit_by_people: int = 0
     events: tuple[str, ...] = ()
 
 
@@ -97,9 +100,16 @@ class RunReport:
         return (
             claims,
             f"[bold]The referee saw:[/bold] {verdict}: {escape(self.referee.why)}",
-            f"{self.referee.collisions} collisions, {self.referee.drops} drops; {figures}",
+            f"{_counts(self.referee)}; {figures}",
             *(escape(f"  {event}") for event in self.referee.events),
         )
+
+
+def _counts(referee: RefereeReport) -> str:
+    """The counts; those with people where there were any."""
+    people = f" ({referee.people_hit} with people)" if referee.people_hit else ""
+    walked_in = f"{referee.hit_by_people} times somebody walked into the robot" if referee.hit_by_people else ""
+    return ", ".join(filter(None, (f"{referee.collisions} collisions{people}", f"{referee.drops} drops", walked_in)))
 
 
 def _mark(good: bool | None) -> str:

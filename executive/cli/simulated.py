@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from executive.cli.artifacts import Artifacts, draw_artifacts
@@ -85,8 +85,7 @@ class SimulatedBackend:
     def judge(self, tree: CompiledTree, result: RobotResult) -> RefereeReport:
         """What the plant's referee saw."""
         verdict = judge(self._simulation, tree, result)
-        events = self._simulation.referee.events
-        return RefereeReport(verdict.success, verdict.why, verdict.collisions, verdict.drops, events)
+        return RefereeReport(**asdict(verdict), events=self._simulation.referee.events)
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Write recording and pictures, where the run was recorded."""

@@ -13,6 +13,8 @@ from plant.snapshot.values import State
 Pair = tuple[int, int]
 
 FLOOR_Z_M = 0.04
+MOVES_M_S = 0.05
+"""A robot that was faster than this just before has caused a contact with a person."""
 
 
 def touching(
@@ -33,47 +35,62 @@ def _lower(lowest: dict[Pair, float], a: int, b: int, z: float) -> None:
 
 @dataclass(frozen=True)
 class Collision:
-    """A robot bumped into something."""
+    """A robot bumped into something, or a person `walked_in`: into a robot that stood."""
 
     time_s: float
     robot: str
     part: Kind
     sentence: str
+    person: str | None = None
+    walked_in: bool = False
 
 
 class CollisionCounter:
     """Counts rising edges of contact between robots and scenery, persons or other robots.
 
-    A pair that parts for less than `debounce_s` is still the same bump. What touches at first does not count.
+    A pair that parts for less than `debounce_s` is still the same bump. What touches at first does not count. With a
+    person a robot is one, whatever part of it touches.
     """
 
     def __init__(self, entities: Mapping[int, Entity], debounce_s: float = 0.5) -> None:
         """Start with a clean record."""
         self._entities, self._debounce_s = entities, debounce_s
+        self._first_of = {entity.owner: number for number, entity in sorted(entities.items(), reverse=True)}
         self._last_touched_s: dict[Pair, float] | None = None
         self.collisions: list[Collision] = []
 
-    def update(self, time_s: float, pairs: Mapping[Pair, float]) -> None:
-        """Take in the pairs that touch at time_s, with the height of their lowest contact."""
-        bumps = [pair for pair, z in pairs.items() if self._is_bump(pair, z)]
+    def update(self, time_s: float, pairs: Mapping[Pair, float], speeds_m_s: Mapping[str, float]) -> None:
+        """Take in the pairs that touch at time_s, with the height of their lowest contact.
+
+        `speeds_m_s` are those of the robots just before they touched.
+        """
+        bumps = {self._counted_as(pair): pair for pair, z in pairs.items() if self._is_bump(pair, z)}
         if self._last_touched_s is None:
             self._last_touched_s = dict.fromkeys(bumps, time_s)
-        for pair in bumps:
-            if time_s - self._last_touched_s.get(pair, float("-inf")) > self._debounce_s:
-                self.collisions.append(self._collision(time_s, pair))
-            self._last_touched_s[pair] = time_s
+        for counted, pair in bumps.items():
+            if time_s - self._last_touched_s.get(counted, float("-inf")) > self._debounce_s:
+                self.collisions.append(self._collision(time_s, pair, speeds_m_s))
+            self._last_touched_s[counted] = time_s
 
     def state(self) -> State:
         """The record so far."""
         touched = None if self._last_touched_s is None else [[*pair, t] for pair, t in self._last_touched_s.items()]
-        bumps = [[bump.time_s, bump.robot, bump.part.value, bump.sentence] for bump in self.collisions]
+        bumps = [
+            [bump.time_s, bump.robot, bump.part.value, bump.sentence, bump.person, bump.walked_in]
+            for bump in self.collisions
+        ]
         return {"touched": touched, "bumps": bumps}
 
     def restore(self, state: State) -> None:
         """Go on with such a record."""
         touched = state["touched"]
         self._last_touched_s = None if touched is None else {(a, b): time_s for a, b, time_s in touched}
-        self.collisions = [Collision(time_s, robot, Kind(part), told) for time_s, robot, part, told in state["bumps"]]
+        self.collisions = [Collision(at_s, robot, Kind(part), *told) for at_s, robot, part, *told in state["bumps"]]
+
+    def _counted_as(self, pair: Pair) -> Pair:
+        """The pair itself; with a person, one that stands for the whole robot."""
+        a, b = (self._entities[number] for number in pair)
+        return (self._first_of[a.owner], self._first_of[b.owner]) if Kind.PERSON in (a.kind, b.kind) else pair
 
     def _is_bump(self, pair: Pair, z: float) -> bool:
         """Whether a touch is a collision: not feet on the floor, not loose objects, not a robot with itself."""
@@ -84,8 +101,10 @@ class CollisionCounter:
             return False
         return not (kinds == {Kind.LEG, Kind.SCENERY} and z < FLOOR_Z_M)
 
-    def _collision(self, time_s: float, pair: Pair) -> Collision:
+    def _collision(self, time_s: float, pair: Pair, speeds_m_s: Mapping[str, float]) -> Collision:
         first, second = self._entities[pair[0]], self._entities[pair[1]]
         robot, other = (first, second) if first.kind in ROBOT_KINDS else (second, first)
-        sentence = f"{robot.label} hit {other.label} at {time_s:.2f} s."
-        return Collision(time_s, robot.owner, robot.kind, sentence)
+        person = other.owner if other.kind is Kind.PERSON else None
+        walked_in = person is not None and speeds_m_s.get(robot.owner, 0.0) <= MOVES_M_S
+        told = f"{other.label} walked into {robot.label}" if walked_in else f"{robot.label} hit {other.label}"
+        return Collision(time_s, robot.owner, robot.kind, f"{told} at {time_s:.2f} s.", person, walked_in)

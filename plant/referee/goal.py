@@ -73,9 +73,15 @@ class GoalCondition:
 @dataclass(frozen=True)
 class Verdict:
     """What the referee saw: whether all goal conditions hold (None: that was not judged), a sentence on each, and the
-    counts of the whole run."""
+    counts of the whole run.
+
+    `collisions` are the robots' own, `people_hit` those of them with people; `hit_by_people` counts who walked into a
+    robot that stood.
+    """
 
     success: bool | None
     why: str
     collisions: int
     drops: int
+    people_hit: int = 0
+    hit_by_people: int = 0

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from plant.referee.contacts import Collision
 from plant.referee.goal import GoalCondition, GoalKind, Region, Verdict
 from plant.referee.object_history import Lift, ObjectHistory
 from skills.robot import FloatArray
@@ -45,11 +46,19 @@ def offered(history: ObjectHistory, p_WP: FloatArray) -> bool:
     return _apart_m(history.last.p_WO, p_WP) <= REACH_OF_PERSON_M
 
 
-def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: int, drops: int) -> Verdict:
+def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[Collision], drops: int) -> Verdict:
     """The verdict on all conditions: the last is judged by the present state, earlier ones by the record."""
     findings = [_judge_one(conditions, i, truth) for i in range(len(conditions))]
     success = all(finding.holds for finding in findings) if findings else None
-    return Verdict(success, " ".join(finding.sentence for finding in findings), collisions, drops)
+    own = [bump for bump in bumps if not bump.walked_in]
+    return Verdict(
+        success,
+        " ".join(finding.sentence for finding in findings),
+        collisions=len(own),
+        drops=drops,
+        people_hit=sum(bump.person is not None for bump in own),
+        hit_by_people=len(bumps) - len(own),
+    )
 
 
 def _judge_one(conditions: Sequence[GoalCondition], i: int, truth: Truth) -> Finding:

@@ -53,10 +53,11 @@ class Referee:
         self.contact_points = 0
         self._bases: dict[str, FloatArray] = {}
         self._persons: dict[str, FloatArray] = {}
+        self._speeds_m_s: dict[str, float] = {}
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
-        """All bumps so far."""
+        """All bumps so far, those included where a person walked into a robot."""
         return tuple(self._counter.collisions)
 
     @property
@@ -84,7 +85,8 @@ class Referee:
         penetrations = self._geometry.Eval(plant_context).ComputePointPairPenetration()
         self.contact_points += len(penetrations)
         pairs = touching(penetrations, self._entities.of_geometry)
-        self._counter.update(time_s, pairs)
+        self._counter.update(time_s, pairs, self._speeds_m_s)
+        self._speeds_m_s = self._speeds(plant_context)
         self._bases = {name: self._position(plant_context, body) for name, body in self._entities.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._entities.persons.items()}
         for name, p_WB in self._bases.items():
@@ -109,7 +111,7 @@ class Referee:
             persons=self._persons,
             offers=frozenset(self._offers),
         )
-        return judge(conditions, truth, collisions=len(self._counter.collisions), drops=self.drops)
+        return judge(conditions, truth, bumps=self._counter.collisions, drops=self.drops)
 
     def state(self) -> State:
         """The whole record; paths are arrays (N, 3)."""
@@ -141,6 +143,16 @@ class Referee:
     def points(self, robot: str) -> Sequence[FloatArray]:
         """The points of `path`, not to be changed; those that were there stay as more are added."""
         return self._paths[robot]
+
+    def _speeds(self, plant_context: Context) -> dict[str, float]:
+        """How fast each robot's body and hand are, the faster of the two (m/s); nothing where there is nobody."""
+        if not self._entities.persons:
+            return {}
+        speeds: dict[str, float] = {}
+        for name, body in (*self._entities.bases.items(), *self._entities.hands.items()):
+            v_W = self._plant.EvalBodySpatialVelocityInWorld(plant_context, body).translational()
+            speeds[name] = max(speeds.get(name, 0.0), float(np.linalg.norm(v_W)))
+        return speeds
 
     def _position(self, plant_context: Context, body: object) -> FloatArray:
         """The body origin's position in the world."""

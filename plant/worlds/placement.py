@@ -11,7 +11,8 @@ import shapely
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from plant.models.catalogue import ModelClass, ModelForm, load_catalogue
-from plant.worlds.world import ObjectRule, PersonRule, Point, Polygon, SurfaceTop, World, WorldError
+from plant.worlds.route import Route, route_of
+from plant.worlds.world import ObjectRule, PersonRule, Point, Polygon, Span, SurfaceTop, World, WorldError
 from skills.robot import FloatArray
 
 ATTEMPTS = 500
@@ -21,13 +22,17 @@ _OBJECT_STREAM, _PEOPLE_STREAM, _FORM_STREAM = 1, 2, 3
 
 @dataclass(frozen=True)
 class Placement:
-    """A model in the world: X_WO is its pose at the start. Loose objects rest on `surface`; people are welded."""
+    """A model in the world: X_WO is its pose at the start.
+
+    Loose objects rest on `surface`; people are welded, but those who walk on a `route`.
+    """
 
     name: str
     class_name: str
     form: ModelForm
     X_WO: RigidTransform
     surface: str | None = None
+    route: Route | None = None
 
     @property
     def model_path(self) -> Path:
@@ -52,7 +57,7 @@ def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
 
 
 def place_people(world: World, seed: int) -> tuple[Placement, ...]:
-    """The people, who stand on the floor before the start pose and look at the robot."""
+    """The people: at the beginnings of their routes, or on the floor before the start pose, looking at the robot."""
     catalogue = load_catalogue()
     return tuple(
         _place_person(world, rule, _form(_model_class(catalogue, rule.model, world), seed, index), seed, index)
@@ -104,14 +109,27 @@ def _candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> 
 
 
 def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, index: int) -> Placement:
-    rng = np.random.default_rng([seed, _PEOPLE_STREAM, index])
-    direction = world.start.yaw_rad + rng.uniform(*rule.bearing_rad)
-    distance = rng.uniform(*rule.distance_m)
-    yaw = direction + np.pi + rng.uniform(*rule.turned_rad)
+    route = None if rule.route is None else route_of(rule.route, world.standing)
+    if route is not None:
+        (x, y), yaw = route.stops[0].at_W, route.first_yaw_rad
+    else:
+        assert rule.ranges is not None
+        x, y, yaw = _before_start(world, rule.ranges, np.random.default_rng([seed, _PEOPLE_STREAM, index]))
+    X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m], dtype=np.float64))
+    return Placement(rule.name, rule.model, form, X_WO, route=route)
+
+
+def _before_start(
+    world: World, ranges: tuple[Span, Span, Span], rng: np.random.Generator
+) -> tuple[float, float, float]:
+    """x, y and yaw of somebody at a random distance, bearing and turn before the start pose."""
+    distance_m, bearing_rad, turned_rad = ranges
+    direction = world.start.yaw_rad + rng.uniform(*bearing_rad)
+    distance = rng.uniform(*distance_m)
+    yaw = direction + np.pi + rng.uniform(*turned_rad)
     x = world.start.x_m + distance * np.cos(direction)
     y = world.start.y_m + distance * np.sin(direction)
-    X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m], dtype=np.float64))
-    return Placement(rule.name, rule.model, form, X_WO)
+    return float(x), float(y), float(yaw)
 
 
 def outline_W(form: ModelForm, centre: Point, yaw_rad: float) -> FloatArray:

@@ -6,12 +6,13 @@ Only what a plant needs is read of `knowledge.yaml`: the start pose, rooms and s
 from __future__ import annotations
 
 import difflib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from skills.robot import Pose2D
 
@@ -53,14 +54,47 @@ class ObjectRule(_Strict):
     surfaces: tuple[str, ...] = Field(min_length=1, description="surfaces of knowledge.yaml; the seed chooses one")
 
 
+class StopRule(_Strict):
+    """A waypoint at which a person stands for a while."""
+
+    at: Point | str = Field(description="a point (x, y), or a room or surface of knowledge.yaml")
+    pause: float = Field(default=0.0, ge=0.0, le=86400.0, description="how long the person stands there, s")
+
+
+class RouteRule(_Strict):
+    """A route on which a person walks, around walls and furniture."""
+
+    waypoints: tuple[Point | str | StopRule, ...] = Field(
+        min_length=1, description="points (x, y), rooms or surfaces, in order; the person begins at the first"
+    )
+    speed: float = Field(default=1.2, gt=0.0, le=3.0, description="how fast the person walks, m/s")
+    loop: bool = Field(default=False, description="whether the first waypoint follows the last; else once")
+    start: float = Field(default=0.0, ge=0.0, le=86400.0, description="when the person sets off, s")
+    yields: bool = Field(default=True, description="whether the person stops for a robot that is close ahead")
+
+
 class PersonRule(_Strict):
-    """A person who stands before the robot's start pose: ranges of distance, bearing and turn from facing it."""
+    """A person, who walks on a route, or stands before the robot's start pose where three ranges say."""
 
     name: str = Field(description="the person's name in knowledge.yaml")
-    model: str = Field(description="a class of `plant/models/catalogue.yaml`")
-    distance_m: Span = Field(description="least and greatest distance from the start pose")
-    bearing_rad: Span = Field(description="least and greatest bearing, seen from the start pose")
-    turned_rad: Span = Field(description="least and greatest turn away from facing the robot")
+    model: str = Field(default="person", description="a class of `plant/models/catalogue.yaml`")
+    distance_m: Span | None = Field(default=None, description="least and greatest distance from the start pose")
+    bearing_rad: Span | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
+    turned_rad: Span | None = Field(default=None, description="least and greatest turn away from facing the robot")
+    route: RouteRule | None = Field(default=None, description="where the person walks")
+
+    @model_validator(mode="after")
+    def _walks_or_stands(self) -> PersonRule:
+        if (self.route is None) == (self.ranges is None):
+            raise ValueError("give either 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'")
+        return self
+
+    @property
+    def ranges(self) -> tuple[Span, Span, Span] | None:
+        """Distance, bearing and turn of one who stands."""
+        if self.distance_m is None or self.bearing_rad is None or self.turned_rad is None:
+            return None
+        return self.distance_m, self.bearing_rad, self.turned_rad
 
 
 class SeedRules(_Strict):
@@ -92,12 +126,14 @@ class _Pose(BaseModel):
 
 class _Place(BaseModel):
     polygon: Polygon
+    pose: _Pose | None = None
 
 
 class _Top(BaseModel):
     place: str
     height: float
     polygon: Polygon
+    viewpoints: tuple[_Pose, ...] = ()
 
 
 class _Knowledge(BaseModel):
@@ -120,7 +156,8 @@ class SurfaceTop:
 class World:
     """A world's files and what the plant needs to know of them. Lengths in metres, world frame.
 
-    Only its geometry and a start are needed: no dock, rooms, surfaces or seed rules.
+    Only its geometry and a start are needed: no dock, rooms, surfaces or seed rules. `standing` tells where somebody
+    stands who is in a room, or at a surface.
     """
 
     name: str
@@ -131,6 +168,7 @@ class World:
     surfaces: dict[str, SurfaceTop]
     surface_places: dict[str, str]
     seed_rules: SeedRules
+    standing: Mapping[str, Point] = field(default_factory=dict)
 
     @property
     def corners(self) -> Polygon:
@@ -138,6 +176,18 @@ class World:
         x, y, reach_m = self.start.x_m, self.start.y_m, 5.0
         rooms = [corner for room in self.rooms.values() for corner in room]
         return tuple(rooms) or ((x - reach_m, y - reach_m), (x + reach_m, y + reach_m))
+
+    def with_routes(self, routes: Mapping[str, RouteRule]) -> World:
+        """The same with people on these routes, by name: others than before, or somebody who is there already.
+
+        Raises WorldError: a name is that of an object, or a waypoint is not known.
+        """
+        rules = self.seed_rules
+        before = {rule.name: rule for rule in rules.people}
+        walking = {name: PersonRule(name=name, route=route) for name, route in routes.items()}
+        changed = rules.model_copy(update={"people": tuple({**before, **walking}.values())})
+        _check_people(self.folder / "objects.yaml", changed, self.standing)
+        return replace(self, seed_rules=changed)
 
     @property
     def directives_path(self) -> Path:
@@ -178,6 +228,8 @@ def load_world(name_or_path: str | Path) -> World:
     rules = _read(objects, SeedRules) if objects.exists() or objects.is_symlink() else NO_SEED_RULES
     surfaces = {name: SurfaceTop(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
     _check_surfaces(objects, rules, surfaces)
+    standing = _standing(knowledge)
+    _check_people(objects, rules, standing)
     return World(
         name=folder.name,
         folder=folder,
@@ -187,7 +239,15 @@ def load_world(name_or_path: str | Path) -> World:
         surfaces=surfaces,
         surface_places={name: top.place for name, top in knowledge.surfaces.items()},
         seed_rules=rules,
+        standing=standing,
     )
+
+
+def _standing(knowledge: _Knowledge) -> dict[str, Point]:
+    """Where somebody stands at each room and surface of which that is told."""
+    poses = {name: place.pose for name, place in knowledge.places.items()}
+    poses |= {name: top.viewpoints[0] for name, top in knowledge.surfaces.items() if top.viewpoints}
+    return {name: (pose.x, pose.y) for name, pose in poses.items() if pose is not None}
 
 
 def _find_folder(name_or_path: str | Path) -> Path:
@@ -259,3 +319,18 @@ def _check_surfaces(path: Path, rules: SeedRules, surfaces: dict[str, SurfaceTop
             raise WorldError(f"{path}: no surface {name!r} in knowledge.yaml{hint}")
         if name in wanted and not rules.fronts.get(name):
             raise WorldError(f"{path}: surface {name!r} may carry things but has no entry under `fronts`")
+
+
+def _check_people(path: Path, rules: SeedRules, standing: Mapping[str, Point]) -> None:
+    """Names are taken once, and every place on a route is known."""
+    names = [*(rule.name for rule in rules.objects), *(rule.name for rule in rules.people)]
+    for name in names:
+        if names.count(name) > 1:
+            raise WorldError(f"{path}: {name!r} names two objects or people; give one of them another name")
+    for rule in rules.people:
+        for waypoint in () if rule.route is None else rule.route.waypoints:
+            at = waypoint.at if isinstance(waypoint, StopRule) else waypoint
+            if isinstance(at, str) and at not in standing:
+                close = difflib.get_close_matches(at, standing, n=1)
+                hint = f"did you mean {close[0]!r}?" if close else "give a point (x, y)"
+                raise WorldError(f"{path}: {rule.name} cannot walk to {at!r}: no place in knowledge.yaml; {hint}")

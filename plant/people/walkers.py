@@ -1,0 +1,129 @@
+"""Moves the people who walk: before each step of the plant, each is put where their walk has them.
+
+A walker's body slides on the floor by a planar joint. Its pose and velocity are set, whatever pushes it; it touches
+robots and loose objects, and passes through the scenery, around which its way is planned. Somebody who stands is not
+touched at all, as long as nobody pushes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from pydrake.multibody.tree import SpatialInertia
+from pydrake.systems.framework import Context
+
+from plant.diagram import WorldDiagram
+from plant.people.paths import Ground
+from plant.people.walk import Leg, Walk
+from plant.snapshot.values import State
+from plant.spot.capabilities import spot_capabilities
+from plant.worlds.route import Route
+from skills.robot import FloatArray
+
+BODY_KG, BODY_M = 75.0, (0.2, 1.75)
+"""Mass, and radius and height of the cylinder that has the body's inertia."""
+YIELD_M = 0.8
+"""Who yields stops when a robot's outline is nearer than this to their middle, and ahead."""
+AHEAD_RAD = 1.2
+"""So far to either side of the way is ahead."""
+_MOVED = 1e-9
+
+
+class Walkers:
+    """The people of one plant who walk, by name. `before_step` is to be called before each step."""
+
+    def __init__(self, world: WorldDiagram, context: Context, routes: Mapping[str, Route]) -> None:
+        """`context` is the plant's. Raises WorldError: a waypoint is in something, or there is no way to it."""
+        self._plant, self._context, self._routes = world.plant, context, dict(routes)
+        self._robots = [robot.body for robot in world.robots.values()]
+        self._outline_B = np.array(spot_capabilities().footprint_m)
+        self._reach_m = float(np.linalg.norm(self._outline_B, axis=1).max())
+        self._instances = {name: world.models[name] for name in routes}
+        inertia = SpatialInertia.SolidCylinderWithMass(BODY_KG, *BODY_M, np.array([0.0, 0.0, 1.0]))
+        for instance in self._instances.values():
+            (body,) = (world.plant.get_body(index) for index in world.plant.GetBodyIndices(instance))
+            body.SetSpatialInertiaInBodyFrame(context, inertia)
+        self._walks = self._planned(world) if routes else {}
+
+    def _planned(self, world: WorldDiagram) -> dict[str, Walk]:
+        points = (stop.at_W for route in self._routes.values() for stop in route.stops)
+        ground = Ground.of(world.plant, world.scene_graph.model_inspector(), points)
+        return {name: _walk(name, route, ground) for name, route in self._routes.items()}
+
+    def __getitem__(self, name: str) -> Walk:
+        """The walk of one of them. Raises KeyError."""
+        return self._walks[name]
+
+    def before_step(self, dt_s: float) -> None:
+        """Put everybody where they are, with the velocity that leads to where they will be after dt_s."""
+        for name, walk in self._walks.items():
+            before = (*walk.place_W, walk.yaw_rad)
+            if not walk.walks or not self._held(name, walk):
+                walk.advance(dt_s)
+            after = (*walk.place_W, walk.yaw_rad)
+            self._set(name, np.array(before), (np.array(after) - before) / dt_s)
+
+    def _set(self, name: str, pose: FloatArray, velocity: FloatArray) -> None:
+        """Set the body's (x, y, yaw) and their rates where they are others."""
+        plant, instance = self._plant, self._instances[name]
+        if np.abs(plant.GetPositions(self._context, instance) - pose).max() > _MOVED:
+            plant.SetPositions(self._context, instance, pose)
+        if np.abs(plant.GetVelocities(self._context, instance) - velocity).max() > _MOVED:
+            plant.SetVelocities(self._context, instance, velocity)
+
+    def _held(self, name: str, walk: Walk) -> bool:
+        """Whether somebody who is on the way stands for a robot."""
+        if not self._routes[name].yields:
+            return False
+        return any(self._close_ahead(walk, outline_W) for outline_W in self._outlines_W(walk))
+
+    def _outlines_W(self, walk: Walk) -> Iterator[FloatArray]:
+        """The outlines (K, 2) of the robots that somebody may be close to."""
+        for body in self._robots:
+            X_WB = self._plant.EvalBodyPoseInWorld(self._context, body)
+            if math.dist(X_WB.translation()[:2], walk.place_W) < YIELD_M + self._reach_m:
+                corners_B = np.column_stack([self._outline_B, np.zeros(len(self._outline_B))])
+                yield X_WB.multiply(corners_B.T).T[:, :2]
+
+    def _close_ahead(self, walk: Walk, outline_W: FloatArray) -> bool:
+        """Whether an outline is close to the person and before them."""
+        offset = _nearest_on(outline_W, np.array(walk.place_W)) - walk.place_W
+        if float(np.hypot(*offset)) > YIELD_M:
+            return False
+        bearing_rad = math.remainder(math.atan2(offset[1], offset[0]) - walk.heading_rad, math.tau)
+        return abs(bearing_rad) < AHEAD_RAD
+
+    def state(self) -> State:
+        """How far everybody is."""
+        return {name: walk.state() for name, walk in self._walks.items()}
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state. Raises KeyError: somebody is not in it."""
+        for name, walk in self._walks.items():
+            walk.restore(state[name])
+
+
+def _walk(name: str, route: Route, ground: Ground) -> Walk:
+    """A route with its legs planned. Raises WorldError."""
+    stops = [*route.stops, *(route.stops[:1] if route.loops else ())]
+    legs = [Leg(ground.way(a.at_W, b.at_W, who=name), b.pause_s) for a, b in itertools.pairwise(stops)]
+    first = route.stops[0]
+    return Walk(
+        legs,
+        at_W=first.at_W,
+        yaw_rad=route.first_yaw_rad,
+        speed_m_s=route.speed_m_s,
+        start_s=route.start_s + first.pause_s,
+        loops=route.loops and len(route.stops) > 1,
+    )
+
+
+def _nearest_on(polygon: FloatArray, point: FloatArray) -> FloatArray:
+    """The point of a polygon's edges (K, 2) that is nearest to a point."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    shares = np.clip(np.sum((point - polygon) * edges, axis=1) / np.sum(edges**2, axis=1), 0.0, 1.0)
+    places = polygon + shares[:, None] * edges
+    return np.asarray(places[int(np.argmin(np.linalg.norm(places - point, axis=1)))])

@@ -1,0 +1,48 @@
+"""Routes on which people walk: waypoints as points, with what the walk between them is like."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from plant.worlds.world import Point, RouteRule, StopRule
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A waypoint in the world frame, and how long the person stands there (s)."""
+
+    at_W: Point
+    pause_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Route:
+    """Where and how a person walks: m/s, set off at `start_s`, back from the last stop to the first if it `loops`.
+
+    A person who `yields` stops for a robot that is close ahead.
+    """
+
+    stops: tuple[Stop, ...]
+    speed_m_s: float = 1.2
+    loops: bool = False
+    start_s: float = 0.0
+    yields: bool = True
+
+    @property
+    def first_yaw_rad(self) -> float:
+        """The way that the person looks at first: towards the second stop."""
+        (x0, y0), (x1, y1) = self.stops[0].at_W, self.stops[min(1, len(self.stops) - 1)].at_W
+        return math.atan2(y1 - y0, x1 - x0)
+
+
+def route_of(rule: RouteRule, standing: Mapping[str, Point]) -> Route:
+    """The route of a rule whose places are known in `standing`."""
+
+    def stop(waypoint: Point | str | StopRule) -> Stop:
+        at, pause_s = (waypoint.at, waypoint.pause) if isinstance(waypoint, StopRule) else (waypoint, 0.0)
+        return Stop(standing[at] if isinstance(at, str) else at, pause_s)
+
+    stops = tuple(map(stop, rule.waypoints))
+    return Route(stops, rule.speed, rule.loop, rule.start, rule.yields)

@@ -1,0 +1,139 @@
+"""People who walk in the plant."""
+
+import math
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from plant.diagram import LooseModel, build_diagram
+from plant.models.catalogue import load_catalogue
+from plant.referee import Referee
+from plant.simulation import Engine
+from plant.worlds.route import Route, Stop
+from plant.worlds.world import WorldError
+from skills.robot import Pose2D
+
+FLOOR = """<sdf version="1.9"><model name="floor"><link name="floor">
+<collision name="top"><pose>0 0 -0.5 0 0 0</pose><geometry><box><size>20 20 1</size></box></geometry></collision>
+</link></model></sdf>"""
+WALL = """<sdf version="1.9"><model name="wall"><link name="wall">
+<collision name="wall"><pose>2 -2 1 0 0 0</pose><geometry><box><size>0.2 6 2</size></box></geometry></collision>
+</link></model></sdf>"""
+WORLD = """directives:
+- add_model: {name: floor, file: "%s"}
+- add_weld: {parent: world, child: "floor::floor"}
+- add_model: {name: wall, file: "%s"}
+- add_weld: {parent: world, child: "wall::wall"}
+"""
+START = Pose2D(-3.0, 0.0, 0.0)
+PERSON = load_catalogue()["person"].forms["standing"].path()
+
+
+class Hall:
+    """A floor with a wall, a robot and a person, and the referee."""
+
+    def __init__(self, folder, route, robot=START):
+        for name, text in (("floor", FLOOR), ("wall", WALL)):
+            (folder / f"{name}.sdf").write_text(text)
+        (folder / "world.dmd.yaml").write_text(
+            WORLD % tuple((folder / f"{name}.sdf").as_uri() for name in ("floor", "wall"))
+        )
+        (x, y), models = route.stops[0].at_W, []
+        models.append(LooseModel("Kim", PERSON, RigidTransform([x, y, 0.0]), slides=True))
+        self.world = build_diagram(
+            directives=folder / "world.dmd.yaml", models=models, robot_names=["Alice"], visuals=False, render=False
+        )
+        self.engine = Engine(self.world, {"Alice": robot}, routes={"Kim": route})
+        self.referee = Referee(self.world.plant, [], robots=["Alice"], persons=["Kim"], scenery=self.world.scenery)
+        self.engine.observe(lambda now_s: self.referee.observe(self.engine.context, now_s), every=4)
+
+    @property
+    def person_W(self):
+        body = self.world.plant.GetBodyByName("person")
+        return Pose2D.from_transform(self.world.plant.EvalBodyPoseInWorld(self.engine.context, body))
+
+    def drive(self, vx, seconds):
+        robot = self.engine.robots["Alice"]
+        robot.drive(vx, 0.0, 0.0, until_s=self.engine.now() + seconds, lease=robot.acquire_lease("test"))
+        self.engine.advance(seconds)
+
+
+@pytest.fixture
+def hall(tmp_path):
+    return lambda *points, robot=START, **options: Hall(
+        tmp_path, Route(tuple(Stop(point) for point in points), **options), robot
+    )
+
+
+def test_walks_where_the_route_leads_and_is_there_in_the_plant(hall):
+    stage = hall((0.0, 2.0), (0.0, -2.0), speed_m_s=1.0)
+    stage.engine.advance(2.0)
+    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert stage.person_W.yaw_rad == pytest.approx(-math.pi / 2, abs=0.01)
+
+
+def test_goes_around_the_wall_and_touches_it_nowhere(hall):
+    stage = hall((1.0, 0.0), (3.0, 0.0), speed_m_s=2.0)
+    places = []
+    for _ in range(60):
+        stage.engine.advance(0.05)
+        places.append((stage.person_W.x_m, stage.person_W.y_m))
+    assert places[-1] == pytest.approx((3.0, 0.0), abs=1e-6)
+    aside = [math.hypot(max(abs(x - 2.0) - 0.1, 0.0), max(y - 1.0, 0.0)) for x, y in places]
+    assert min(aside) > 0.22
+
+
+def test_a_route_into_the_wall_is_refused(hall):
+    with pytest.raises(WorldError, match="Kim cannot stand"):
+        hall((1.0, 0.0), (2.0, 0.0))
+
+
+def test_the_lidar_sees_somebody_walk(hall):
+    stage = hall((-1.0, 0.0), (0.0, 0.0), speed_m_s=1.0)
+
+    def ahead_m():
+        scan = stage.engine.robots["Alice"].scan()
+        return float(np.nanmin(scan.ranges_m[:, np.abs(scan.azimuths_rad) < 0.1]))
+
+    stage.engine.advance(0.1)
+    near_m = ahead_m()
+    stage.engine.advance(0.9)
+    assert ahead_m() - near_m == pytest.approx(0.9, abs=0.12)
+
+
+def test_who_yields_stops_for_a_robot_close_ahead_and_goes_on_when_it_has_left(hall):
+    stage = hall((-1.0, -2.0), (-1.0, 3.0), robot=Pose2D(-1.0, 0.5, 0.0))
+    stage.engine.advance(4.0)
+    held = stage.person_W.y_m
+    assert -0.6 < held < -0.4 and not stage.referee.collisions
+    stage.drive(-0.8, 4.0)
+    assert stage.person_W.y_m > 1.0 and not stage.referee.collisions
+
+
+def test_who_does_not_yield_walks_into_a_standing_robot_and_has_caused_it(hall):
+    stage = hall((-1.0, -2.0), (-1.0, 1.0), robot=Pose2D(-1.0, 0.5, 0.0), yields=False)
+    stage.engine.advance(4.0)
+    verdict = stage.referee.judge([])
+    assert (verdict.collisions, verdict.people_hit, verdict.hit_by_people) == (0, 0, 1)
+    assert "Kim walked into Alice's" in stage.referee.events[0]
+    assert stage.person_W.y_m == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_robot_that_drives_into_somebody_has_caused_it_and_does_not_push_them_away(hall):
+    stage = hall((-1.0, 0.0), (-1.0, 0.0))
+    stage.drive(0.6, 4.0)
+    verdict = stage.referee.judge([])
+    assert (verdict.collisions, verdict.people_hit, verdict.hit_by_people) == (1, 1, 0)
+    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((-1.0, 0.0), abs=0.02)
+
+
+def test_a_restored_walk_goes_on_where_it_was(hall):
+    stage = hall((0.0, 2.0), (0.0, -2.0), loops=True)
+    stage.engine.advance(1.0)
+    state, world = stage.engine.state(), {k: v.copy() for k, v in stage.engine.world_state().items()}
+    stage.engine.advance(1.0)
+    there = stage.person_W
+    stage.engine.restore(state, world)
+    stage.engine.advance(1.0)
+    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((there.x_m, there.y_m), abs=1e-6)

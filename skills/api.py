@@ -194,6 +194,14 @@ class LayeredView(Protocol):
         """Centres (N, 2) of the cells that are blocked by something seen that the map does not explain."""
 
 
+@runtime_checkable
+class ReturnsView(Protocol):
+    """A costmap that gives the LiDAR returns of the last scan that nothing surveyed explains."""
+
+    def unexplained(self) -> tuple[float, NDArray[np.float64]]:
+        """The scan's stamp and the returns (N, 3) in the world; of one scan alone, so not confirmed."""
+
+
 class Job(Protocol[ResultT_co]):
     """A job of the Worker."""
 

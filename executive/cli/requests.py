@@ -16,13 +16,14 @@ from executive.mission.command import parse_command
 from executive.mission.errors import InputError
 from executive.mission.file.model import DEFAULT_WORLD, Mission
 from executive.mission.file.overrides import overridden
+from executive.mission.file.people import routes_in
 from executive.mission.file.resolve import load_mission, mission_from_file
 from executive.mission.file.schema import MissionFile
 from executive.mission.knowledge import Knowledge, Pose
 from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
-from plant.worlds.world import World
+from plant.worlds.world import RouteRule, World, WorldError
 
 __all__ = ["Prepared", "fingerprint", "prepare", "replacing"]
 
@@ -88,8 +89,18 @@ def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:
     knowledge = overridden(loaded, knowledge)
     answer = answerer(request.answers, request.questions or loaded.questions, ask)
     mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
+    world = _with_people(loaded, world, knowledge)
     text = file.read_text(encoding="utf-8")
     return _prepared(replace(request, text=text), mission, world, knowledge)
+
+
+def _with_people(loaded: MissionFile, world: World, knowledge: Knowledge) -> World:
+    """The world with the people who walk in a mission's file. Raises InputError."""
+    routes = {name: RouteRule.model_validate(values) for name, values in routes_in(loaded, knowledge).items()}
+    try:
+        return world.with_routes(routes) if routes else world
+    except WorldError as error:
+        raise loaded.error(("people",), str(error), "choose another name") from error
 
 
 def _standing(request: Request, world: World) -> tuple[World, Knowledge]:

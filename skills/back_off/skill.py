@@ -13,6 +13,7 @@ from skills.api import Cause, Failed, Running, Skill, SkillContext, Step, Succee
 from skills.geometry import compose, relative
 from skills.navigate.base import Base
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
+from skills.navigate.scan_health import ScanHealth
 from skills.quantities import Delay, Length, Speed
 from skills.robot import Pose2D
 
@@ -46,6 +47,7 @@ class BackOff(Skill[BackOffInputs]):
     Options: ClassVar[type] = BackOffOptions
     options: BackOffOptions
     causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "the LiDAR does not work",
         Cause.PLANNING: "there is no clearance in any direction",
         Cause.EXECUTION: "the robot refuses to drive or makes no progress",
     }
@@ -62,6 +64,7 @@ class BackOff(Skill[BackOffInputs]):
         self._base = Base(self.context)
         self._inputs = inputs
         self._footprint = Footprint.of(self.context.robot.capabilities())
+        self._scans = ScanHealth(self.context)
         self._goal_O: Pose2D | None = None
         self._least_left_m, self._best_s = math.inf, self.context.clock.now()
         self._settled_s: float | None = None
@@ -71,6 +74,10 @@ class BackOff(Skill[BackOffInputs]):
         refusal = self._base.refusal()
         if refusal is not None:
             return Failed(Cause.EXECUTION, f"The robot refused to drive: {refusal}.")
+        trouble = self._scans.trouble()
+        if trouble is not None:
+            self._base.stop()
+            return Failed(Cause.PRECONDITION, f"{trouble} The robot does not back off blindly.")
         if self._goal_O is None:
             chosen = self._choose()
             if chosen is None:

@@ -60,6 +60,7 @@ class LayeredCostmap:
         self._next_expiry_s = math.inf
         self._now_s = -math.inf
         self._scan_stamp_s = -math.inf
+        self._returns_W: FloatArray = np.empty((0, 3))
         self._X_WB: Pose2D | None = None
         self._filter: SelfFilter | None = None
 
@@ -81,6 +82,10 @@ class LayeredCostmap:
     def seen_m(self) -> FloatArray:
         """Centres (x, y) of the cells that are blocked by something seen and not surveyed."""
         return self._layer.centres(np.argwhere(self._until_s > self._now_s))
+
+    def unexplained(self) -> tuple[float, FloatArray]:
+        """The last scan's stamp and those of its returns (N, 3) that the surveyed grid does not explain."""
+        return self._scan_stamp_s, self._returns_W
 
     def forget_seen(self) -> int:
         """Forget all that was seen and not surveyed; the number of cells that were blocked by it."""
@@ -156,6 +161,7 @@ class LayeredCostmap:
         points = self._unexplained(_placed(points_F, X_WF))
         if len(points):
             points = points[foreign(in_body_axes(points, X_WF))]
+        self._returns_W = points
         times = (scan.stamp_s, options.confirm_s, options.memory_s)
         cells = self._layer.cells(points)
         changed |= mark_cells(cells, points[:, 2].copy(), times, self._candidate_s, self._until_s, self._height_m)

@@ -10,10 +10,12 @@ from typing import ClassVar
 from skills.api import Cause, Costmap, Failed, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import relative
 from skills.navigate.base import Base
+from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.footprint import Footprint
 from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
+from skills.navigate.scan_health import ScanHealth, ScanHealthOptions
 from skills.perception.people_watch import PeopleOptions, PeopleWatch
 from skills.quantities import Delay, Duration, Length, Speed, Tries, Turn, TurnRate
 from skills.robot import Pose2D
@@ -42,6 +44,7 @@ class NavigateOptions:
 
     planning_latency_s: Delay = 0.3
     localising_patience_s: Delay = 3.0
+    blind_patience_s: Delay = 3.0
     blocked_patience_s: Delay = 1.5
     replan_pause_s: Delay = 2.0
     replans: Tries = 6
@@ -54,6 +57,8 @@ class NavigateOptions:
     low_obstacles: WatchOptions = field(default_factory=WatchOptions)
     people: PeopleOptions = field(default_factory=PeopleOptions)
     space: SpaceOptions = field(default_factory=SpaceOptions)
+    guard: GuardOptions = field(default_factory=GuardOptions)
+    scans: ScanHealthOptions = field(default_factory=ScanHealthOptions)
 
 
 class Navigate(Skill[NavigateInputs]):
@@ -64,9 +69,9 @@ class Navigate(Skill[NavigateInputs]):
     Options: ClassVar[type] = NavigateOptions
     outputs: ClassVar[Mapping[str, type]] = {}
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "localisation is lost, or the robot refuses to drive",
+        Cause.PRECONDITION: "localisation is lost, the LiDAR does not work, or the robot refuses to drive",
         Cause.PLANNING: "the goal is blocked or there is no path, even after waiting for obstacles to move",
-        Cause.EXECUTION: "the robot makes no progress, loses localisation, or refuses to drive on",
+        Cause.EXECUTION: "the robot makes no progress, loses localisation or its LiDAR, or refuses to drive on",
         Cause.POSTCONDITION: "it stands still, but not at the goal",
     }
     default_timeout_s: ClassVar[float] = 180.0
@@ -86,6 +91,9 @@ class Navigate(Skill[NavigateInputs]):
         self._watch = LowObstacleWatch(self.context, self.options.low_obstacles)
         self._people = PeopleWatch(self.context, self.options.people)
         self._pace = PaceManager(self._footprint, self.options.space)
+        self._scans = ScanHealth(self.context, self.options.scans)
+        self._blind_since_s: float | None = None
+        self._guard = CollisionGuard(self.context, self._footprint, self.options.guard)
         self._room_m = self.options.space.room_m
         self._person_s = self._person_since_s = -math.inf
         self._phase: Callable[[], Step] = self._localising
@@ -101,6 +109,9 @@ class Navigate(Skill[NavigateInputs]):
 
     def step(self) -> Step:
         """One tick: see `Skill.step`."""
+        blind = self._blind()
+        if blind is not None:
+            return blind
         if self._phase != self._localising and self._lost():
             self._base.stop()
             return Failed(Cause.EXECUTION, "The robot lost its place: its scans no longer agree with the map.")
@@ -130,6 +141,20 @@ class Navigate(Skill[NavigateInputs]):
             return False
         self._lost_since_s = self._now() if self._lost_since_s is None else self._lost_since_s
         return self._now() - self._lost_since_s > self.options.localising_patience_s
+
+    def _blind(self) -> Step | None:
+        """Stand as long as the LiDAR does not work, and fail when that takes too long."""
+        trouble, now_s = self._scans.trouble(), self._now()
+        if trouble is None:
+            self._blind_since_s = None
+            return None
+        self._base.stop()
+        self._best_s = now_s
+        self._blind_since_s = now_s if self._blind_since_s is None else self._blind_since_s
+        if now_s - self._blind_since_s <= self.options.blind_patience_s:
+            return Running(f"standing: {trouble}")
+        cause = Cause.EXECUTION if self._base.accepted else Cause.PRECONDITION
+        return Failed(cause, f"{trouble} The robot does not drive without it.")
 
     def _localising(self) -> Step:
         """Wait for the first agreement of a scan with the map."""
@@ -227,6 +252,9 @@ class Navigate(Skill[NavigateInputs]):
             self._base.drive((0.0, 0.0, 0.0))
             return Running("standing until scans agree with the map again")
         pose, velocity = self.context.pose(), self.context.robot.odometry().velocity
+        danger = self._guard.danger(pose, self._follower, self._inputs.max_speed_m_s)
+        if danger is not None:
+            return self._stand_at_once(danger)
         pace = self._paced(self._follower, pose)
         costmap = self._costmap(pose)
         answer = self._follower.command(pose, velocity, self._base.last_velocity, costmap, pace.most_m_s)
@@ -242,6 +270,12 @@ class Navigate(Skill[NavigateInputs]):
         if trouble is not None and self._job is None:
             return self._replan(trouble)
         return self._progress(answer.remaining_m)
+
+    def _stand_at_once(self, place_W: tuple[float, float]) -> Step:
+        """Brake as hard as the robot can, and stand."""
+        self._base.stop()
+        self._best_s = self._now()
+        return Running(f"standing, since something comes into the way at {_xy(place_W)}")
 
     def _paced(self, follower: LocalController, pose: Pose2D) -> Pace:
         """How fast people near the way let the robot go."""

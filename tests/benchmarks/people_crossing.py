@@ -33,12 +33,14 @@ from plant.worlds.builder.own import world_from_grid
 from plant.worlds.world import RouteRule
 from skills.robot import Pose2D
 
-CELL_M, HALL_M, DEPTH_M = 0.05, (11.0, 3.2), 1.6
+CELL_M, HALL_M, DEPTH_M = 0.05, (11.0, 4.4), 1.6
 OPENINGS_M = (3.5, 5.5, 7.5)
 WIDTH_M = 1.0
-START, GOAL_X_M, WAY_Y_M = Pose2D(1.0, DEPTH_M + 1.6, 0.0), 10.0, DEPTH_M + 1.6
+WAY_Y_M, GOAL_X_M = DEPTH_M + HALL_M[1] / 2.0, 10.0
+START = Pose2D(1.0, WAY_Y_M, 0.0)
 STEP_IN_M, FRONT_M, HALF_SWATH_M = 1.2, 0.55, 0.5
 BODY_M = 0.15
+ASIDE_M = {"steps_in": (0.8, 1.5), "crosses": (1.3, 1.8)}
 NOBODY = "nobody"
 
 
@@ -78,14 +80,14 @@ def case(what: str, number: int) -> Case:
     side = float(rng.choice([-1.0, 1.0]))
     hidden = rng.random() < 0.5
     x = float(rng.choice(OPENINGS_M) if hidden else rng.uniform(3.5, 7.5))
-    aside_m = float(rng.uniform(1.9, 2.4) if hidden else rng.uniform(0.8, 1.2))
+    aside_m = float(rng.uniform(2.5, 3.0) if hidden else rng.uniform(*ASIDE_M[what]))
     robot_m_s = float(rng.uniform(0.5, 1.0))
     start_W = (x, WAY_Y_M + side * aside_m)
     if what == "steps_in":
         to_W = (x, WAY_Y_M + float(rng.uniform(-0.25, 0.25)))
         return Case(what, number, robot_m_s, start_W, to_W, float(rng.uniform(0.8, 1.4)), STEP_IN_M)
-    beyond_m = float(rng.uniform(0.9, 1.2))
-    gap_m = float(rng.uniform(-1.0, 1.2))
+    beyond_m = float(rng.uniform(1.2, 1.8))
+    gap_m = float(rng.uniform(-0.8, 1.2))
     return Case(what, number, robot_m_s, start_W, (x, WAY_Y_M - side * beyond_m), 1.2, gap_m)
 
 

@@ -22,6 +22,7 @@ from executive.mission.file.model import (
     StepGuards,
     StepPolicy,
 )
+from executive.mission.file.people import RouteFile
 from executive.mission.yaml_source import Name, Text, YamlSource
 from skills.quantities import Duration, bounds, without_range, without_unit
 
@@ -155,6 +156,9 @@ class MissionFile(PolicyFile):
     robot: Name | None = Field(None, description="The robot's name; by default that of the world.")
     knowledge: dict[str, Any] | None = Field(
         None, description="Laid over the world's knowledge: what stands here replaces what stands there, key by key."
+    )
+    people: dict[Name, RouteFile] | None = Field(
+        None, description="People who walk while the mission runs, by name: new ones, or those of the world."
     )
     parameters: dict[str, Scalar] | None = Field(
         None,

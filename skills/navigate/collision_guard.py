@@ -1,0 +1,134 @@
+"""Stops the robot before what moves into its way, or stands in it so suddenly that no costmap knows of it yet.
+
+Others plan and follow; this looks at the last LiDAR revolution only, and stops as hard as the robot can.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from skills.api import ReturnsView, SkillContext
+from skills.navigate.footprint import Footprint, disc_centres
+from skills.navigate.path import TURN_M_PER_RAD
+from skills.perception.moving import Moving, MovingOptions, MovingWatch
+from skills.quantities import Acceleration, Count, Delay, Duration, Length, Margin, Speed
+from skills.robot import FloatArray, Pose2D
+from skills.stack import LocalController
+
+Place = tuple[float, float]
+_STEP_S = 0.1
+
+
+@dataclass(frozen=True)
+class GuardOptions:
+    """The robot stands while something that moves would come within `margin_m` of it in the next `horizon_s`.
+
+    It is taken to drive on along its path, to gain speed at `acceleration_m_s2` up to its limit, or to go on as it does
+    now for `coasting_s`. What moves slower than `slow_m_s` does not count. Returns that nothing explains stop it where
+    `least_points` of them lie within `touch_m` of the ground that it covers until it stands: after `reaction_s`, at
+    `stop_m_s2`. It goes on once all has been clear for `clear_s`.
+    """
+
+    horizon_s: Duration = 1.3
+    margin_m: Margin = 0.2
+    acceleration_m_s2: Acceleration = 0.8
+    coasting_s: Duration = 0.6
+    slow_m_s: Speed = 0.35
+    touch_m: Margin = 0.05
+    least_points: Count = 3
+    reaction_s: Delay = 0.15
+    stop_m_s2: Acceleration = 3.0
+    clear_s: Delay = 0.3
+    near_m: Length = 4.0
+    moving: MovingOptions = field(default_factory=MovingOptions)
+
+
+class CollisionGuard:
+    """Tells from tick to tick whether the robot must stand, and because of what. Idle without unexplained returns."""
+
+    def __init__(self, context: SkillContext, footprint: Footprint, options: GuardOptions | None = None) -> None:
+        self._context, self._footprint = context, footprint
+        self._options = options or GuardOptions()
+        self._watch = MovingWatch(self._options.moving)
+        self._danger_s, self._place_W = -math.inf, (0.0, 0.0)
+
+    def danger(self, here: Pose2D, follower: LocalController, most_m_s: float) -> Place | None:
+        """The place (x, y) of what the robot, on its path at most_m_s at most, would run into; None when it may go."""
+        costmap, now_s = self._context.costmap, self._context.clock.now()
+        if not isinstance(costmap, ReturnsView):
+            return None
+        stamp_s, returns_W = costmap.unexplained()
+        moving = self._watch.take(stamp_s, returns_W)
+        found = self._suddenly_ahead(here, returns_W) or self._crossing(here, follower, most_m_s, moving, now_s)
+        if found is not None:
+            self._danger_s, self._place_W = now_s, found
+        return self._place_W if now_s - self._danger_s < self._options.clear_s else None
+
+    def _suddenly_ahead(self, here: Pose2D, returns_W: FloatArray) -> Place | None:
+        """Returns on the ground that the robot covers until it stands."""
+        velocity, options = self._velocity_W(here), self._options
+        speed = float(np.linalg.norm(velocity[:2]))
+        if len(returns_W) < options.least_points or speed < 0.05:
+            return None
+        until_s = options.reaction_s + 0.5 * speed / options.stop_m_s2
+        times = np.linspace(0.0, until_s, 1 + math.ceil(speed * until_s / 0.05))[1:]
+        near = returns_W[np.linalg.norm(returns_W[:, :2] - (here.x_m, here.y_m), axis=1) < 1.5 + speed, :2]
+        then_m = self._apart_m(_coasting(here, velocity, times), near).min(axis=0, initial=math.inf)
+        now_m = self._apart_m(_coasting(here, velocity, np.zeros(1)), near)[0]
+        hit = near[(then_m < options.touch_m) & (then_m < now_m - 0.02)]
+        return None if len(hit) < options.least_points else _place(hit.mean(axis=0))
+
+    def _crossing(
+        self, here: Pose2D, follower: LocalController, most_m_s: float, moving: tuple[Moving, ...], now_s: float
+    ) -> Place | None:
+        """Where the first thing is that moves into the way."""
+        options = self._options
+        moving = tuple(one for one in moving if math.hypot(*one.velocity_W) >= options.slow_m_s)
+        if not moving:
+            return None
+        times = np.arange(0.0, options.horizon_s + 1e-9, _STEP_S)
+        velocity = self._velocity_W(here)
+        on_path = self._on_path(follower, float(np.linalg.norm(velocity[:2])), most_m_s, times)
+        coasting = _coasting(here, velocity, np.minimum(times, options.coasting_s))
+        for one in moving:
+            places_W = one.places_W(times, now_s)
+            for poses in (on_path, coasting):
+                centres = disc_centres(self._footprint, poses)
+                apart_m = np.linalg.norm(centres - places_W[:, None], axis=2) - self._footprint.discs[:, 2]
+                if float(apart_m.min()) < options.margin_m + one.radius_m:
+                    return one.place_W
+        return None
+
+    def _on_path(self, follower: LocalController, speed: float, most_m_s: float, times: FloatArray) -> FloatArray:
+        """Poses (N, 3) on the path at these times."""
+        path = follower.ahead(most_m_s * self._options.horizon_s)
+        steps = np.abs(np.diff(path, axis=0))
+        lengths = np.hypot(steps[:, 0], steps[:, 1]) + TURN_M_PER_RAD * np.minimum(steps[:, 2], math.tau - steps[:, 2])
+        ways = np.concatenate([[0.0], np.cumsum(lengths)])
+        gained = np.minimum(speed + self._options.acceleration_m_s2 * times, max(most_m_s, speed))
+        driven = np.concatenate([[0.0], np.cumsum(0.5 * (gained[1:] + gained[:-1]) * np.diff(times))])
+        return np.asarray(path[np.minimum(np.searchsorted(ways, driven), len(path) - 1)])
+
+    def _apart_m(self, poses: FloatArray, points_W: FloatArray) -> FloatArray:
+        """Distances (N, points) from the outline at poses to points."""
+        centres = disc_centres(self._footprint, poses)
+        offsets = np.linalg.norm(centres[:, :, None] - points_W[None, None], axis=3)
+        return np.asarray(np.min(offsets - self._footprint.discs[None, :, 2:3], axis=1))
+
+    def _velocity_W(self, here: Pose2D) -> FloatArray:
+        """The body's velocity (vx, vy, wz) in the world's axes."""
+        vx, vy, wz = self._context.robot.odometry().velocity
+        c, s = math.cos(here.yaw_rad), math.sin(here.yaw_rad)
+        return np.array([c * vx - s * vy, s * vx + c * vy, wz])
+
+
+def _coasting(here: Pose2D, velocity_W: FloatArray, times: FloatArray) -> FloatArray:
+    """Poses (N, 3) of a body that goes on as it does."""
+    return np.array([here.x_m, here.y_m, here.yaw_rad]) + times[:, None] * velocity_W
+
+
+def _place(point: FloatArray) -> Place:
+    return float(point[0]), float(point[1])

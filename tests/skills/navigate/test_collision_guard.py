@@ -1,0 +1,111 @@
+"""The robot stops for what moves into its way, and for what is in it all at once."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planar_people import person_at
+from planar_robot import OUTLINE, TWO_ROOMS, Bench
+
+from skills.api import Running, Succeeded
+from skills.navigate.collision_guard import CollisionGuard
+from skills.navigate.footprint import Footprint, disc_centres, pose_array
+from skills.navigate.skill import Navigate, NavigateInputs, NavigateOptions
+from skills.robot import Pose2D
+
+FOOTPRINT = Footprint.rectangle(OUTLINE)
+START, GOAL = Pose2D(1.2, 5.6, 0.0), Pose2D(8.5, 5.6, 0.0)
+
+
+class Drive:
+    """A drive along the corridor, with somebody who is at `place(time_s, robot_x)` or, while that is None, nowhere."""
+
+    def __init__(self, place, *, options=None, most_s=60.0):
+        self.bench = Bench(START, surveyed=TWO_ROOMS)
+        fixed = list(self.bench.robot.boxes)
+        skill = Navigate(self.bench.context(), options)
+        skill.begin(NavigateInputs(GOAL))
+        self.gaps, self.told, step = [], [], skill.step()
+        while isinstance(step, Running) and self.bench.clock.now() < most_s:
+            self.told.append(step.message)
+            x, there = self.bench.robot.pose.x_m, None
+            there = place(self.bench.clock.now(), x)
+            self.bench.robot.boxes[:] = fixed if there is None else [*fixed, person_at(*there)]
+            self.bench.tick()
+            if there is not None:
+                speed = float(np.hypot(*self.bench.robot.velocity[:2]))
+                self.gaps.append((self.gap_m(there), speed, x))
+            step = skill.step()
+        skill.end()
+        self.step = step
+
+    def gap_m(self, there):
+        """From the outline to the axis of the person."""
+        centres = disc_centres(FOOTPRINT, pose_array([self.bench.robot.pose]))[0]
+        return float(np.min(np.linalg.norm(centres - there, axis=1) - FOOTPRINT.discs[:, 2]))
+
+    def nearest_while_moving_m(self):
+        """The least gap while the robot moves; once somebody walks through it, as nobody can, it counts no more."""
+        through = next((n for n, (gap, _, _) in enumerate(self.gaps) if gap < 0.0), len(self.gaps))
+        return min((gap for gap, speed, _ in self.gaps[:through] if speed > 0.05), default=np.inf)
+
+    def stood(self):
+        return [one for one in self.told if "something comes into the way" in one]
+
+
+class Crossing:
+    """Somebody who walks across once the robot has come to `from_x`, from y to y at a speed."""
+
+    def __init__(self, x, y0, y1, from_x, speed_m_s=1.2):
+        self.x, self.y0, self.y1, self.from_x, self.speed_m_s, self.since_s = x, y0, y1, from_x, speed_m_s, None
+
+    def __call__(self, now_s, robot_x):
+        if robot_x >= self.from_x and self.since_s is None:
+            self.since_s = now_s
+        way = 0.0 if self.since_s is None else min(abs(self.y1 - self.y0), self.speed_m_s * (now_s - self.since_s))
+        return self.x, self.y0 + np.sign(self.y1 - self.y0) * way
+
+
+@pytest.mark.parametrize("from_x", [2.0, 2.7, 3.3])
+def test_it_stands_while_somebody_crosses_and_goes_on(from_x):
+    drive = Drive(Crossing(4.0, 4.4, 6.7, from_x))
+    assert drive.nearest_while_moving_m() > 0.25
+    assert isinstance(drive.step, Succeeded)
+
+
+def test_it_stands_at_once_for_who_comes_from_nowhere_just_ahead():
+    drive = Drive(lambda now_s, x: (4.6, 5.6) if x > 3.58 else None, most_s=9.0)
+    assert drive.stood()
+    assert drive.nearest_while_moving_m() > 0.2
+
+
+def test_without_the_guard_it_comes_nearer_to_who_comes_from_nowhere():
+    class Off(CollisionGuard):
+        def danger(self, *_):
+            return None
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("skills.navigate.skill.CollisionGuard", Off)
+        without = Drive(lambda now_s, x: (4.6, 5.6) if x > 3.58 else None, most_s=9.0)
+    assert not without.stood()
+
+
+def test_who_walks_beside_the_way_does_not_stop_it():
+    drive = Drive(lambda now_s, x: (1.5 + 0.6 * now_s, 4.5))
+    assert not drive.stood() and isinstance(drive.step, Succeeded)
+
+
+def test_who_stands_beside_the_way_does_not_stop_it():
+    drive = Drive(lambda now_s, x: (4.6, 4.6))
+    assert not drive.stood() and isinstance(drive.step, Succeeded)
+
+
+def test_who_walks_away_ahead_does_not_stop_it():
+    drive = Drive(lambda now_s, x: (3.2 + 0.9 * now_s, 5.6) if now_s < 5.5 else None)
+    assert not drive.stood() and isinstance(drive.step, Succeeded)
+
+
+def test_the_margin_is_an_option():
+    options = NavigateOptions()
+    wide = replace(options, guard=replace(options.guard, margin_m=1.0))
+    assert Drive(lambda now_s, x: (1.5 + 0.6 * now_s, 4.5), options=wide, most_s=15.0).stood()

@@ -1,0 +1,107 @@
+"""Without its LiDAR the robot stands, and says why."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planar_robot import TWO_ROOMS, Bench
+
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.back_off.skill import BackOff, BackOffInputs
+from skills.navigate.scan_health import ScanHealth
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.robot import Pose2D
+from skills.testing.faults import with_faults
+
+START, GOAL = Pose2D(1.2, 5.4, 0.0), Pose2D(4.0, 5.4, 0.0)
+
+
+class Repeating:
+    """A robot whose LiDAR repeats the scan of a moment with new stamps."""
+
+    def __init__(self, robot, clock, from_s):
+        self._robot, self._clock, self._from_s, self._kept = robot, clock, from_s, None
+
+    def __getattr__(self, name):
+        return getattr(self._robot, name)
+
+    def scan(self):
+        scan = self._robot.scan()
+        if self._clock.now() < self._from_s or scan is None:
+            self._kept = scan
+            return scan
+        return replace(self._kept, stamp_s=scan.stamp_s)
+
+
+def drive(*faults, wrap=None, seconds=20.0):
+    """How a drive ends, where the robot stood when the LiDAR failed for half a second, and where at the end."""
+    bench = Bench(START, surveyed=TWO_ROOMS)
+    bench.robot = wrap(bench) if wrap else with_faults(bench.robot, bench.clock, faults)
+    bench.tick()
+    skill = Navigate(bench.context())
+    skill.begin(NavigateInputs(GOAL))
+    step, places = skill.step(), []
+    while isinstance(step, Running) and bench.clock.now() < seconds:
+        bench.tick()
+        places.append((bench.clock.now(), bench.robot.pose.x_m))
+        step = skill.step()
+    skill.end()
+    return step, places
+
+
+def driven_after(places, time_s):
+    """How far it drove after a time."""
+    return places[-1][1] - next(x for at_s, x in places if at_s >= time_s)
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ("scan is missing from 1.5 s", "gives no scans"),
+        ("lidar freezes at 1.5 s", "gives no new scans"),
+        ("lidar returns garbage from 1.5 s", "ranges are invalid"),
+    ],
+)
+def test_a_lidar_that_fails_on_the_way_is_told_and_the_robot_stands(fault, message):
+    step, places = drive(fault)
+    assert isinstance(step, Failed) and step.cause is Cause.EXECUTION and message in step.message
+    assert places[-1][0] < 6.0
+    assert driven_after(places, 2.4) < 0.02
+
+
+def test_a_scan_that_is_repeated_with_new_stamps_is_told():
+    step, places = drive(wrap=lambda bench: Repeating(bench.robot, bench.clock, 1.5))
+    assert isinstance(step, Failed) and step.cause is Cause.EXECUTION and "repeats its last scan" in step.message
+    assert driven_after(places, 2.4) < 0.02
+
+
+def test_a_robot_without_scans_does_not_set_out():
+    step, places = drive("scan is missing")
+    assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION and "gives no scans" in step.message
+    assert driven_after(places, 0.0) == pytest.approx(0.0)
+
+
+def test_a_silence_of_a_moment_is_waited_for():
+    step, _ = drive("scan is missing from 1.5 s to 3 s")
+    assert isinstance(step, Succeeded)
+
+
+def test_some_lost_returns_are_no_trouble():
+    bench = Bench(START, surveyed=TWO_ROOMS)
+    for _ in range(4):
+        bench.tick()
+    context = bench.context()
+    assert ScanHealth(context).trouble() is None
+    scan = context.robot.scan()
+    holes = np.where(np.arange(scan.ranges_m.size).reshape(scan.ranges_m.shape) % 10, np.nan, scan.ranges_m)
+    bench.robot.scan = lambda: replace(scan, ranges_m=holes.astype(np.float32))
+    assert ScanHealth(bench.context()).trouble() is None
+
+
+def test_it_does_not_back_off_blindly():
+    bench = Bench(START, surveyed=TWO_ROOMS)
+    bench.robot = with_faults(bench.robot, bench.clock, ["scan is missing"])
+    skill = BackOff(bench.context())
+    skill.begin(BackOffInputs())
+    step = skill.step()
+    assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION and "gives no scans" in step.message

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pydrake.geometry import Box, Cylinder
 from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
@@ -332,6 +333,29 @@ def test_every_part_that_touches_the_person_collides(link):
     stage = Stage().put(link, (0, 3 - 0.2 - (0.009 if link.startswith("arm") else 0.049), 0.9)).watch()
     assert len(stage.referee.collisions) == 1
     assert "robin" in stage.referee.collisions[0].sentence
+
+
+def test_all_parts_that_touch_one_person_are_one_contact_and_who_stood_did_not_cause_it():
+    stage = Stage().put("body", (0, 3 - 0.2 - 0.049, 0.9)).put("fl_lleg", (0, 3 + 0.2 + 0.049, 0.9)).watch()
+    verdict = stage.referee.judge([])
+    assert (verdict.collisions, verdict.people_hit, verdict.hit_by_people) == (0, 0, 1)
+    assert "robin walked into alice's" in stage.referee.events[0]
+
+
+@pytest.mark.parametrize(("speed", "hit"), [(0.3, 1), (0.04, 0)])
+def test_a_robot_that_moved_before_it_touched_a_person_caused_it(speed, hit):
+    stage = Stage()
+    velocity = SpatialVelocity([0, 0, 0], [0, speed, 0])
+    stage.plant.SetFreeBodySpatialVelocity(context=stage.context, body=stage.bodies["body"], V_JpJc=velocity)
+    stage.watch(0.1).put("body", (0, 3 - 0.2 - 0.049, 0.9)).watch()
+    verdict = stage.referee.judge([])
+    assert (verdict.collisions, verdict.people_hit, verdict.hit_by_people) == (hit, hit, 1 - hit)
+
+
+def test_contacts_with_people_outlive_a_restart():
+    stage, other = Stage().put("body", (0, 3 - 0.2 - 0.049, 0.9)).watch(), Stage()
+    other.referee.restore(stage.referee.state(), {"alice": stage.referee.path("alice")})
+    assert other.referee.collisions == stage.referee.collisions
 
 
 def test_feet_on_the_floor_and_hands_on_objects_are_no_collisions():

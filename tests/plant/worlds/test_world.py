@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from plant.worlds.placement import place_objects, place_people
-from plant.worlds.world import WORLDS_FOLDER, World, WorldError, known_worlds, load_world
+from plant.worlds.world import WORLDS_FOLDER, RouteRule, World, WorldError, known_worlds, load_world
 from skills.robot import Pose2D
 
 
@@ -114,3 +114,54 @@ def test_a_surface_without_a_front_is_refused(copy: Path) -> None:
     replace(copy / "objects.yaml", "surfaces: [kitchen counter, kitchen table]", "surfaces: [desk]")
     with pytest.raises(WorldError, match="'desk' may carry things but has no entry under `fronts`"):
         load_world(copy)
+
+
+WALKER = """people:
+  - name: Kim
+    route: {waypoints: [kitchen, {at: [8.0, 4.0], pause: 2}, desk], speed: 0.9, loop: true, start: 5, yields: false}
+"""
+
+
+def with_people(copy: Path, people: str) -> Path:
+    path = copy / "objects.yaml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text[: text.index("people:")] + people, encoding="utf-8")
+    return copy
+
+
+def test_a_person_walks_on_a_route_of_places_and_points(copy: Path) -> None:
+    (kim,) = place_people(load_world(with_people(copy, WALKER)), seed=1)
+    assert kim.route is not None
+    assert [(stop.at_W, stop.pause_s) for stop in kim.route.stops] == [
+        ((8.4, 6.9), 0.0), ((8.0, 4.0), 2.0), ((5.75, 1.75), 0.0)
+    ]  # fmt: skip
+    assert (kim.route.speed_m_s, kim.route.loops, kim.route.start_s, kim.route.yields) == (0.9, True, 5.0, False)
+    assert tuple(kim.X_WO.translation()[:2]) == (8.4, 6.9)
+
+
+@pytest.mark.parametrize(
+    ("people", "says"),
+    [
+        ("people: [{name: Kim}]", "give either 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'"),
+        ("people: [{name: Kim, route: {waypoints: []}}]", "route.waypoints"),
+        ("people: [{name: Kim, route: {waypoints: [kitchn]}}]", "Kim cannot walk to 'kitchn'.*did you mean 'kitchen'"),
+        ("people: [{name: Kim, route: {waypoints: [kitchen], speed: 9}}]", "route.speed"),
+        ("people: [{name: coke, route: {waypoints: [kitchen]}}]", "'coke' names two objects or people"),
+    ],
+)
+def test_a_wrong_person_is_refused(copy: Path, people: str, says: str) -> None:
+    with pytest.raises(WorldError, match=says):
+        load_world(with_people(copy, people))
+
+
+def test_routes_are_added_and_take_the_place_of_who_stands() -> None:
+    world = load_world("flat")
+    walking = world.with_routes(
+        {"Robin": RouteRule(waypoints=("kitchen", "office")), "Kim": RouteRule(waypoints=((4.0, 4.5),))}
+    )
+    assert [(each.name, each.route is not None) for each in place_people(walking, 1)] == [
+        ("Robin", True), ("Kim", True)
+    ]  # fmt: skip
+    assert [each.name for each in place_people(world, 1)] == ["Robin"]
+    with pytest.raises(WorldError, match="'hammer' names two"):
+        world.with_routes({"hammer": RouteRule(waypoints=("kitchen",))})

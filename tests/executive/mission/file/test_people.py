@@ -1,0 +1,75 @@
+"""People who walk in a mission file."""
+
+import pytest
+
+from executive.mission.errors import InputError
+from executive.mission.file.people import routes_in
+from executive.mission.file.resolve import load_mission
+
+WALKS = """\
+name: busy
+people:
+  Robin:
+    waypoints: [kitchen, [4.0, 4.5], {at: worktop, pause: 2}]
+    speed: 0.9
+    loop: true
+    start: 5
+    yields: false
+  Kim: {waypoints: [office]}
+steps:
+  - to: kitchen
+"""
+
+
+def loaded(tmp_path, text):
+    path = tmp_path / "mission.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_mission(path)
+
+
+def test_places_become_points_by_any_of_their_names(tmp_path, flat):
+    routes = routes_in(loaded(tmp_path, WALKS), flat)
+    counter = flat.place_pose("kitchen counter")
+    assert routes["Robin"] == {
+        "waypoints": [
+            {"at": (8.4, 6.9), "pause": 0.0},
+            {"at": (4.0, 4.5), "pause": 0.0},
+            {"at": (counter.x, counter.y), "pause": 2.0},
+        ],
+        "speed": 0.9,
+        "loop": True,
+        "start": 5.0,
+        "yields": False,
+    }
+    assert (routes["Kim"]["speed"], routes["Kim"]["loop"], routes["Kim"]["yields"]) == (1.2, False, True)
+
+
+def test_a_mission_without_people_has_no_routes(tmp_path, flat):
+    assert routes_in(loaded(tmp_path, "name: alone\nsteps: [{to: kitchen}]\n"), flat) == {}
+
+
+def test_a_place_that_nobody_knows_is_refused_at_its_line(tmp_path, flat):
+    with pytest.raises(InputError, match="unknown place 'kitchn'") as error:
+        routes_in(loaded(tmp_path, WALKS.replace("[kitchen,", "[kitchn,")), flat)
+    assert (error.value.line, error.value.hint) == (4, "did you mean 'kitchen'?")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("speed: 0.9", "speed: 9", 5),
+        ("loop: true", "loops: true", 6),
+        ("start: 5", "start: -1", 7),
+        ("pause: 2", "pause: soon", 4),
+        ("[office]", "[]", 9),
+    ],
+)
+def test_a_wrong_route_is_refused_at_its_line(tmp_path, old, new, line):
+    with pytest.raises(InputError) as error:
+        loaded(tmp_path, WALKS.replace(old, new))
+    assert error.value.line == line
+
+
+def test_a_file_that_is_used_brings_no_people_of_its_own(compile_text):
+    with pytest.raises(InputError, match="'people' of a file that is used"):
+        compile_text("name: all\nsteps:\n  - use: busy.yaml\n", busy=WALKS)

@@ -100,7 +100,7 @@ def _with_people(loaded: MissionFile, world: World, knowledge: Knowledge) -> Wor
     try:
         return world.with_routes(routes) if routes else world
     except WorldError as error:
-        raise loaded.error(("people",), str(error), "choose another name") from error
+        raise loaded.error(("people",), str(error), "change the route or its name here") from error
 
 
 def _standing(request: Request, world: World) -> tuple[World, Knowledge]:

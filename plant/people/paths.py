@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable, Sequence
 
@@ -36,16 +37,26 @@ class Ground:
         corners = np.concatenate([*outlines_W, np.array([*points_W], dtype=np.float64).reshape(-1, 2)])
         self._low = corners.min(axis=0) - 1.0
         columns, rows = np.ceil((corners.max(axis=0) + 1.0 - self._low) / _CELL_M).astype(int)
-        free = np.full((rows, columns), 255, np.uint8)
-        for outline in outlines_W:
-            cells = np.round(((outline - self._low) / _CELL_M - 0.5) * 16).astype(np.int32)
-            cv2.fillConvexPoly(free, cells, 0, shift=4)
-        self._clearance_m = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _CELL_M
+        self._free = np.full((rows, columns), 255, np.uint8)
+        self._block(outlines_W)
 
     @staticmethod
     def of(plant: MultibodyPlant, inspector: SceneGraphInspector, points_W: Iterable[Point]) -> Ground:
         """The ground of a finalized plant: what is fixed to the world is in the way."""
         return Ground([*_outlines_W(plant, inspector)], points_W)
+
+    def around(self, outlines_W: Iterable[FloatArray]) -> Ground:
+        """The same with something more in the way."""
+        other = copy.copy(self)
+        other._free = self._free.copy()
+        other._block(outlines_W)
+        return other
+
+    def _block(self, outlines_W: Iterable[FloatArray]) -> None:
+        for outline in outlines_W:
+            cells = np.round(((outline - self._low) / _CELL_M - 0.5) * 16).astype(np.int32)
+            cv2.fillConvexPoly(self._free, cells, 0, shift=4)
+        self._clearance_m = cv2.distanceTransform(self._free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _CELL_M
 
     def way(self, start_W: Point, goal_W: Point, *, who: str) -> tuple[Point, ...]:
         """The corners of a short way, start and goal included. Raises WorldError: there is none for `who`."""

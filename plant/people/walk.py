@@ -39,6 +39,7 @@ class Walk:
         self._legs, self._lengths_m = tuple(legs), [leg.lengths_m() for leg in legs]
         self._speed_m_s, self._loops = speed_m_s, loops
         self._leg, self._way_m, self._wait_s = 0, 0.0, start_s
+        self._detour: tuple[Leg, tuple[float, ...]] | None = None
         self.place_W, self.yaw_rad, self.heading_rad = at_W, yaw_rad, yaw_rad
 
     @property
@@ -55,6 +56,21 @@ class Walk:
         """End the pause."""
         self._wait_s = 0.0
 
+    def detour(self, corners_W: tuple[Point, ...]) -> None:
+        """Go to the next stop on another way, from here."""
+        leg = Leg(corners_W, self._legs[self._leg].pause_s)
+        self._detour, self._way_m = (leg, leg.lengths_m()), 0.0
+
+    @property
+    def next_stop_W(self) -> Point:
+        """Where the leg under way ends. Raises IndexError: the route is done."""
+        return self._legs[self._leg].corners_W[-1]
+
+    @property
+    def on_detour(self) -> bool:
+        """Whether the person walks on another way than the planned one."""
+        return self._detour is not None
+
     def advance(self, dt_s: float) -> None:
         """Go on for dt_s."""
         if self.done:
@@ -62,13 +78,14 @@ class Walk:
         if self._wait_s > 0.0:
             self._wait_s -= dt_s
             return
-        corners, lengths_m = self._legs[self._leg].corners_W, self._lengths_m[self._leg]
+        leg, lengths_m = self._detour or (self._legs[self._leg], self._lengths_m[self._leg])
+        corners = leg.corners_W
         self._way_m = min(self._way_m + self._speed_m_s * dt_s, lengths_m[-1])
         after = min(bisect.bisect_right(lengths_m, self._way_m), len(corners) - 1)
         if after > 0:
             self._stand_between(corners[after - 1], corners[after], self._way_m - lengths_m[after - 1], dt_s)
         if self._way_m >= lengths_m[-1]:
-            self._wait_s, self._way_m, self._leg = self._legs[self._leg].pause_s, 0.0, self._leg + 1
+            self._wait_s, self._way_m, self._leg, self._detour = leg.pause_s, 0.0, self._leg + 1, None
             if self._loops and self.done:
                 self._leg = 0
 
@@ -85,10 +102,16 @@ class Walk:
     def state(self) -> State:
         """How far the person is."""
         pose = [*self.place_W, self.yaw_rad, self.heading_rad]
-        return {"leg": self._leg, "way_m": self._way_m, "wait_s": self._wait_s, "pose": pose}
+        detour = None if self._detour is None else [[*corner] for corner in self._detour[0].corners_W]
+        return {"leg": self._leg, "way_m": self._way_m, "wait_s": self._wait_s, "pose": pose, "detour": detour}
 
     def restore(self, state: State) -> None:
         """Go on from such a state."""
         self._leg, self._way_m, self._wait_s = state["leg"], state["way_m"], state["wait_s"]
+        self._detour = None
+        if state["detour"] is not None:
+            way_m = self._way_m
+            self.detour(tuple((x, y) for x, y in state["detour"]))
+            self._way_m = way_m
         x, y, self.yaw_rad, self.heading_rad = state["pose"]
         self.place_W = (x, y)

@@ -7,6 +7,7 @@ touched at all, as long as nobody pushes.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Iterator, Mapping
@@ -21,6 +22,7 @@ from plant.people.walk import Leg, Walk
 from plant.snapshot.values import State
 from plant.spot.capabilities import spot_capabilities
 from plant.worlds.route import Route
+from plant.worlds.world import WorldError
 from skills.robot import FloatArray
 
 BODY_KG, BODY_M = 75.0, (0.2, 1.75)
@@ -29,6 +31,10 @@ YIELD_M = 0.8
 """Who yields stops when a robot's outline is nearer than this to their middle, and ahead."""
 AHEAD_RAD = 1.2
 """So far to either side of the way is ahead."""
+PATIENCE_S = 4.0
+"""Who has yielded so long looks for a way around the robots, and again after as long."""
+PASS_M = 0.22
+"""On a way around, they stop only for what is nearer than this."""
 _MOVED = 1e-9
 
 
@@ -46,12 +52,13 @@ class Walkers:
         for instance in self._instances.values():
             (body,) = (world.plant.get_body(index) for index in world.plant.GetBodyIndices(instance))
             body.SetSpatialInertiaInBodyFrame(context, inertia)
-        self._walks = self._planned(world) if routes else {}
-
-    def _planned(self, world: WorldDiagram) -> dict[str, Walk]:
-        points = (stop.at_W for route in self._routes.values() for stop in route.stops)
-        ground = Ground.of(world.plant, world.scene_graph.model_inspector(), points)
-        return {name: _walk(name, route, ground) for name, route in self._routes.items()}
+        self._held_s = dict.fromkeys(routes, 0.0)
+        self._walks: dict[str, Walk] = {}
+        self._ground: Ground | None = None
+        if routes:
+            points = (stop.at_W for route in routes.values() for stop in route.stops)
+            self._ground = ground = Ground.of(world.plant, world.scene_graph.model_inspector(), points)
+            self._walks = {name: _walk(name, route, ground) for name, route in routes.items()}
 
     def __getitem__(self, name: str) -> Walk:
         """The walk of one of them. Raises KeyError."""
@@ -61,10 +68,23 @@ class Walkers:
         """Put everybody where they are, with the velocity that leads to where they will be after dt_s."""
         for name, walk in self._walks.items():
             before = (*walk.place_W, walk.yaw_rad)
-            if not walk.walks or not self._held(name, walk):
+            if walk.walks and self._held(name, walk):
+                self._wait(name, walk, dt_s)
+            else:
+                self._held_s[name] = 0.0
                 walk.advance(dt_s)
             after = (*walk.place_W, walk.yaw_rad)
             self._set(name, np.array(before), (np.array(after) - before) / dt_s)
+
+    def _wait(self, name: str, walk: Walk, dt_s: float) -> None:
+        """Stand for a robot; after a while, look for a way around."""
+        self._held_s[name] += dt_s
+        if self._held_s[name] < PATIENCE_S or self._ground is None:
+            return
+        self._held_s[name] = 0.0
+        with contextlib.suppress(WorldError):
+            around = self._ground.around(self._outlines_W(walk))
+            walk.detour(around.way(walk.place_W, walk.next_stop_W, who=name))
 
     def _set(self, name: str, pose: FloatArray, velocity: FloatArray) -> None:
         """Set the body's (x, y, yaw) and their rates where they are others."""
@@ -91,19 +111,20 @@ class Walkers:
     def _close_ahead(self, walk: Walk, outline_W: FloatArray) -> bool:
         """Whether an outline is close to the person and before them."""
         offset = _nearest_on(outline_W, np.array(walk.place_W)) - walk.place_W
-        if float(np.hypot(*offset)) > YIELD_M:
+        if float(np.hypot(*offset)) > (PASS_M if walk.on_detour else YIELD_M):
             return False
         bearing_rad = math.remainder(math.atan2(offset[1], offset[0]) - walk.heading_rad, math.tau)
         return abs(bearing_rad) < AHEAD_RAD
 
     def state(self) -> State:
         """How far everybody is."""
-        return {name: walk.state() for name, walk in self._walks.items()}
+        return {name: {**walk.state(), "held_s": self._held_s[name]} for name, walk in self._walks.items()}
 
     def restore(self, state: State) -> None:
         """Go on from such a state. Raises KeyError: somebody is not in it."""
         for name, walk in self._walks.items():
             walk.restore(state[name])
+            self._held_s[name] = state[name]["held_s"]
 
 
 def _walk(name: str, route: Route, ground: Ground) -> Walk:

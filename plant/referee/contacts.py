@@ -14,7 +14,7 @@ Pair = tuple[int, int]
 
 FLOOR_Z_M = 0.04
 MOVES_M_S = 0.05
-"""A robot that was faster than this just before has caused a contact with a person."""
+"""A robot that was faster than this all along just before has caused a contact with a person."""
 
 
 def touching(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from plant.worlds.placement import Placement
 
 PATH_STEP_M = 0.02
+BEFORE_SAMPLES = 3
 
 
 class Referee:
@@ -53,7 +55,7 @@ class Referee:
         self.contact_points = 0
         self._bases: dict[str, FloatArray] = {}
         self._persons: dict[str, FloatArray] = {}
-        self._speeds_m_s: dict[str, float] = {}
+        self._speeds_m_s: deque[Mapping[str, float]] = deque(maxlen=BEFORE_SAMPLES)
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
@@ -85,8 +87,8 @@ class Referee:
         penetrations = self._geometry.Eval(plant_context).ComputePointPairPenetration()
         self.contact_points += len(penetrations)
         pairs = touching(penetrations, self._entities.of_geometry)
-        self._counter.update(time_s, pairs, self._speeds_m_s)
-        self._speeds_m_s = self._speeds(plant_context)
+        self._counter.update(time_s, pairs, self._speeds_before())
+        self._speeds_m_s.append(self._speeds(plant_context))
         self._bases = {name: self._position(plant_context, body) for name, body in self._entities.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._entities.persons.items()}
         for name, p_WB in self._bases.items():
@@ -143,6 +145,11 @@ class Referee:
     def points(self, robot: str) -> Sequence[FloatArray]:
         """The points of `path`, not to be changed; those that were there stay as more are added."""
         return self._paths[robot]
+
+    def _speeds_before(self) -> dict[str, float]:
+        """The least speed of each robot just before now: a push that began unnoticed does not count as its own."""
+        names = self._speeds_m_s[-1] if self._speeds_m_s else ()
+        return {name: min(speeds[name] for speeds in self._speeds_m_s) for name in names}
 
     def _speeds(self, plant_context: Context) -> dict[str, float]:
         """How fast each robot's body and hand are, the faster of the two (m/s); nothing where there is nobody."""

@@ -14,7 +14,7 @@ from skills.api import ReturnsView, SkillContext
 from skills.navigate.footprint import Footprint, disc_centres
 from skills.navigate.path import TURN_M_PER_RAD
 from skills.perception.moving import Moving, MovingOptions, MovingWatch
-from skills.quantities import Acceleration, Count, Delay, Duration, Length, Margin, Speed
+from skills.quantities import Acceleration, Count, Delay, Duration, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D
 from skills.stack import LocalController
 
@@ -27,7 +27,8 @@ class GuardOptions:
     """The robot stands while something that moves would come within `margin_m` of it in the next `horizon_s`.
 
     It is taken to drive on along its path, to gain speed at `acceleration_m_s2` up to its limit, or to go on as it does
-    now for `coasting_s`. What moves slower than `slow_m_s` does not count. Returns that nothing explains stop it where
+    now for `coasting_s`. What moves slower than `slow_m_s` does not count, nor what follows: from behind it, in its
+    own direction within `follows_rad`. Returns that nothing explains stop it where
     `least_points` of them lie within `touch_m` of the ground that it covers until it stands: after `reaction_s`, at
     `stop_m_s2`. It goes on once all has been clear for `clear_s`.
     """
@@ -37,6 +38,7 @@ class GuardOptions:
     acceleration_m_s2: Acceleration = 0.8
     coasting_s: Duration = 0.6
     slow_m_s: Speed = 0.35
+    follows_rad: Turn = 0.8
     touch_m: Margin = 0.05
     least_points: Count = 3
     reaction_s: Delay = 0.15
@@ -93,7 +95,7 @@ class CollisionGuard:
         velocity = self._velocity_W(here)
         on_path = self._on_path(follower, float(np.linalg.norm(velocity[:2])), most_m_s, times)
         coasting = _coasting(here, velocity, np.minimum(times, options.coasting_s))
-        for one in moving:
+        for one in (one for one in moving if not self._follows(one, here, on_path)):
             places_W = one.places_W(times, now_s)
             for poses in (on_path, coasting):
                 centres = disc_centres(self._footprint, poses)
@@ -101,6 +103,18 @@ class CollisionGuard:
                 if float(apart_m.min()) < options.margin_m + one.radius_m:
                     return one.place_W
         return None
+
+    def _follows(self, one: Moving, here: Pose2D, on_path: FloatArray) -> bool:
+        """Whether something comes from behind the robot and goes where it goes: standing would not help."""
+        way = on_path[-1, :2] - on_path[0, :2]
+        if float(np.linalg.norm(way)) < 0.05:
+            return False
+        towards = way / np.linalg.norm(way)
+        behind = float((np.array(one.place_W) - (here.x_m, here.y_m)) @ towards) < -0.5 * self._footprint.width_m
+        aligned = float(np.array(one.velocity_W) @ towards) > math.cos(self._options.follows_rad) * math.hypot(
+            *one.velocity_W
+        )
+        return behind and aligned
 
     def _on_path(self, follower: LocalController, speed: float, most_m_s: float, times: FloatArray) -> FloatArray:
         """Poses (N, 3) on the path at these times."""

@@ -347,7 +347,7 @@ def test_a_robot_that_moved_before_it_touched_a_person_caused_it(speed, hit):
     stage = Stage()
     velocity = SpatialVelocity([0, 0, 0], [0, speed, 0])
     stage.plant.SetFreeBodySpatialVelocity(context=stage.context, body=stage.bodies["body"], V_JpJc=velocity)
-    stage.watch(0.1).put("body", (0, 3 - 0.2 - 0.049, 0.9)).watch()
+    stage.watch(0.3).put("body", (0, 3 - 0.2 - 0.049, 0.9)).watch()
     verdict = stage.referee.judge([])
     assert (verdict.collisions, verdict.people_hit, verdict.hit_by_people) == (hit, hit, 1 - hit)
 

@@ -53,7 +53,7 @@ def routes_in(file: MissionFile, knowledge: Knowledge) -> dict[str, Mapping[str,
     for name, route in (file.people or {}).items():
         stops = []
         for index, waypoint in enumerate(route.waypoints):
-            stop = waypoint if isinstance(waypoint, StopFile) else StopFile(at=waypoint)
+            stop = waypoint if isinstance(waypoint, StopFile) else StopFile(at=waypoint, pause=0.0)
             with problems:
                 path = ("people", name, "waypoints", index)
                 stops.append({"at": _point(file, path, stop.at, knowledge), "pause": stop.pause})

@@ -137,3 +137,22 @@ def test_a_restored_walk_goes_on_where_it_was(hall):
     stage.engine.restore(state, world)
     stage.engine.advance(1.0)
     assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((there.x_m, there.y_m), abs=1e-6)
+
+
+def test_who_has_yielded_for_long_goes_around_the_robot(hall):
+    stage = hall((-1.0, -2.5), (-1.0, 3.5), robot=Pose2D(-1.0, 0.5, 0.0))
+    stage.engine.advance(12.0)
+    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((-1.0, 3.5), abs=1e-6)
+    assert not stage.referee.collisions
+
+
+def test_who_is_on_a_way_around_goes_on_with_it_after_a_restart(hall):
+    stage = hall((-1.0, -2.5), (-1.0, 3.5), robot=Pose2D(-1.0, 0.5, 0.0))
+    stage.engine.advance(6.0)
+    state, world = stage.engine.state(), {k: v.copy() for k, v in stage.engine.world_state().items()}
+    stage.engine.advance(1.0)
+    there = stage.person_W
+    stage.engine.restore(state, world)
+    stage.engine.advance(1.0)
+    assert stage.engine.walkers["Kim"].on_detour
+    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((there.x_m, there.y_m), abs=1e-6)

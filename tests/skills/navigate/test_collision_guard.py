@@ -109,3 +109,8 @@ def test_the_margin_is_an_option():
     options = NavigateOptions()
     wide = replace(options, guard=replace(options.guard, margin_m=1.0))
     assert Drive(lambda now_s, x: (1.5 + 0.6 * now_s, 4.5), options=wide, most_s=15.0).stood()
+
+
+def test_who_follows_does_not_stop_it():
+    drive = Drive(lambda now_s, x: (max(0.3, x - 1.2), 5.6))
+    assert not drive.stood() and isinstance(drive.step, Succeeded)

@@ -1,9 +1,10 @@
-"""Writes the generated files of the world `flat`: `python -m plant.worlds.builder`."""
+"""Writes the generated files of the worlds: `python -m plant.worlds.builder [NAME ...]`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from plant.models.builder.mesh import Mesh, mtl_text, obj_text, palette_picture, write_text
@@ -12,32 +13,38 @@ from plant.pictures import save_png
 from plant.worlds.builder.furniture import Piece
 from plant.worlds.builder.maps import BANDS_M, Placement, pgm_bytes, rasterise, yaml_text
 from plant.worlds.builder.materials import materials, pictures
-from plant.worlds.builder.plan import Placed, load_plan
+from plant.worlds.builder.plan import PLANS, Placed, load_plan
 from plant.worlds.builder.shell import shell_collisions, shell_mesh
+from plant.worlds.world import WORLDS_FOLDER
 
-PACKAGE = "package://errand/worlds/flat/furniture"
 
-
-def build(folder: Path) -> None:
+def build(name: str, folder: Path) -> None:
     """Write meshes, models, directives and maps into a world's folder. The same source gives the same bytes."""
-    palette, plan = materials(), load_plan()
-    for name, picture in pictures().items():
-        save_png(folder / "furniture" / name, picture, 9)
-    save_png(folder / "furniture" / "palette.png", palette_picture(palette), 9)
-    _write_model(
-        folder, Model("shell", "shell.obj", shell_collisions(), comment="floor and walls"), shell_mesh(palette)
-    )
-    shapes = [Placement(shape, 0.0, 0.0, 0.0) for shape in shell_collisions()]
-    for name, placed in plan.furniture.items():
-        piece = Piece(placed.piece or name, palette, **(placed.model_extra or {}))
-        _write_model(folder, Model(name, f"{name}.obj", piece.collisions), piece.mesh)
+    palette, plan = materials(), load_plan(name)
+    shell = shell_mesh(plan, palette)
+    _write_model(folder, Model("shell", "shell.obj", shell_collisions(plan), comment="floor and walls"), shell)
+    shapes, meshes = [Placement(shape, 0.0, 0.0, 0.0) for shape in shell_collisions(plan)], [shell]
+    for called, placed in plan.furniture.items():
+        piece = Piece(placed.piece or called, palette, **(placed.model_extra or {}))
+        _write_model(folder, Model(called, f"{called}.obj", piece.collisions), piece.mesh)
         shapes += [Placement(shape, *placed.at, placed.yaw_rad) for shape in piece.collisions]
-    write_text(folder / "world.dmd.yaml", _directives(plan.furniture))
+        meshes.append(piece.mesh)
+    _write_pictures(folder / "furniture", meshes)
+    write_text(folder / "world.dmd.yaml", _directives(name, plan.furniture))
     (folder / "map").mkdir(parents=True, exist_ok=True)
-    for name, band in BANDS_M.items():
+    for kind, band in BANDS_M.items():
         grid = rasterise(shapes, band, plan.outline_m)
-        (folder / "map" / f"{name}.pgm").write_bytes(pgm_bytes(grid))
-        write_text(folder / "map" / f"{name}.yaml", yaml_text(grid, f"{name}.pgm", band))
+        (folder / "map" / f"{kind}.pgm").write_bytes(pgm_bytes(grid))
+        write_text(folder / "map" / f"{kind}.yaml", yaml_text(grid, f"{kind}.pgm", band))
+
+
+def _write_pictures(folder: Path, meshes: Iterable[Mesh]) -> None:
+    """The palette, and the textures that the meshes use."""
+    used = {mesh.materials[material].texture for mesh in meshes for material, *_ in mesh.groups()}
+    for name, picture in pictures().items():
+        if name in used:
+            save_png(folder / name, picture, 9)
+    save_png(folder / "palette.png", palette_picture(materials()), 9)
 
 
 def _write_model(folder: Path, model: Model, mesh: Mesh) -> None:
@@ -47,15 +54,16 @@ def _write_model(folder: Path, model: Model, mesh: Mesh) -> None:
     write_text(base.with_suffix(".mtl"), mtl_text(mesh, "palette.png"))
 
 
-def _directives(pieces: Mapping[str, Placed]) -> str:
-    welds = [_weld("shell", 0.0, 0.0, 0.0), *(_weld(name, *p.at, p.yaw_rad) for name, p in pieces.items())]
+def _directives(world: str, pieces: Mapping[str, Placed]) -> str:
+    folder = f"package://errand/worlds/{world}/furniture"
+    welds = [_weld(folder, "shell", 0.0, 0.0, 0.0), *(_weld(folder, k, *p.at, p.yaw_rad) for k, p in pieces.items())]
     return "# Made by `python -m plant.worlds.builder`, don't edit.\ndirectives:\n" + "".join(welds)
 
 
-def _weld(name: str, x: float, y: float, yaw_rad: float) -> str:
+def _weld(folder: str, name: str, x: float, y: float, yaw_rad: float) -> str:
     return f"""- add_model:
     name: {name}
-    file: {PACKAGE}/{name}.sdf
+    file: {folder}/{name}.sdf
 - add_weld:
     parent: world
     child: {name}::{name}
@@ -66,4 +74,5 @@ def _weld(name: str, x: float, y: float, yaw_rad: float) -> str:
 
 
 if __name__ == "__main__":
-    build(Path(__file__).resolve().parents[1] / "flat")
+    for world in sys.argv[1:] or PLANS:
+        build(world, WORLDS_FOLDER / world)

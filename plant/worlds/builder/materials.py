@@ -1,4 +1,4 @@
-"""Appearance of the flat's surfaces: the materials in `materials.yaml`, and the pictures behind them."""
+"""Appearance of the surfaces: the materials in `materials.yaml`, and the pictures behind them."""
 
 from __future__ import annotations
 

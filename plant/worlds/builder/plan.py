@@ -1,17 +1,18 @@
-"""The flat's plan: rooms, walls, doors, hangings and furniture, read from `flat.yaml`."""
+"""The plan of a world: rooms, walls, doors, hangings and furniture, read from `NAME.yaml`."""
 
 from __future__ import annotations
 
 import math
 from functools import cache
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import yaml
 from pydantic import BaseModel, ConfigDict
 
 Rectangle = tuple[float, float, float, float]
 """(x0, y0, x1, y1)"""
+PLANS: Final = ("flat", "lab", "shop")
 _FACING_YAW_RAD = {"south": 0.0, "east": math.pi / 2, "north": math.pi, "west": -math.pi / 2}
 
 
@@ -25,12 +26,17 @@ class Room(NamedTuple):
 
 
 class Door(NamedTuple):
-    """An opening without a leaf; (x, y) is its middle, in the middle of the wall."""
+    """An opening without a leaf; (x, y) is its middle, in the middle of the wall.
+
+    A width of its own goes before the plan's. One that is open to the top of the wall has no frame.
+    """
 
     name: str
     x: float
     y: float
     along_x: bool
+    own_width_m: float | None = None
+    open: bool = False
 
 
 class Hanging(NamedTuple):
@@ -62,7 +68,7 @@ class Placed(BaseModel):
 
 
 class Plan(BaseModel):
-    """The schema of `flat.yaml`."""
+    """The schema of a plan's file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -76,9 +82,13 @@ class Plan(BaseModel):
     hangings: tuple[Hanging, ...]
     furniture: dict[str, Placed]
 
+    def width_m(self, door: Door) -> float:
+        """Clear width of a door."""
+        return self.door_width_m if door.own_width_m is None else door.own_width_m
+
 
 @cache
-def load_plan() -> Plan:
-    """The plan of the flat."""
-    text = Path(__file__).with_name("flat.yaml").read_text(encoding="utf-8")
+def load_plan(name: str) -> Plan:
+    """The plan of one of `PLANS`."""
+    text = Path(__file__).with_name(f"{name}.yaml").read_text(encoding="utf-8")
     return Plan.model_validate(yaml.load(text, Loader=yaml.CSafeLoader))

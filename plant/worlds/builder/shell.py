@@ -1,39 +1,39 @@
-"""The shell of the flat: floor, walls with door openings, frames, skirting and what hangs on the walls."""
+"""The shell of a world: floor, walls with door openings, frames, skirting and what hangs on the walls."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.shapes import Box, Shape
-from plant.worlds.builder.plan import Door, Hanging, Rectangle, Room, load_plan
+from plant.worlds.builder.plan import Door, Hanging, Plan, Rectangle, Room
 from skills.robot import FloatArray
 
 FRAME_M, FRAME_DEPTH_M, SKIRTING_M = 0.07, 0.012, 0.07
 UP = np.array([0.0, 0.0, 1.0])
+_NOTHING_M = 1e-6
 
 Span = tuple[float, float]
 
 
-def shell_collisions() -> list[Shape]:
+def shell_collisions(plan: Plan) -> list[Shape]:
     """The floor and the wall boxes, lintels included."""
-    plan = load_plan()
     x, y = plan.outline_m
     floor = Box(size=(x + 2, y + 2, 0.2), p=(x / 2, y / 2, -0.1))
-    return [floor, *(box for wall in plan.walls for box in _wall_boxes(wall))]
+    return [floor, *(box for wall in plan.walls for box in _wall_boxes(plan, wall))]
 
 
-def _wall_boxes(wall: Rectangle) -> Iterator[Box]:
+def _wall_boxes(plan: Plan, wall: Rectangle) -> Iterator[Box]:
     """A wall beside its doors, then the lintels over them. It runs along its longer side."""
-    plan, (x0, y0, x1, y1) = load_plan(), wall
+    x0, y0, x1, y1 = wall
     along_x = x1 - x0 > y1 - y0
     low, high = (x0, x1) if along_x else (y0, y1)
     doors = [d for d in plan.doors if x0 <= d.x <= x1 and y0 <= d.y <= y1 and d.along_x == along_x]
-    gaps, sides = _around(low, high, [d.x if along_x else d.y for d in doors])
-    spans = [(a, b, 0.0) for a, b in sides] + [(a, b, plan.door_height_m) for a, b in gaps]
+    gaps, sides = _around(plan, low, high, [(d.x if along_x else d.y, d) for d in doors])
+    spans = [(a, b, 0.0) for a, b in sides] + [(a, b, plan.door_height_m) for a, b, door in gaps if not door.open]
     for a, b, z0 in spans:
         ends = (a, y0, b, y1) if along_x else (x0, a, x1, b)
         yield Box(
@@ -42,30 +42,33 @@ def _wall_boxes(wall: Rectangle) -> Iterator[Box]:
         )
 
 
-def _around(low: float, high: float, doors: Sequence[float]) -> tuple[list[Span], list[Span]]:
-    """The door openings with these middles, in order, and what is left of a line from low to high."""
-    half = load_plan().door_width_m / 2
-    gaps = [(middle - half, middle + half) for middle in sorted(doors)]
-    edges = [low, *(edge for gap in gaps for edge in gap), high]
-    return gaps, list(zip(edges[0::2], edges[1::2], strict=True))
+def _around(
+    plan: Plan, low: float, high: float, doors: Iterable[tuple[float, Door]]
+) -> tuple[list[tuple[float, float, Door]], list[Span]]:
+    """The openings of the doors with these middles, in order, and what is left of a line from low to high."""
+    halves = sorted((middle, plan.width_m(door) / 2, door) for middle, door in doors)
+    gaps = [(middle - half, middle + half, door) for middle, half, door in halves]
+    edges = [low, *(edge for a, b, _ in gaps for edge in (a, b)), high]
+    spans = zip(edges[0::2], edges[1::2], strict=True)
+    return gaps, [(a, b) for a, b in spans if b - a > _NOTHING_M]
 
 
-def shell_mesh(materials: Mapping[str, Material]) -> Mesh:
+def shell_mesh(plan: Plan, materials: Mapping[str, Material]) -> Mesh:
     """The visual geometry of the shell."""
     mesh = Mesh(materials)
-    plan = load_plan()
     for one in plan.rooms:
         x0, y0, x1, y1 = one.inside
         mesh.add_rectangle(one.floor, (x0, y0, 0), (x1 - x0, 0, 0), (0, y1 - y0, 0))
         for side in _sides(one).values():
-            _add_panel(mesh, one, side)
+            _add_panel(mesh, plan, one, side)
     for x0, y0, x1, y1 in plan.walls:
         mesh.add_rectangle("cap", (x0, y0, plan.wall_height_m), (x1 - x0, 0, 0), (0, y1 - y0, 0))
     for door in plan.doors:
-        _add_door(mesh, door)
+        if not door.open:
+            _add_door(mesh, plan, door)
     for hanging in plan.hangings:
-        _add_hanging(mesh, hanging)
-    _add_outside(mesh)
+        _add_hanging(mesh, plan, hanging)
+    _add_outside(mesh, plan)
     return mesh
 
 
@@ -91,32 +94,33 @@ def _sides(one: Room) -> dict[str, _Side]:
     }
 
 
-def _doors_along(side: _Side) -> Iterator[float]:
-    """Middles of the doors on a room's side, as lengths along it."""
-    for door in load_plan().doors:
+def _doors_along(plan: Plan, side: _Side) -> Iterator[tuple[float, Door]]:
+    """The doors on a room's side, each with its middle as a length along it."""
+    for door in plan.doors:
         offset = np.array([door.x, door.y, 0.0]) - side.corner
         if abs(offset @ side.inward) < 0.1 and 0 < offset @ side.along < side.length:
-            yield float(offset @ side.along)
+            yield float(offset @ side.along), door
 
 
-def _add_panel(mesh: Mesh, one: Room, side: _Side) -> None:
-    plan = load_plan()
-    gaps, spans = _around(0.0, side.length, list(_doors_along(side)))
+def _add_panel(mesh: Mesh, plan: Plan, one: Room, side: _Side) -> None:
+    gaps, spans = _around(plan, 0.0, side.length, _doors_along(plan, side))
     for a, b in spans:
         mesh.add_rectangle(one.wall, side.corner + a * side.along, (b - a) * side.along, plan.wall_height_m * UP)
         skirting = side.corner + a * side.along + FRAME_DEPTH_M * side.inward
         mesh.add_rectangle("skirting", skirting, (b - a) * side.along, SKIRTING_M * UP)
         mesh.add_rectangle("skirting", skirting + SKIRTING_M * UP, (b - a) * side.along, -FRAME_DEPTH_M * side.inward)
-    for a, b in gaps:
+    for a, b, door in gaps:
+        if door.open:
+            continue
         lintel = side.corner + a * side.along + plan.door_height_m * UP
         mesh.add_rectangle(one.wall, lintel, (b - a) * side.along, (plan.wall_height_m - plan.door_height_m) * UP)
 
 
-def _add_door(mesh: Mesh, door: Door) -> None:
+def _add_door(mesh: Mesh, plan: Plan, door: Door) -> None:
     """Jamb linings, casings on both faces and the sill."""
     turned = np.eye(3) if door.along_x else np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    frame, half, deep = Mesh(mesh.materials), load_plan().door_width_m / 2, 0.05 + FRAME_DEPTH_M
-    top = load_plan().door_height_m
+    frame, half, deep = Mesh(mesh.materials), plan.width_m(door) / 2, 0.05 + FRAME_DEPTH_M
+    top = plan.door_height_m
     for sign in (-1, 1):
         low, high = sorted((sign * half, sign * (half + FRAME_M)))
         frame.add_box("skirting", (low, -deep, 0), (high, deep, top + FRAME_M), faces={"-z": None})
@@ -125,9 +129,9 @@ def _add_door(mesh: Mesh, door: Door) -> None:
     mesh.add_mesh(frame, turned, (door.x, door.y, 0))
 
 
-def _add_hanging(mesh: Mesh, item: Hanging) -> None:
+def _add_hanging(mesh: Mesh, plan: Plan, item: Hanging) -> None:
     """A picture, mirror, window or door on a room's wall, `along` being x or y in the world."""
-    (room,) = (each for each in load_plan().rooms if each.name == item.room)
+    (room,) = (each for each in plan.rooms if each.name == item.room)
     side = _sides(room)[item.side]
     axis = np.abs(side.along)
     start = side.corner + (item.along - float(side.corner @ axis)) * axis + item.z * UP
@@ -139,8 +143,7 @@ def _add_hanging(mesh: Mesh, item: Hanging) -> None:
     mesh.add_rectangle(item.frame, back, (item.width + edge) * side.along, (item.height + edge) * UP)
 
 
-def _add_outside(mesh: Mesh) -> None:
-    plan = load_plan()
+def _add_outside(mesh: Mesh, plan: Plan) -> None:
     x, y = plan.outline_m
     around = (((0, 0), (x, 0)), ((x, 0), (0, y)), ((x, y), (-x, 0)), ((0, y), (0, -y)))
     for (px, py), (dx, dy) in around:

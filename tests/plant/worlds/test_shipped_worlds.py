@@ -1,4 +1,4 @@
-"""The flat is fit for the robot: doors, free poses, surfaces at their heights, maps that agree with the shapes."""
+"""The worlds of our own are fit for the robot: doors, free poses, surfaces at their heights, maps that agree with the shapes."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from plant.worlds.builder.__main__ import build
-from plant.worlds.builder.plan import load_plan
+from plant.worlds.builder.plan import PLANS, load_plan
 from plant.worlds.placement import place_objects, place_people
-from plant.worlds.world import World, add_package, load_world
+from plant.worlds.world import World, add_package, known_worlds, load_world
 
 FOOTPRINT_M = (1.1, 0.6)  # the standing outline of 1.0 by 0.5 with 5 cm around
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
@@ -38,9 +38,9 @@ class Map:
         return self.cells[index[..., 1], index[..., 0]]
 
 
-@pytest.fixture(scope="module")
-def world() -> World:
-    return load_world("flat")
+@pytest.fixture(scope="module", params=PLANS)
+def world(request: pytest.FixtureRequest) -> World:
+    return load_world(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -55,19 +55,20 @@ def keepout(world: World) -> Map:
 
 @pytest.fixture(scope="module")
 def furnished(world: World) -> tuple[Diagram, Context]:
-    """The flat with all things of seed 1 in Drake."""
+    """The world with all things of seed 1 in Drake."""
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(time_step=0.005, discrete_contact_approximation="sap")
     plant, _ = AddMultibodyPlant(config, builder)
     parser = Parser(plant)
+    parser.SetAutoRenaming(True)
     add_package(parser.package_map())
     ProcessModelDirectives(LoadModelDirectives(str(world.directives_path)), plant, parser)
     for thing in place_objects(world, 1):
         parser.AddModels(str(thing.model_path))
         plant.SetDefaultFloatingBaseBodyPose(plant.GetBodyByName(thing.class_name), thing.X_WO)
     for one in place_people(world, 1):
-        parser.AddModels(str(one.model_path))
-        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(one.class_name), one.X_WO)
+        (model,) = parser.AddModels(str(one.model_path))
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(one.class_name, model), one.X_WO)
     plant.Finalize()
     diagram = builder.Build()
     return diagram, diagram.CreateDefaultContext()
@@ -93,6 +94,10 @@ def known_poses(knowledge: dict[str, Any]) -> dict[str, dict[str, float]]:
     return poses
 
 
+def test_every_plan_is_a_world_that_comes_with_the_project() -> None:
+    assert known_worlds() == tuple(sorted(PLANS))
+
+
 def test_every_known_pose_is_free(knowledge: dict[str, Any], keepout: Map) -> None:
     taken = [name for name, pose in known_poses(knowledge).items() if np.any(keepout.at(footprint(pose)) != FREE)]
     assert taken == []
@@ -104,24 +109,38 @@ def test_every_room_has_a_free_circle_to_turn_in(knowledge: dict[str, Any], keep
     y = (np.arange(keepout.cells.shape[0]) + 0.5) * keepout.header["resolution"] + keepout.header["origin"][1]
     for name, place in knowledge["places"].items():
         low, high = np.min(place["polygon"], axis=0), np.max(place["polygon"], axis=0)
+        if name.endswith(("corridor", "passage", "aisle", "aisle one", "aisle two", "aisle three")):
+            continue  # ways, in which there need be none
         window = np.ix_((y > low[1]) & (y < high[1]), (x > low[0]) & (x < high[0]))
         assert 2 * radius[window].max() * keepout.header["resolution"] >= 1.5, name
 
 
-@pytest.mark.parametrize("door", load_plan().doors, ids=lambda door: door.name)
-def test_every_door_is_ninety_centimetres_wide_and_free_on_both_sides(door: Any, keepout: Map) -> None:
+@pytest.mark.parametrize(
+    ("name", "door"),
+    [
+        pytest.param(name, door, id=f"{name}-{door.name}")
+        for name in PLANS
+        for door in load_plan(name).doors
+        if not door.open
+    ],
+)
+def test_every_door_is_as_wide_as_planned_and_free_on_both_sides(name: str, door: Any) -> None:
+    keepout, width = Map(load_world(name).keepout_map_path), load_plan(name).width_m(door)
     across = np.array([0.0, 1.0]) if door.along_x else np.array([1.0, 0.0])
     along = across[::-1]
     middle = np.array([door.x, door.y])
-    line = middle + np.arange(-0.7, 0.7, 0.005)[:, None] * along
-    assert np.sum(keepout.at(line) == FREE) * 0.005 == pytest.approx(0.9, abs=0.03)
-    way = middle + np.arange(-1.05, 1.05, 0.01)[:, None, None] * across + np.arange(-0.43, 0.43, 0.01)[:, None] * along
+    line = middle + np.arange(-width / 2 - 0.1, width / 2 + 0.1, 0.005)[:, None] * along
+    assert np.sum(keepout.at(line) == FREE) * 0.005 == pytest.approx(width, abs=0.03)
+    reach, half = (0.65, width / 2 - 0.02) if name == "lab" else (1.05, width / 2 - 0.02)  # its corridors are narrow
+    way = (
+        middle + np.arange(-reach, reach, 0.01)[:, None, None] * across + np.arange(-half, half, 0.01)[:, None] * along
+    )
     assert np.all(keepout.at(way) == FREE)
 
 
 def test_rooms_hang_together(knowledge: dict[str, Any], keepout: Map) -> None:
     resolution = keepout.header["resolution"]
-    passable = cv2.erode((keepout.cells == FREE).astype(np.uint8), np.ones((2 * int(0.3 / resolution) + 1,) * 2))
+    passable = cv2.erode((keepout.cells == FREE).astype(np.uint8), np.ones((2 * int(0.31 / resolution) + 1,) * 2))
     _, parts = cv2.connectedComponents(passable)
     centres = np.array([(p["pose"]["x"], p["pose"]["y"]) for p in knowledge["places"].values()])
     index = np.floor((centres - keepout.header["origin"][:2]) / resolution).astype(int)
@@ -154,10 +173,10 @@ def test_viewpoints_face_their_surface_from_the_right_distance(knowledge: dict[s
 
 
 def test_surfaces_are_solid_and_flat_at_their_heights(
-    knowledge: dict[str, Any], furnished: tuple[Diagram, Context]
+    world: World, knowledge: dict[str, Any], furnished: tuple[Diagram, Context]
 ) -> None:
     query_object = query(*furnished)
-    things = [t.X_WO.translation() for t in place_objects(load_world("flat"), 1)]
+    things = [t.X_WO.translation() for t in place_objects(world, 1)]
     for name, surface in knowledge["surfaces"].items():
         low, high = np.min(surface["polygon"], axis=0), np.max(surface["polygon"], axis=0)
         for x in np.linspace(low[0] + 0.03, high[0] - 0.03, 7):
@@ -176,7 +195,7 @@ def test_maps_agree_with_the_collision_shapes(name: str, world: World, furnished
     moving = [p.X_WO.translation()[:2] for p in (*place_objects(world, 1), *place_people(world, 1))]
     rng, (z0, z1) = np.random.default_rng(5), grid.header["height_band_m"]
     occupied = 0
-    for point in rng.uniform([0.0, 0.0], [12.0, 9.0], (400, 2)):
+    for point in rng.uniform([0.0, 0.0], load_plan(world.name).outline_m, (400, 2)):
         if min(np.linalg.norm(point - m) for m in moving) < 0.5:
             continue
         depth = min(distance_m(query_object, point, z) for z in np.arange(z0 + 0.01, z1, 0.03))
@@ -194,11 +213,12 @@ def distance_m(query_object: QueryObject, point: np.ndarray, z: float) -> float:
     return min((f.distance for f in found), default=1.0)
 
 
-def test_outside_of_the_walls_is_unknown(keepout: Map) -> None:
-    assert np.all(keepout.at(np.array([(-0.3, 4.0), (12.3, 4.0), (6.0, 9.3), (6.0, -0.3)])) == UNKNOWN)
+def test_outside_of_the_walls_is_unknown(world: World, keepout: Map) -> None:
+    x, y = load_plan(world.name).outline_m
+    assert np.all(keepout.at(np.array([(-0.3, y / 2), (x + 0.3, y / 2), (x / 2, y + 0.3), (x / 2, -0.3)])) == UNKNOWN)
 
 
-def test_the_living_room_table_is_for_the_body_and_not_for_the_lidar(world: World, keepout: Map) -> None:
+def test_the_coffee_table_is_for_the_body_and_not_for_the_lidar(world: World, keepout: Map) -> None:
     middle = np.mean(world.surfaces["coffee table"].polygon_W, axis=0)
     assert keepout.at(middle) == OCCUPIED
     assert Map(world.scan_map_path).at(middle) == FREE
@@ -206,9 +226,9 @@ def test_the_living_room_table_is_for_the_body_and_not_for_the_lidar(world: Worl
 
 def test_people_and_things_are_not_surveyed(world: World, keepout: Map) -> None:
     for seed in range(10):
-        (robin,) = place_people(world, seed)
-        around = {"x": robin.X_WO.translation()[0], "y": robin.X_WO.translation()[1], "yaw": 0.0}
-        assert np.all(keepout.at(footprint(around, (1.4, 1.4))) == FREE)
+        for one in place_people(world, seed):
+            around = {"x": one.X_WO.translation()[0], "y": one.X_WO.translation()[1], "yaw": 0.0}
+            assert np.all(keepout.at(footprint(around, (1.4, 1.4))) == FREE), one.name
 
 
 def test_things_stay_where_the_seed_put_them(world: World, furnished: tuple[Diagram, Context]) -> None:
@@ -225,8 +245,21 @@ def test_things_stay_where_the_seed_put_them(world: World, furnished: tuple[Diag
 
 
 def test_committed_world_is_what_the_builder_writes(world: World, tmp_path: Path) -> None:
-    build(tmp_path)
+    build(world.name, tmp_path)
     written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl", ".yaml", ".pgm")]
-    assert len(written) > 70
+    assert len(written) > 3 * len(load_plan(world.name).furniture)
     for path in written:
         assert (world.folder / path.relative_to(tmp_path)).read_bytes() == path.read_bytes(), path.name
+
+
+def test_a_way_of_more_than_a_hundred_metres_leads_around_the_rooms_of_the_lab() -> None:
+    corridors = {
+        room.name: room.inside for room in load_plan("lab").rooms if room.name.endswith(("corridor", "passage"))
+    }
+    widths = {name: min(x1 - x0, y1 - y0) for name, (x0, y0, x1, y1) in corridors.items()}
+    assert all(0.8 <= width <= 1.2 + 1e-9 for width in widths.values())
+    middles = {name: ((x0 + x1) / 2, (y0 + y1) / 2) for name, (x0, y0, x1, y1) in corridors.items()}
+    along_x = middles["east corridor"][0] - middles["west corridor"][0]
+    along_y = middles["north corridor"][1] - middles["south corridor"][1]
+    assert 2 * (along_x + along_y) > 100
+    assert all(0.75 <= load_plan("lab").width_m(door) <= 0.9 for door in load_plan("lab").doors if not door.open)

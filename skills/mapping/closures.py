@@ -47,7 +47,7 @@ def find_pose(
     reach_m: float = 0.25,
     rival_m: float = 0.5,
 ) -> Found | None:
-    """Where points (N, 2) fit a distance field best about a guess, None when nowhere better than `least`.
+    """Where points (N, 2 or more columns) fit a distance field best about a guess, None when nowhere better than `least`.
 
     `frame` is the field's resolution and the x, y of its outer corner (m). A rival lies farther than rival_m away.
     """
@@ -59,9 +59,7 @@ def find_pose(
     if best[0] <= least:
         return None
     place, bar = (float(best[1]), float(best[2])), 0.8 * float(best[0])
-    rival = _branch_and_bound(
-        distance, frame, points_F, yaws, centre, window.place_m, bar, reach_m, place, rival_m
-    )
+    rival = _branch_and_bound(distance, frame, points_F, yaws, centre, window.place_m, bar, reach_m, place, rival_m)
     return Found(Pose2D(place[0], place[1], float(best[3])), float(best[0]), float(rival[0]))
 
 
@@ -80,7 +78,7 @@ def _branch_and_bound(
 ) -> FloatArray:
     """Score, x, y, yaw of the best pose above `least`, at least away_m from a place; the score `least` when none is."""
     best = np.array([least, 0.0, 0.0, 0.0])
-    turned = np.empty_like(points)
+    turned = np.empty((points.shape[0], 2))
     stack = np.empty((256, 3))
     for yaw in yaws:
         c, s = math.cos(yaw), math.sin(yaw)

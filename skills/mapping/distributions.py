@@ -1,7 +1,8 @@
-"""Matching of points to a submap of normal distributions (Biber and Strasser, The Normal Distributions Transform, 2003).
+"""Matching of points to a submap of normal distributions (the Normal Distributions Transform, Biber and Strasser, 2003).
 
 Each cell keeps the moments of the points in the 3 x 3 cells about it. Where these lie on a line, only the distance
-across it counts (point to line), so that a submap of noisy scans has surfaces much finer than the noise.
+across it counts (point to line), so that a submap of noisy scans has surfaces much finer than the noise. Surfaces that
+face different ways are kept apart by quarters, so that the two sides of a thin wall are not one.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from skills.geometry import wrap
 from skills.robot import FloatArray, Pose2D
 
 CELL_M = 0.1
+_QUARTERS = 4
+_QUARTER_RAD = 0.5 * math.pi
 Moments = NDArray[np.float32]
 
 
@@ -50,16 +53,16 @@ class Distributions:
     def __init__(self, half_m: float = 26.0) -> None:
         cells = math.ceil(2.0 * half_m / CELL_M)
         self._low_m = -0.5 * cells * CELL_M
-        self._moments: Moments = np.zeros((cells, cells, 6), dtype=np.float32)
+        self._moments: Moments = np.zeros((cells, cells, _QUARTERS, 6), dtype=np.float32)
 
     def add(self, points_F: FloatArray, X_AF: Pose2D) -> None:
-        """Add the points (N, 2) of a scan taken at a pose."""
+        """Add the points (N, 3) of a scan taken at a pose: x, y, and the direction that the surface faces (rad)."""
         _add(self._moments, self._low_m, points_F, np.array([X_AF.x_m, X_AF.y_m, X_AF.yaw_rad]))
 
     def align(
         self, points_F: FloatArray, prior: Pose2D, covariance: FloatArray, options: AlignOptions | None = None
     ) -> Alignment:
-        """The pose at which points (N, 2) lie best on the submap, given a prior."""
+        """The pose at which points (N, 3) lie best on the submap, given a prior."""
         used = options or AlignOptions()
         mean = np.array([prior.x_m, prior.y_m, prior.yaw_rad])
         share = min(1.0, used.effective_points / max(1, len(points_F)))
@@ -83,10 +86,11 @@ def _add(moments: Moments, low: float, points: FloatArray, pose: FloatArray) -> 
         column, row = math.floor((x - low) / CELL_M), math.floor((y - low) / CELL_M)
         if not (1 <= column < cells - 1 and 1 <= row < cells - 1):
             continue
+        quarter = math.floor((points[n, 2] + pose[2]) / _QUARTER_RAD) % _QUARTERS
         for i in range(row - 1, row + 2):
             for j in range(column - 1, column + 2):
                 u, v = x - low - (j + 0.5) * CELL_M, y - low - (i + 0.5) * CELL_M
-                cell = moments[i, j]
+                cell = moments[i, j, quarter]
                 cell[0] += 1.0
                 cell[1] += u
                 cell[2] += v
@@ -139,7 +143,7 @@ def _linearise(
         column, row = math.floor(x / CELL_M), math.floor(y / CELL_M)
         if not (0 <= column < cells and 0 <= row < cells):
             continue
-        cell = moments[row, column]
+        cell = moments[row, column, math.floor((points[n, 2] + pose[2]) / _QUARTER_RAD) % _QUARTERS]
         count = float(cell[0])
         if count < 5.0:
             continue

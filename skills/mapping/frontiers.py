@@ -33,13 +33,15 @@ class Frontier:
 class Ground:
     """What can be reached on a grid whose unknown cells are blocked, from a place (x, y).
 
-    The robot's middle needs `clear_m` to all that is blocked.
+    The robot's middle needs `clear_m` to all that is blocked; frontiers end the ground that was `explored`.
     """
 
-    def __init__(self, grid: GridMap, here: tuple[float, float], *, clear_m: float) -> None:
+    def __init__(
+        self, grid: GridMap, explored: NDArray[np.bool_], here: tuple[float, float], *, clear_m: float
+    ) -> None:
         self._grid, self._cell_m = grid, _STEP * grid.resolution_m
         unknown = np.zeros_like(grid.occupied) if grid.unknown is None else grid.unknown
-        self._unknown = unknown
+        self._explored = explored
         clear = grid.with_unknown_blocked().distance[::_STEP, ::_STEP]
         free = ~(grid.occupied | unknown)[::_STEP, ::_STEP]
         stands = free & (clear >= clear_m)
@@ -51,9 +53,8 @@ class Ground:
 
     def frontiers(self, *, least_m: float, within_m: float) -> list[Frontier]:
         """All that are at least so long and within so far of where the robot can stand; the nearest first."""
-        free = ~(self._grid.occupied | self._unknown)
-        beside = cv2.dilate(self._unknown.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        border = free & beside & (self._grid.distance > 0.1)
+        beside = cv2.dilate((~self._explored).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        border = self._explored & beside & (self._grid.distance > 0.1)
         _, labels = cv2.connectedComponents(border.astype(np.uint8), connectivity=8)
         rows, columns = np.nonzero(labels)
         found = []

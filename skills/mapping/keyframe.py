@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skills.estimate.compiled import compiled
 from skills.estimate.scan_points import scan_points, sensor_pose
 from skills.estimate.self_filter import SelfFilter
 from skills.robot import FloatArray, Joints, Pose2D, Scan, unit_rays
 
 BAND_M = (0.7, 1.3)
 """Heights (m) of the points that scans are matched by."""
+_NEIGHBOURS: Final = 24
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,8 @@ class Keyframe:
     """A scan and where the odometry had the robot.
 
     `ranges_m` is (rings, azimuths) float32 with NaN for no return; `rotation` (3, 3) and `translation` (3,) are the
-    LiDAR's pose in the levelled body frame F; `points_F` (N, 2) are the points that scans are matched by.
+    LiDAR's pose in the levelled body frame F; `points_F` (N, 3) are the points that scans are matched by: x, y, and
+    the direction (rad) that the surface there faces.
     """
 
     stamp_s: float
@@ -58,8 +63,37 @@ class Keyframe:
 
 
 def matching_points(scan: Scan, *, azimuths: int, most: int, max_range_m: float) -> FloatArray:
-    """At most so many points (N, 2) of a scan in the band that scans are matched by, in frame F."""
-    points = scan_points(scan, azimuths=azimuths, heights_m=BAND_M, max_range_m=max_range_m)[:, :2]
-    if len(points) > most:
-        points = points[np.linspace(0, len(points) - 1, most).astype(np.int64)]
-    return np.ascontiguousarray(points)
+    """At most so many points of a scan in the band that scans are matched by, as `Keyframe.points_F` has them."""
+    points = scan_points(scan, azimuths=azimuths, heights_m=BAND_M, max_range_m=max_range_m)
+    facing = _facing(points)
+    chosen = slice(None) if len(points) <= most else np.linspace(0, len(points) - 1, most).astype(np.int64)
+    return np.column_stack([points[chosen, :2], facing[chosen]])
+
+
+@compiled
+def _facing(points: FloatArray) -> FloatArray:
+    """The direction (rad) that the surface at each point faces: across the points about it, towards the sensor.
+
+    The points are ordered by azimuth. One that is alone faces the sensor.
+    """
+    count = points.shape[0]
+    facing = np.empty(count)
+    for n in range(count):
+        x, y = points[n, 0], points[n, 1]
+        reach = 0.15 + 0.03 * math.hypot(x, y)
+        near, u, v, xx, xy, yy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(n - _NEIGHBOURS, n + _NEIGHBOURS + 1):
+            dx, dy = points[k % count, 0] - x, points[k % count, 1] - y
+            if dx * dx + dy * dy < reach * reach:
+                near += 1
+                u, v, xx, xy, yy = u + dx, v + dy, xx + dx * dx, xy + dx * dy, yy + dy * dy
+        u, v = u / near, v / near
+        xx, xy, yy = xx / near - u * u, xy / near - u * v, yy / near - v * v
+        middle, spread = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+        if near < 4 or middle + spread < 2.0 * (middle - spread):
+            facing[n] = math.atan2(-y, -x)
+            continue
+        angle = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
+        away = math.cos(angle) * x + math.sin(angle) * y > 0.0
+        facing[n] = angle + math.pi if away else angle
+    return facing

@@ -66,7 +66,7 @@ def save_grids(folder: Path, grids: Surveyed, resolution_m: float = RESOLUTION_M
         text = (
             f"image: {band}.pgm\nmode: trinary\nresolution: {resolution_m}\n"
             f"origin: [{grids.origin_m[0]:.4f}, {grids.origin_m[1]:.4f}, 0.0]\nnegate: 0\n"
-            f"occupied_thresh: 0.65\nfree_thresh: 0.196\nheight_band_m: [{low}, {high}]\n"
+            f"occupied_thresh: 0.65\nfree_thresh: 0.45\nheight_band_m: [{low}, {high}]\n"
         )
         _write(folder / f"{band}.yaml", text.encode())
     return folder / "scan.yaml"
@@ -98,7 +98,7 @@ def save_graph(folder: Path, mapper: Mapper) -> None:
         ],
     }
     first, most = frames[0], max(len(frame.points_F) for frame in frames)
-    points = np.full((len(frames), most, 2), np.nan, dtype=np.float32)
+    points = np.full((len(frames), most, 3), np.nan, dtype=np.float32)
     for row, frame in zip(points, frames, strict=True):
         row[: len(frame.points_F)] = frame.points_F
     millimetres = np.stack([np.nan_to_num(1000.0 * frame.ranges_m, nan=0.0) for frame in frames])

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -274,8 +275,7 @@ class Mapper:
         self._closed_at_m = self.way_m
 
     def _way_between(self, first: int, second: int) -> float:
-        poses = self.graph.poses[first : second + 1]
-        return sum(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in zip(poses, poses[1:], strict=False))
+        return sum(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in pairwise(self.graph.poses[first : second + 1]))
 
     def _agree(self, edge: Edge, other: Edge) -> bool:
         """Whether two closures give the same loop: once around both, and the way between them, leads back."""
@@ -344,7 +344,7 @@ class Mapper:
 
 def _placed(points_F: FloatArray, X_AF: Pose2D) -> FloatArray:
     c, s = math.cos(X_AF.yaw_rad), math.sin(X_AF.yaw_rad)
-    return np.asarray(points_F @ np.array([[c, s], [-s, c]]) + [X_AF.x_m, X_AF.y_m])
+    return np.asarray(points_F[:, :2] @ np.array([[c, s], [-s, c]]) + [X_AF.x_m, X_AF.y_m])
 
 
 def _hit_grid(points: FloatArray) -> GridMap:

@@ -24,6 +24,7 @@ BANDS_M: Final = {"scan": (0.7, 1.3), "keepout": (0.05, 1.0)}
 UNIT: Final = 0.2
 """Log-odds of one step of a cell's value."""
 _HIT, _MISS, _MOST = 4, -2, 120
+_OCCUPIED = 4
 _BLOCK_M: Final = 8.0
 Values = NDArray[np.int8]
 
@@ -36,8 +37,8 @@ class LayeredOccupancy:
         self.origin_m = (0.0, 0.0)
         self.values: Values = np.zeros((LAYERS, 0, 0), dtype=np.int8)
 
-    def insert(self, frame: Keyframe, X_WF: Pose2D) -> None:
-        """Trace all beams of a keyframe that was taken at a pose."""
+    def insert(self, frame: Keyframe, X_WF: Pose2D, *, stride: int = 1) -> None:
+        """Trace the beams of every `stride`-th column of a keyframe that was taken at a pose."""
         self._reach(X_WF)
         c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -46,28 +47,40 @@ class LayeredOccupancy:
         _trace(
             self.values,
             place,
-            frame.ranges_m,
+            frame.ranges_m[:, ::stride].copy(),
             frame.elevations_rad,
-            frame.azimuths_rad,
+            frame.azimuths_rad[::stride].copy(),
             np.ascontiguousarray(turn @ frame.rotation),
             sensor,
         )
 
     def probability(self, band: str) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         """The probability that a cell is occupied anywhere in a band's heights, and whether it was observed at all."""
-        low, high = BANDS_M[band]
-        first, last = math.floor((low - LOWEST_M) / LAYER_M + 0.5), math.ceil((high - LOWEST_M) / LAYER_M - 0.5)
-        layers = self.values[first:last]
+        layers = self.values[_layers(BANDS_M[band])]
         observed = (layers != 0).any(axis=0)
-        odds = np.where(layers == 0, np.int8(-128), layers).max(axis=0).astype(np.float32) * np.float32(UNIT)
+        odds = _greatest(layers).astype(np.float32) * np.float32(UNIT)
         probability = 1.0 / (1.0 + np.exp(-odds))
         return np.where(observed, probability, 0.5).astype(np.float32), observed
+
+    def ground(self, window: tuple[slice, slice], low_m: float) -> tuple[NDArray[np.bool_], ...]:
+        """Of a window of cells: which are occupied for the body, which were observed, and which of these below low_m.
+
+        Occupied cells count as observed below.
+        """
+        values = self.values[:, window[0], window[1]]
+        layers = values[_layers(BANDS_M["keepout"])]
+        occupied = _greatest(layers) >= _OCCUPIED
+        low = (values[_layers((LOWEST_M, low_m))] != 0).any(axis=0)
+        return occupied, (layers != 0).any(axis=0), low | occupied
 
     def _reach(self, X_WF: Pose2D) -> None:
         """Grow so that all within the range of a pose lies on the grid."""
         rows, columns = self.values.shape[1:]
         need = [
-            (math.floor((at - self._max_range_m - 1.0) / _BLOCK_M), math.ceil((at + self._max_range_m + 1.0) / _BLOCK_M))
+            (
+                math.floor((at - self._max_range_m - 1.0) / _BLOCK_M),
+                math.ceil((at + self._max_range_m + 1.0) / _BLOCK_M),
+            )
             for at in (X_WF.x_m, X_WF.y_m)
         ]
         block = round(_BLOCK_M / self.resolution_m)
@@ -85,6 +98,17 @@ class LayeredOccupancy:
             self.values = np.ascontiguousarray(np.pad(self.values, ((0, 0), pads[1], pads[0])))
             low = [start - before * self.resolution_m for start, (before, _) in zip(self.origin_m, pads, strict=True)]
             self.origin_m = (low[0], low[1])
+
+
+def _layers(band_m: tuple[float, float]) -> slice:
+    """The layers that lie in a band of heights by more than half."""
+    low, high = band_m
+    return slice(math.floor((low - LOWEST_M) / LAYER_M + 0.5), math.ceil((high - LOWEST_M) / LAYER_M - 0.5))
+
+
+def _greatest(layers: Values) -> Values:
+    """The greatest value of the layers that were observed; -128 where none was."""
+    return np.asarray(np.where(layers == 0, np.int8(-128), layers).max(axis=0), dtype=np.int8)
 
 
 @compiled

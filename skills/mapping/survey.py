@@ -12,19 +12,17 @@ import numpy as np
 
 from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import GridMap
-from skills.geometry import compose, relative
+from skills.estimate.grid_map import BoolGrid, GridMap
+from skills.geometry import relative
 from skills.mapping.frontiers import Ground
 from skills.mapping.mapper import Mapper
 from skills.mapping.occupancy import LayeredOccupancy
 from skills.navigate.follower import FollowerOptions
-from skills.navigate.footprint import Footprint, footprint_clearance_m
+from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner
 from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
 from skills.stack import LocalController
 
-OCCUPIED = 0.65
-"""Cells at least so likely occupied are."""
 _EXPIRY_S = 0.3
 
 
@@ -46,6 +44,9 @@ class SurveyOptions:
     unsure_m: float = 0.12
     back_after_m: float = 25.0
     refresh_m: float = 0.5
+    moved_m: float = 0.04
+    around_m: float = 5.0
+    low_m: float = 0.3
     refresh_s: float = 1.5
     stuck_s: float = 3.0
     blind_stop_s: float = 1.0
@@ -93,9 +94,10 @@ class Survey:
         self.trouble: str | None = None
         self.notes: list[str] = []
         self._grid = LayeredOccupancy(self._options.resolution_m)
-        self._inserted, self._revision = 0, 0
-        self._known: GridMap | None = None
+        self._inserted: list[Pose2D] = []
+        self._revision = 0
         self._costmap: LayeredCostmap | None = None
+        self._whole: LayeredCostmap | None = None
         self._refreshed = (-math.inf, -math.inf)
         self._goal: _Goal | None = None
         self._follower: LocalController | None = None
@@ -105,11 +107,6 @@ class Survey:
         self._failures = 0
         self._explored_since_loop = True
         self._closed = 0
-
-    @property
-    def known(self) -> GridMap | None:
-        """The keep-out grid as known so far."""
-        return self._known
 
     @property
     def goal(self) -> tuple[str, Pose2D] | None:
@@ -126,8 +123,9 @@ class Survey:
         assert self._costmap is not None
         self._costmap.update(self._robot, self.mapper.estimate())
         if corrected and self._goal is not None:
+            self._whole = LayeredCostmap(self.known()[0])
             self._begin(self._goal, now_s)
-        if self._goal is None or self._seen(self._goal):
+        if self._goal is None or self._seen(self._goal, now_s):
             self._choose(now_s)
         if not self.done:
             self._drive(now_s)
@@ -154,38 +152,79 @@ class Survey:
     # ---- the map so far
 
     def _refresh(self, now_s: float, *, force: bool) -> None:
-        """Bring the grid for driving up to date."""
+        """Bring the grid for driving up to date, and about the robot the costmap."""
         mapper, options = self.mapper, self._options
         due = mapper.way_m - self._refreshed[0] > options.refresh_m or now_s - self._refreshed[1] > options.refresh_s
-        if not force and not (due and self._inserted < len(mapper.keyframes)):
+        if not force and not (due and len(self._inserted) < len(mapper.keyframes)):
             return
-        if mapper.revision != self._revision:
-            self._revision, self._inserted = mapper.revision, 0
-            self._grid = LayeredOccupancy(options.resolution_m)
-        for index in range(self._inserted, len(mapper.keyframes)):
-            self._grid.insert(mapper.keyframes[index], mapper.graph.poses[index])
-        self._inserted = len(mapper.keyframes)
+        if self._moved():
+            self._grid, self._inserted = LayeredOccupancy(options.resolution_m), []
+        for index in range(len(self._inserted), len(mapper.keyframes)):
+            self._grid.insert(mapper.keyframes[index], mapper.graph.poses[index], stride=2)
+            self._inserted.append(mapper.graph.poses[index])
         self._refreshed = mapper.way_m, now_s
-        self._known = known_ground(self._grid, [*mapper.graph.poses, mapper.pose], self._footprint)
-        self._costmap = LayeredCostmap(self._known)
+        self._costmap = LayeredCostmap(self.known(options.around_m)[0])
+
+    def _moved(self) -> bool:
+        """Whether keyframes have been corrected by more than the grid for driving stands."""
+        if self.mapper.revision == self._revision:
+            return False
+        self._revision = self.mapper.revision
+        pairs = zip(self._inserted, self.mapper.graph.poses, strict=False)
+        return any(math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) > self._options.moved_m for a, b in pairs)
+
+    def known(self, around_m: float | None = None) -> tuple[GridMap, BoolGrid]:
+        """The keep-out grid as known so far, or of it what lies about the robot, and which cells were explored.
+
+        Explored is what was seen near the floor, too; where the robot itself stood is free.
+        """
+        grid, poses = self._grid, [*self._inserted, self.mapper.pose]
+        shape = grid.values.shape[1:]
+        rows, columns = slice(0, shape[0]), slice(0, shape[1])
+        if around_m is not None:
+            rows, columns = (
+                slice(
+                    max(0, math.floor((at - around_m - start) / grid.resolution_m)),
+                    math.ceil((at + around_m - start) / grid.resolution_m),
+                )
+                for at, start in ((poses[-1].y_m, grid.origin_m[1]), (poses[-1].x_m, grid.origin_m[0]))
+            )
+        origin_m = (
+            grid.origin_m[0] + columns.start * grid.resolution_m,
+            grid.origin_m[1] + rows.start * grid.resolution_m,
+        )
+        occupied, observed, low = grid.ground((rows, columns), self._options.low_m)
+        close = np.ones((3, 3), np.uint8)
+        observed, low = (
+            cv2.morphologyEx(seen.astype(np.uint8), cv2.MORPH_CLOSE, close) > 0 for seen in (observed, low)
+        )
+        stood = _stood(poses, occupied.shape, origin_m, grid.resolution_m, self._footprint.inscribed_m)
+        unknown = ~observed & ~stood & ~occupied
+        return GridMap(occupied & ~stood, grid.resolution_m, origin_m, unknown), (low & observed) | stood | occupied
 
     # ---- goals
 
-    def _seen(self, goal: _Goal) -> bool:
-        """Whether a frontier is none any more."""
-        if goal.purpose is not Purpose.FRONTIER or self._known is None or self._known.unknown is None:
+    def _seen(self, goal: _Goal, now_s: float) -> bool:
+        """Whether a frontier is none any more, looked at when the costmap has been refreshed."""
+        if goal.purpose is not Purpose.FRONTIER or self._refreshed[1] != now_s:
             return False
-        row, column = self._known.cells(np.array([goal.about]))[0]
-        about = self._known.unknown[max(0, row - 6) : row + 7, max(0, column - 6) : column + 7]
-        return int(np.count_nonzero(about)) < 6
+        window = tuple(
+            slice(
+                max(0, math.floor((at - start) / self._grid.resolution_m) - 6),
+                math.floor((at - start) / self._grid.resolution_m) + 7,
+            )
+            for at, start in zip(reversed(goal.about), reversed(self._grid.origin_m), strict=True)
+        )
+        _, _, low = self._grid.ground((window[0], window[1]), self._options.low_m)
+        return int(np.count_nonzero(~low)) < 8
 
     def _choose(self, now_s: float) -> None:
         """The next goal, or the end."""
         self._goal = None
-        if self._known is None:
-            return
-        pose = self.mapper.pose
-        ground = Ground(self._known, (pose.x_m, pose.y_m), clear_m=self._options.clear_m)
+        self._refresh(now_s, force=True)
+        pose, (known, explored) = self.mapper.pose, self.known()
+        self._whole = LayeredCostmap(known)
+        ground = Ground(known, explored, (pose.x_m, pose.y_m), clear_m=self._options.clear_m)
         if self._unsure() and (goal := self._loop_goal(ground)) is not None:
             self._explored_since_loop = False
             if self._begin(goal, now_s):
@@ -230,7 +269,9 @@ class Survey:
                 self.notes.append(f"the route's point ({point[0]:.1f}, {point[1]:.1f}) cannot be reached")
                 self._route.pop(0)
                 continue
-            pose = self._standing(stand, point if math.dist(stand, point) > 0.1 else (2 * stand[0] - here[0], 2 * stand[1] - here[1]))
+            pose = self._standing(
+                stand, point if math.dist(stand, point) > 0.1 else (2 * stand[0] - here[0], 2 * stand[1] - here[1])
+            )
             if pose is not None:
                 return _Goal(Purpose.ROUTE, pose, stand)
             self._tried.append(stand)
@@ -256,11 +297,11 @@ class Survey:
 
     def _standing(self, stand: tuple[float, float], towards: tuple[float, float]) -> Pose2D | None:
         """A pose at a place with room for the body, as nearly facing a point as can be."""
-        assert self._costmap is not None
+        assert self._whole is not None
         facing = math.atan2(towards[1] - stand[1], towards[0] - stand[0])
         turns = np.array([0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2, 1.57, -1.57, 2.2, -2.2, 2.8, -2.8, math.pi])
         poses = np.column_stack([np.full(len(turns), stand[0]), np.full(len(turns), stand[1]), facing + turns])
-        clear = footprint_clearance_m(self._costmap, self._footprint, poses)
+        clear = footprint_clearance_m(self._whole, self._footprint, poses)
         free = np.flatnonzero(clear > self._options.margin_m + 0.01)
         return Pose2D(stand[0], stand[1], float(poses[free[0], 2])) if len(free) else None
 
@@ -268,10 +309,10 @@ class Survey:
 
     def _begin(self, goal: _Goal, now_s: float) -> bool:
         """Plan a path to a goal; False when there is none."""
-        assert self._costmap is not None
+        assert self._whole is not None
         options = self._options
         problem = options.planner.problem(
-            self._costmap, self._footprint, self.mapper.pose, goal.pose, max_speed_m_s=options.max_speed_m_s
+            self._whole, self._footprint, self.mapper.pose, goal.pose, max_speed_m_s=options.max_speed_m_s
         )
         try:
             path = problem()
@@ -326,6 +367,7 @@ class Survey:
         self._failures += 1
         self._last = np.zeros(3)
         self._refresh(now_s, force=True)
+        self._whole = LayeredCostmap(self.known()[0])
         if self._failures < 3 and self._begin(goal, now_s):
             return
         self._tried.append(goal.about)
@@ -338,18 +380,16 @@ class Survey:
         return math.hypot(off.x_m, off.y_m) < 0.1 and abs(off.yaw_rad) < 0.15
 
 
-def known_ground(grid: LayeredOccupancy, stood: Sequence[Pose2D], footprint: Footprint) -> GridMap:
-    """The keep-out grid; where the robot itself stood is free."""
-    probability, observed = grid.probability("keepout")
-    occupied = probability >= OCCUPIED
-    observed = cv2.morphologyEx(observed.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
-    trail = np.zeros(occupied.shape, dtype=np.uint8)
-    shown = GridMap(np.zeros((2, 2), dtype=np.bool_), grid.resolution_m, grid.origin_m)
-    radius = math.ceil(footprint.inscribed_m / grid.resolution_m)
-    for pose in stood:
-        for reach_m in (-0.25, 0.0, 0.25):
-            ahead = compose(pose, Pose2D(reach_m, 0.0, 0.0))
-            row, column = shown.cells(np.array([(ahead.x_m, ahead.y_m)]))[0]
-            cv2.circle(trail, (int(column), int(row)), radius, 1, -1)
-    stood_on = trail > 0
-    return GridMap(occupied & ~stood_on, grid.resolution_m, grid.origin_m, ~observed & ~stood_on & ~occupied)
+def _stood(
+    poses: Sequence[Pose2D], shape: tuple[int, ...], origin_m: tuple[float, float], cell_m: float, radius_m: float
+) -> BoolGrid:
+    """The cells under the body's middle at some poses."""
+    x, y, yaw = pose_array(poses).T
+    shown = np.zeros(shape, dtype=np.uint8)
+    for reach_m in (-0.25, 0.0, 0.25):
+        row = np.floor((y + reach_m * np.sin(yaw) - origin_m[1]) / cell_m).astype(int)
+        column = np.floor((x + reach_m * np.cos(yaw) - origin_m[0]) / cell_m).astype(int)
+        inside = (row >= 0) & (column >= 0) & (row < shape[0]) & (column < shape[1])
+        shown[row[inside], column[inside]] = 1
+    size = 2 * math.ceil(radius_m / cell_m) + 1
+    return np.asarray(cv2.dilate(shown, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))) > 0)

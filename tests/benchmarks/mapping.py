@@ -189,7 +189,7 @@ def free_seen(world, grids, mapper: Mapper, true: list[Pose2D]) -> float:
     """The share of the truth's ground with room for the body that is free in the map."""
     surveyed_grid = load_grid_map(world.keepout_map_path)
     x0, y0 = grids.origin_m
-    cells = np.argwhere(grids.observed["keepout"] & (grids.probabilities["keepout"] < 0.196))
+    cells = np.argwhere(grids.observed["keepout"] & (grids.probabilities["keepout"] < 0.45))
     points = aligned((cells[:, ::-1] + 0.5) * 0.025 + np.array([x0, y0]), mapper.graph.poses, true)
     covered = np.zeros_like(surveyed_grid.occupied)
     rows, columns = surveyed_grid.cells(points).T

@@ -31,6 +31,7 @@ def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
     arguments += ["--world", asked.world] if asked.world else []
     arguments += [] if asked.require_wake is None else ["--wake" if asked.require_wake else "--no-wake"]
     arguments += ["--stack", str(asked.stack)] if asked.stack else []
+    arguments += ["--map", str(asked.map)] if asked.map else []
     if asked.file is None:
         return arguments
     arguments += [part for answer in asked.answers for part in ("--answer", answer)]

@@ -49,6 +49,9 @@ StartAt = Annotated[
     str | None,
     typer.Option(metavar="X Y YAW", help="Where the robot stands (m, rad); 'unknown': anywhere, and it finds out."),
 ]
+OwnMap = Annotated[
+    Path | None, typer.Option("--map", help="The robot's map, a folder of `errand map build`; else the world's own.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 Given = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
@@ -74,6 +77,7 @@ def run(
     profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: Store = None,
     stack: STACK = None,
+    own_map: OwnMap = None,
     start: StartAt = None,
     anyway: Anyway = False,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
@@ -94,8 +98,8 @@ def run(
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
         at = None if start is None else Start.of(start)
-        asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack, at)
-        asked = replace(asked, given=given_values(given or ()))
+        asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
+        asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
         finished, page = _run_kept(
             asked,
             kept_in,
@@ -127,6 +131,7 @@ def evaluate(
     answer: Answer = None,
     questions: Questions = None,
     stack: STACK = None,
+    own_map: OwnMap = None,
     anyway: Anyway = False,
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
     as_json: AsJson = False,
@@ -134,7 +139,7 @@ def evaluate(
     """Run a mission at many seeds and count what the trees claim and what the referee saw."""
     with refusals():
         chosen = seed_range(seeds)
-        asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack)
+        asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack, map=own_map)
         prepared = _prepared(asked, anyway=anyway)
         arguments = run_arguments(asked, prepared)
     console = console_for(as_json)

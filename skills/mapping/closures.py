@@ -47,7 +47,7 @@ def find_pose(
     reach_m: float = 0.25,
     rival_m: float = 0.5,
 ) -> Found | None:
-    """Where points (N, 2 or more columns) fit a distance field best about a guess, None when nowhere better than `least`.
+    """Where points (N, 2 or more columns) fit a distance field best about a guess, None when not better than `least`.
 
     `frame` is the field's resolution and the x, y of its outer corner (m). A rival lies farther than rival_m away.
     """
@@ -132,4 +132,4 @@ def _bound(
         outside = math.hypot(v - i, u - j) * frame[0]
         d = max(0.0, abs(distance[i, j]) + outside - slack)
         total += max(0.0, 1.0 - (d / reach) ** 2)
-    return total / max(1, count)
+    return float(total / max(1, count))

@@ -1,4 +1,4 @@
-"""Matching of points to a submap of normal distributions (the Normal Distributions Transform, Biber and Strasser, 2003).
+"""Matching of points to a submap of normal distributions (Biber and Strasser, 2003: the NDT).
 
 Each cell keeps the moments of the points in the 3 x 3 cells about it. Where these lie on a line, only the distance
 across it counts (point to line), so that a submap of noisy scans has surfaces much finer than the noise. Surfaces that

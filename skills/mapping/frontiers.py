@@ -58,7 +58,7 @@ class Ground:
         _, labels = cv2.connectedComponents(border.astype(np.uint8), connectivity=8)
         rows, columns = np.nonzero(labels)
         found = []
-        for label, cells in _grouped(labels[rows, columns], np.column_stack([rows, columns])):
+        for label, cells in _grouped(labels[rows, columns].astype(np.int32), np.column_stack([rows, columns])):
             length_m = len(cells) * self._grid.resolution_m
             if label == 0 or length_m < least_m:
                 continue

@@ -55,6 +55,8 @@ class MapperOptions:
     closure_reach_m: float = 8.0
     closure_window: Window = field(default_factory=lambda: Window(0.4, 0.05))
     window_per_m: Window = field(default_factory=lambda: Window(0.02, 0.002))
+    recognised_window: Window = field(default_factory=lambda: Window(1.5, 0.5))
+    recognised_in: int = 3
     widest: Window = field(default_factory=lambda: Window(4.0, 0.35))
     closure_score: float = 0.55
     closure_share: float = 0.6
@@ -101,6 +103,9 @@ class Mapper:
         self._tried_at_m = 0.0
         self._closed_at_m = 0.0
         self._pending: list[Edge] = []
+        self._active: list[Submap] = []
+        self._returning = False
+        self._joint: Edge | None = None
 
     @staticmethod
     def going_on(
@@ -115,7 +120,7 @@ class Mapper:
     @property
     def pose(self) -> Pose2D:
         """X_WF: where the robot is on the map."""
-        if not self.submaps:
+        if not self._active:
             return self._start
         return compose(self.graph.poses[self._current.anchor], self._X_AF)
 
@@ -128,7 +133,7 @@ class Mapper:
         """The pose as a localiser gives it."""
         X_WO = compose(self.pose, inverse(self._X_OF)).transform()
         stamp_s = -math.inf if self._scan is None else self._scan.stamp_s
-        seeing = bool(self.submaps) and self.blind_since_s is None
+        seeing = bool(self._active) and self.blind_since_s is None
         return LocalisationEstimate(stamp_s, X_WO, self._covariance.copy(), seeing)
 
     def update(self, robot: Robot) -> None:
@@ -151,12 +156,24 @@ class Mapper:
             self.blind_since_s = scan.stamp_s if self.blind_since_s is None else self.blind_since_s
             return
         self.blind_since_s = None
-        if not self.keyframes or self._keyframe_is_due():
+        if not self._active or self._keyframe_is_due():
             self._keep(Keyframe.of(scan, points_F, self._filter, robot.joints()))
+
+    def _recognised(self, points_F: FloatArray) -> bool:
+        """Find the robot on the map that it goes on from, about where that began; its keyframe then joins the graph."""
+        options, first = self._options, self.graph.poses[0]
+        for submap in sorted(self.submaps, key=lambda each: self._off_m(each, first))[: options.recognised_in]:
+            guess = relative(self.graph.poses[submap.anchor], first)
+            found = self.find_in(submap, points_F, guess, options.recognised_window)
+            if found is not None:
+                self._joint = Edge(submap.anchor, len(self.keyframes), found.pose, self._at_least(found.covariance))
+                self._start = compose(self.graph.poses[submap.anchor], found.pose)
+                return True
+        return False
 
     @property
     def _current(self) -> Submap:
-        return self.submaps[-2] if len(self.submaps) > 1 else self.submaps[-1]
+        return self._active[0]
 
     def _frozen(self, scan: Scan) -> bool:
         """Whether a scan repeats the last one, noise and all, although the robot has moved."""
@@ -181,8 +198,8 @@ class Mapper:
 
     def _matched(self, points_F: FloatArray) -> bool:
         """Match a scan to the current submap; False when it explains too little."""
-        if not self.submaps:
-            return True
+        if not self._active:
+            return not self._returning or self._recognised(points_F)
         distributions = self._current.distributions
         assert distributions is not None
         found = distributions.align(points_F, self._X_AF, self._covariance)
@@ -200,8 +217,9 @@ class Mapper:
         index = len(self.keyframes)
         self.keyframes.append(frame)
         way, self._since_keyframe = self._since_keyframe[0], (0.0, 0.0)
-        if not self.submaps:
+        if not self._active:
             self.graph.poses.append(self._start)
+            self.graph.edges.extend([] if self._joint is None else [self._joint])
             self._begin_submap(index)
             return
         current = self._current
@@ -210,8 +228,7 @@ class Mapper:
         current.members[index] = self._X_AF
         self._add_to(current, index)
         current.way_m += way
-        if len(self.submaps) > 1 and self.submaps[-1] is not current:
-            follower = self.submaps[-1]
+        for follower in self._active[1:]:
             follower.members[index] = relative(current.members[follower.anchor], self._X_AF)
             self._add_to(follower, index)
             follower.way_m += way
@@ -228,20 +245,21 @@ class Mapper:
         submap = Submap(anchor, Distributions(), {anchor: Pose2D(0.0, 0.0, 0.0)})
         self._add_to(submap, anchor)
         self.submaps.append(submap)
+        self._active.append(submap)
 
     def _change_submaps(self, index: int) -> None:
         """Begin the next submap when the current one is half full; go over to it when it is full."""
         current, options = self._current, self._options
         full = max(current.way_m / options.submap_m, len(current.members) / options.submap_keyframes)
-        alone = self.submaps[-1] is current
-        if alone and full > 0.5:
+        if len(self._active) == 1 and full > 0.5:
             self._begin_submap(index)
-        elif not alone and full > 1.0:
-            follower = self.submaps[-1]
+        elif len(self._active) > 1 and full > 1.0:
+            follower = self._active[1]
             X_AB = current.members[follower.anchor]
             self._X_AF = relative(X_AB, self._X_AF)
             self._covariance = np.diag([1e-5, 1e-5, 1e-6])
             current.distributions = None
+            self._active.pop(0)
             self._begin_submap(index)
 
     def _at_least(self, covariance: FloatArray) -> FloatArray:
@@ -300,7 +318,7 @@ class Mapper:
             min(options.widest.yaw_rad, options.closure_window.yaw_rad + options.window_per_m.yaw_rad * way),
         )
         guess = relative(self.graph.poses[submap.anchor], self.graph.poses[index])
-        found = self.find_in(submap, self.keyframes[index], guess, window)
+        found = self.find_in(submap, self.keyframes[index].points_F, guess, window)
         if found is None:
             return None
         return Edge(submap.anchor, index, found.pose, self._at_least(found.covariance), closure=True)
@@ -308,28 +326,28 @@ class Mapper:
     def _nearest_old(self, index: int) -> Submap | None:
         """The submap with the keyframe nearest to a keyframe, within reach."""
         here = self.graph.poses[index]
+        old = [submap for submap in self.submaps if max(submap.members) < self._current.anchor]
+        near = min(old, key=lambda each: self._off_m(each, here), default=None)
+        return near if near is not None and self._off_m(near, here) < self._options.closure_reach_m else None
 
-        def off_m(submap: Submap) -> float:
-            places = (self.graph.poses[member] for member in submap.members)
-            return min(math.hypot(place.x_m - here.x_m, place.y_m - here.y_m) for place in places)
+    def _off_m(self, submap: Submap, here: Pose2D) -> float:
+        """How far a pose is from the nearest keyframe of a submap."""
+        places = (self.graph.poses[member] for member in submap.members)
+        return min(math.hypot(place.x_m - here.x_m, place.y_m - here.y_m) for place in places)
 
-        old = [submap for submap in self.submaps[:-2] if max(submap.members) < self._current.anchor]
-        near = min(old, key=off_m, default=None)
-        return near if near is not None and off_m(near) < self._options.closure_reach_m else None
-
-    def find_in(self, submap: Submap, frame: Keyframe, guess: Pose2D, window: Window) -> Alignment | None:
-        """Where a keyframe fits into a submap, clearly and nowhere else in the window."""
+    def find_in(self, submap: Submap, points_F: FloatArray, guess: Pose2D, window: Window) -> Alignment | None:
+        """Where a scan's points fit into a submap, clearly and nowhere else in the window."""
         options = self._options
         distributions = self.rebuilt(submap)
         points_A = np.vstack([_placed(self.keyframes[i].points_F, pose) for i, pose in submap.members.items()])
         grid = _hit_grid(points_A)
-        few = np.ascontiguousarray(frame.points_F[:: max(1, len(frame.points_F) // 150)])
+        few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // 150)])
         place = (grid.resolution_m, *grid.origin_m)
         coarse = find_pose(grid.distance, place, few, guess, window, least=options.closure_score)
         if coarse is None or coarse.rival_score > options.rival_share * coarse.score:
             return None
         wide = np.diag([0.2**2, 0.2**2, 0.05**2])
-        found = distributions.align(frame.points_F, coarse.pose, wide)
+        found = distributions.align(points_F, coarse.pose, wide)
         return found if found.inlier_share >= options.closure_share else None
 
     def rebuilt(self, submap: Submap) -> Distributions:

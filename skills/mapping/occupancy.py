@@ -17,8 +17,8 @@ from skills.mapping.keyframe import Keyframe
 from skills.robot import FloatArray, Pose2D
 
 LOWEST_M: Final = 0.05
-LAYER_M: Final = 0.125
-LAYERS: Final = 10
+LAYER_M: Final = 0.05
+LAYERS: Final = 25
 BANDS_M: Final = {"scan": (0.7, 1.3), "keepout": (0.05, 1.0)}
 """The heights that each map speaks of."""
 UNIT: Final = 0.2
@@ -122,7 +122,7 @@ def _trace(
     sensor: FloatArray,
 ) -> None:
     """The loop of `LayeredOccupancy.insert`: misses along each beam, a hit at its end."""
-    layers, rows, columns = values.shape
+    layers = values.shape[0]
     for i in range(elevations.shape[0]):
         ce, se = math.cos(elevations[i]), math.sin(elevations[i])
         for j in range(azimuths.shape[0]):

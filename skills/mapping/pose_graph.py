@@ -14,7 +14,7 @@ from skills.robot import FloatArray, Pose2D
 _HUBER_SIGMAS = 1.5
 
 
-class MappingExtraMissing(ImportError):
+class MappingExtraMissingError(ImportError):
     """GTSAM is not installed."""
 
 
@@ -48,7 +48,7 @@ class PoseGraph:
         return [edge for edge in self.edges if edge.closure]
 
     def optimise(self) -> None:
-        """Move the poses to where all edges are satisfied best: first plainly, then with closures under Huber's loss."""
+        """Move the poses to where all edges fit best: first plainly, then with Huber's loss for closures."""
         for robust in (False, True) if self.closures else (False,):
             self.poses = self._solved(robust)
 
@@ -66,19 +66,19 @@ class PoseGraph:
 
     def covariance(self, index: int) -> FloatArray:
         """The marginal covariance of a pose, x, y (m) and yaw (rad) in its own axes."""
-        gtsam = _gtsam()
+        gtsam = gtsam_module()
         marginals = gtsam.Marginals(self._factors(False), self._values())
         return np.asarray(marginals.marginalCovariance(index))
 
     def _values(self) -> Any:
-        gtsam = _gtsam()
+        gtsam = gtsam_module()
         values = gtsam.Values()
         for index, pose in enumerate(self.poses):
             values.insert(index, gtsam.Pose2(pose.x_m, pose.y_m, pose.yaw_rad))
         return values
 
     def _factors(self, robust: bool) -> Any:
-        gtsam = _gtsam()
+        gtsam = gtsam_module()
         factors, noise = gtsam.NonlinearFactorGraph(), gtsam.noiseModel
         first = self.poses[0]
         anchor = noise.Diagonal.Sigmas(np.full(3, 1e-4))
@@ -92,14 +92,15 @@ class PoseGraph:
         return factors
 
     def _solved(self, robust: bool) -> list[Pose2D]:
-        solved = _gtsam().LevenbergMarquardtOptimizer(self._factors(robust), self._values()).optimize()
+        solved = gtsam_module().LevenbergMarquardtOptimizer(self._factors(robust), self._values()).optimize()
         found = (solved.atPose2(index) for index in range(len(self.poses)))
         return [Pose2D(pose.x(), pose.y(), pose.theta()) for pose in found]
 
 
-def _gtsam() -> Any:
+def gtsam_module() -> Any:
+    """GTSAM, imported when it is needed. Raises MappingExtraMissingError."""
     try:
         import gtsam
     except ImportError as error:
-        raise MappingExtraMissing("GTSAM is not installed") from error
+        raise MappingExtraMissingError("GTSAM is not installed") from error
     return gtsam

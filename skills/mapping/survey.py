@@ -17,23 +17,24 @@ from skills.geometry import relative
 from skills.mapping.frontiers import Ground
 from skills.mapping.mapper import Mapper
 from skills.mapping.occupancy import LayeredOccupancy
-from skills.navigate.follower import FollowerOptions
+from skills.navigate.follower import FollowerOptions, PathFollower
 from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner
 from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
-from skills.stack import LocalController
 
 _EXPIRY_S = 0.3
 
 
 @dataclass(frozen=True)
 class SurveyOptions:
-    """Metres, m/s and seconds of the robot's clock. The robot goes back to a known place before `unsure_m` is passed.
+    """Metres, m/s and seconds of the robot's clock.
 
-    That is the standard deviation of its place, once `back_after_m` were driven since the last loop.
+    Ground counts as explored within `explored_m`. The robot goes back to a known place when the standard deviation of
+    its own place passes `unsure_m`, once `back_after_m` were driven since the last loop.
     """
 
     resolution_m: float = 0.05
+    explored_m: float = 5.0
     max_speed_m_s: float = 0.7
     margin_m: float = 0.05
     clear_m: float = 0.33
@@ -93,14 +94,14 @@ class Survey:
         self.done = False
         self.trouble: str | None = None
         self.notes: list[str] = []
-        self._grid = LayeredOccupancy(self._options.resolution_m)
+        self._grid = LayeredOccupancy(self._options.resolution_m, self._options.explored_m)
         self._inserted: list[Pose2D] = []
         self._revision = 0
         self._costmap: LayeredCostmap | None = None
         self._whole: LayeredCostmap | None = None
         self._refreshed = (-math.inf, -math.inf)
         self._goal: _Goal | None = None
-        self._follower: LocalController | None = None
+        self._follower: PathFollower | None = None
         self._last: FloatArray = np.zeros(3)
         self._tried: list[tuple[float, float]] = []
         self._best_m, self._best_s = math.inf, -math.inf
@@ -158,7 +159,7 @@ class Survey:
         if not force and not (due and len(self._inserted) < len(mapper.keyframes)):
             return
         if self._moved():
-            self._grid, self._inserted = LayeredOccupancy(options.resolution_m), []
+            self._grid, self._inserted = LayeredOccupancy(options.resolution_m, options.explored_m), []
         for index in range(len(self._inserted), len(mapper.keyframes)):
             self._grid.insert(mapper.keyframes[index], mapper.graph.poses[index], stride=2)
             self._inserted.append(mapper.graph.poses[index])

@@ -18,6 +18,7 @@ import sys
 import time
 from pathlib import Path
 
+import cv2
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
@@ -95,13 +96,11 @@ class InPlant:
 
     def __init__(self, simulation: Simulation) -> None:
         self.robot, self._simulation = simulation.robots["Alice"], simulation
-        self._body = simulation.engine.world.robots["Alice"].body
         self.advance, self.now = simulation.clock.advance, simulation.clock.now
 
     @property
     def true(self) -> Pose2D:
-        engine = self._simulation.engine
-        return Pose2D.from_transform(engine.world.plant.EvalBodyPoseInWorld(engine.context, self._body))
+        return self._simulation.true_pose("Alice")
 
 
 def survey(name: str, seed: int, route: Path | None, out: Path | None, *, dynamics: bool, most_s: float) -> dict:
@@ -120,7 +119,7 @@ def survey(name: str, seed: int, route: Path | None, out: Path | None, *, dynami
     own_s, told, begun, slowest = 0.0, 0.0, time.perf_counter(), 0.0
     while not made.done and plant.now() < most_s:
         plant.advance(STEP_S)
-        truth[round(robot.scan().stamp_s, 3)] = plant.true if dynamics else plant.true
+        truth[round(robot.scan().stamp_s, 3)] = plant.true
         tick = time.process_time()
         made.tick(plant.now())
         took = time.process_time() - tick
@@ -159,6 +158,7 @@ def survey(name: str, seed: int, route: Path | None, out: Path | None, *, dynami
         "false_closures": false_closures(mapper, true),
         "dropped_closures": mapper.dropped,
         "walls_within": {band: walls_within(world, grids, mapper, true, band) for band in ("scan", "keepout")},
+        "obstacles_found": obstacles_found(world, grids, mapper, true),
         "free_seen": free_seen(world, grids, mapper, true),
         "contacts": len(simulation.referee.collisions),
         "own_cpu_s": round(own_s + render_s, 1),
@@ -197,6 +197,22 @@ def free_seen(world, grids, mapper: Mapper, true: list[Pose2D]) -> float:
     covered[rows[inside], columns[inside]] = True
     wanted = surveyed_grid.with_unknown_blocked().distance > 0.3
     return round(float(covered[wanted].mean()), 4)
+
+
+def obstacles_found(world, grids, mapper: Mapper, true: list[Pose2D]) -> float:
+    """The share of the keep-out's surface by the ground where the body fits that the map has within 10 cm."""
+    truth = load_grid_map(world.keepout_map_path)
+    cells = np.argwhere(grids.probabilities["keepout"] > 0.65)
+    points = aligned((cells[:, ::-1] + 0.5) * 0.025 + np.array(grids.origin_m), mapper.graph.poses, true)
+    rows, columns = truth.cells(points).T
+    inside = (rows >= 0) & (columns >= 0) & (rows < truth.occupied.shape[0]) & (columns < truth.occupied.shape[1])
+    found = np.ones(truth.occupied.shape, dtype=np.uint8)
+    found[rows[inside], columns[inside]] = 0
+    off_m = cv2.distanceTransform(found, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * truth.resolution_m
+    fits = (truth.with_unknown_blocked().distance > 0.3).astype(np.uint8)
+    near = cv2.dilate(fits, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (27, 27))) > 0
+    surface = truth.occupied & near & (truth.distance > -truth.resolution_m)
+    return round(float(np.mean(off_m[surface] < 0.1)), 4)
 
 
 def main() -> None:

@@ -67,14 +67,15 @@ class Ground:
                 found.append(Frontier(*nearest, length_m=length_m))
         return sorted(found, key=lambda each: each.cost_m)
 
-    def nearest_stand(self, x: float, y: float) -> tuple[float, float] | None:
-        """The reachable place that is nearest to a point, None when there is none."""
-        places = np.argwhere(self._stands)
-        if len(places) == 0:
-            return None
-        xy = self._grid.centres(places * _STEP)
-        best = xy[int(np.argmin(np.hypot(xy[:, 0] - x, xy[:, 1] - y)))]
-        return float(best[0]), float(best[1])
+    def stands_near(self, x: float, y: float, *, most: int, apart_m: float) -> list[tuple[float, float]]:
+        """Reachable places nearest to a point, the nearest first, at least so far apart."""
+        xy = self._grid.centres(np.argwhere(self._stands) * _STEP)
+        xy = xy[np.argsort(np.hypot(xy[:, 0] - x, xy[:, 1] - y), kind="stable")]
+        chosen: list[tuple[float, float]] = []
+        while len(xy) > 0 and len(chosen) < most:
+            chosen.append((float(xy[0, 0]), float(xy[0, 1])))
+            xy = xy[np.hypot(*(xy - xy[0]).T) >= apart_m]
+        return chosen
 
     def cost_to(self, x: float, y: float) -> float:
         """The way (m) to a place; infinite when it cannot be reached."""

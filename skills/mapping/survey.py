@@ -259,23 +259,19 @@ class Survey:
     def _route_goal(self, ground: Ground) -> _Goal | None:
         """As near to the next point of the route as is known to be free."""
         assert self._route is not None
-        here = (self.mapper.pose.x_m, self.mapper.pose.y_m)
+        here, near_m = (self.mapper.pose.x_m, self.mapper.pose.y_m), self._options.route_tolerance_m
         while self._route:
             point = self._route[0]
-            stand = ground.nearest_stand(*point)
-            if math.dist(here, point) < self._options.route_tolerance_m:
-                self._route.pop(0)
-                continue
-            if stand is None or math.dist(here, stand) < self._options.route_tolerance_m or stand in self._tried:
+            away_m = math.dist(here, point)
+            if away_m >= near_m:
+                for stand in ground.stands_near(*point, most=60, apart_m=0.25):
+                    if math.dist(stand, point) > away_m - 0.5 * near_m:
+                        break
+                    pose = self._standing(stand, _beyond(here, stand, point))
+                    if pose is not None and stand not in self._tried:
+                        return _Goal(Purpose.ROUTE, pose, stand)
                 self.notes.append(f"the route's point ({point[0]:.1f}, {point[1]:.1f}) cannot be reached")
-                self._route.pop(0)
-                continue
-            pose = self._standing(
-                stand, point if math.dist(stand, point) > 0.1 else (2 * stand[0] - here[0], 2 * stand[1] - here[1])
-            )
-            if pose is not None:
-                return _Goal(Purpose.ROUTE, pose, stand)
-            self._tried.append(stand)
+            self._route.pop(0)
         return None
 
     def _loop_goal(self, ground: Ground) -> _Goal | None:
@@ -394,3 +390,8 @@ def _stood(
         shown[row[inside], column[inside]] = 1
     size = 2 * math.ceil(radius_m / cell_m) + 1
     return np.asarray(cv2.dilate(shown, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))) > 0)
+
+
+def _beyond(here: tuple[float, float], stand: tuple[float, float], point: tuple[float, float]) -> tuple[float, float]:
+    """What to face at a place on a route: the route's point, or ahead where that is the place itself."""
+    return point if math.dist(stand, point) > 0.1 else (2.0 * stand[0] - here[0], 2.0 * stand[1] - here[1])

@@ -237,6 +237,11 @@ class Simulation:
         """The robots by name."""
         return self.engine.robots
 
+    def true_pose(self, robot_name: str) -> Pose2D:
+        """Where a robot's body really is, for judging afterwards; no robot is told. Raises KeyError."""
+        body = self.engine.world.robots[robot_name].body
+        return Pose2D.from_transform(self.engine.world.plant.EvalBodyPoseInWorld(self.engine.context, body))
+
     def work(self) -> Mapping[str, int]:
         """What this process has had to do so far, by name: counts that the same run repeats, whatever the machine."""
         return {**self.engine.work, "contact_points": self.referee.contact_points}

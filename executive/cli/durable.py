@@ -34,6 +34,7 @@ def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
     arguments += ["--stack", str(asked.stack)] if asked.stack else []
     arguments += [] if asked.start is None else [f"--start={asked.start}"]
     arguments += [f"--set={name}={json.dumps(value)}" for name, value in asked.given.items()]
+    arguments += ["--map", str(asked.map)] if asked.map else []
     if asked.file is None:
         return arguments
     arguments += [part for answer in asked.answers for part in ("--answer", answer)]

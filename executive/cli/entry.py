@@ -53,6 +53,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "dataset": _Command("dataset_command", "dataset", "Labelled pictures rendered in the plant; scores, training."),
     "stack": _Command("stack_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
+    "map": _Command("map_command", "map_group", "Maps that the robot makes itself, by exploring or along a route."),
     "world": _Command("world_command", "world", "Worlds made of any map, and how a world looks."),
     "new-skill": _Command("new_skill_command", "new_skill", "Write an installable package with a skill and tests."),
 }

@@ -46,6 +46,9 @@ Questions = Annotated[
 ]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
 Anyway = Annotated[bool, typer.Option("--anyway", help="Begin although `errand check` would refuse it.")]
+OwnMap = Annotated[
+    Path | None, typer.Option("--map", help="The robot's map, a folder of `errand map build`; else the world's own.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 PageOf = Callable[[Prepared], PageView | None]
 
@@ -68,6 +71,7 @@ def run(
     profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: Store = None,
     stack: STACK = None,
+    own_map: OwnMap = None,
     start: START_OR_UNKNOWN = None,
     anyway: Anyway = False,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
@@ -88,8 +92,8 @@ def run(
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
         at = None if start is None else Start.of(start)
-        asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack, at)
-        asked = replace(asked, given=given_values(given or ()))
+        asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
+        asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
         finished, page = _run_kept(
             asked,
             kept_in,
@@ -122,6 +126,7 @@ def evaluate(
     answer: Answer = None,
     questions: Questions = None,
     stack: STACK = None,
+    own_map: OwnMap = None,
     start: START_OR_UNKNOWN = None,
     anyway: Anyway = False,
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
@@ -131,7 +136,7 @@ def evaluate(
     with refusals():
         chosen = seed_range(seeds)
         at = None if start is None else Start.of(start)
-        asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack, start=at)
+        asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack, start=at, map=own_map)
         asked = replace(asked, given=given_values(given or ()))
         prepared = _prepared(asked, anyway=anyway)
         arguments = run_arguments(asked, prepared)

@@ -9,7 +9,7 @@ from pathlib import Path
 from executive.cli.answers import answerer, ask_at_terminal
 from executive.cli.missions_command import mission_file
 from executive.cli.plugins import usable_skills
-from executive.cli.worlds import knowledge_of, open_world, refuse_blocked
+from executive.cli.worlds import knowledge_of, open_world, refuse_blocked, with_map
 from executive.language import Understanding, load_parser
 from executive.language.questions import Answerer
 from executive.mission.command import parse_command
@@ -106,6 +106,8 @@ def _with_people(loaded: MissionFile, world: World, knowledge: Knowledge) -> Wor
 def _standing(request: Request, world: World) -> tuple[World, Knowledge]:
     """The world and what is known of it, with the robot where the request has it. Raises InputError: it is not free."""
     knowledge = knowledge_of(world)
+    if request.map is not None:
+        world = with_map(world, request.map)
     start = None if request.start is None else request.start.pose
     if start is None:
         return world, knowledge

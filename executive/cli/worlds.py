@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from executive.mission.errors import InputError, known_names, suggestion
@@ -49,6 +51,16 @@ def refuse_blocked(world: World, pose: Pose2D) -> None:
         there = f"({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g})"
         hint = "give a free pose; `errand world show` draws the world"
         raise InputError(f"at the start {there} the robot stands in something or outside of {world.name}", hint=hint)
+
+
+def with_map(world: World, folder: Path) -> World:
+    """The world with the robot's map from a folder, as `errand map build` leaves it. Raises InputError: it has none."""
+    chosen = replace(world, maps=folder.resolve())
+    for path in (chosen.scan_map_path, chosen.keepout_map_path):
+        if not path.is_file():
+            hint = "make one by `errand map build`, or let it finish"
+            raise InputError(f"there is no map: {path.name} is missing", hint=hint, file=folder)
+    return chosen
 
 
 def knowledge_of(world: World) -> Knowledge:

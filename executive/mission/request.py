@@ -51,7 +51,8 @@ class Request:
     `world` is as it was said, if it was; `require_wake` tells whether the robot's name must be said (None: the world
     decides); `answers` are to the questions that it leaves open, in their order, and `questions` says what becomes of
     further ones. `given` are values for a file's parameters; the robot stands at `start`, where the world's own is not
-    meant. `out` is the folder for the run's files, `stack` the file that says what the robot uses.
+    meant. `out` is the folder for the run's files, `stack` the file that says what the robot uses, `map` the
+    folder of the map that it has in place of the world's own.
 
     What stands below `start` is filled once it is understood. Then another process can take it up: a sentence has the
     answers in their places, and `text` is that of the file.
@@ -67,6 +68,7 @@ class Request:
     out: Path = Path("out")
     record: bool = True
     stack: Path | None = None
+    map: Path | None = None
     start: Start | None = None
     given: Mapping[str, Any] = field(default_factory=dict)
     name: str = ""
@@ -86,4 +88,5 @@ class Request:
         file = None if self.file is None else self.file.resolve()
         world = self.world if self.world is None or not Path(self.world).exists() else str(Path(self.world).resolve())
         stack = None if self.stack is None else self.stack.resolve()
-        return replace(self, file=file, world=world, out=self.out.resolve(), stack=stack)
+        own_map = None if self.map is None else self.map.resolve()
+        return replace(self, file=file, world=world, out=self.out.resolve(), stack=stack, map=own_map)

@@ -10,7 +10,7 @@ from typing import Final
 
 from executive.mission.errors import InputError, disk_is_full
 
-VERSION: Final = 3
+VERSION: Final = 4
 APPLICATION_ID: Final = 0x45525244  # "ERRD"
 BUSY_S: Final = 2.0
 _DAMAGED: Final = "move it away (its missions are lost), or name another by --store"
@@ -30,6 +30,7 @@ CREATE TABLE mission (
     out TEXT NOT NULL,
     record INTEGER NOT NULL,
     stack TEXT,
+    map TEXT,
     given TEXT NOT NULL,
     start TEXT,
     commands TEXT NOT NULL,

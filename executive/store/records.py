@@ -48,7 +48,7 @@ _AS_THEY_ARE: Final = ("name", "world_name", "robot", "seed", "fingerprint", "se
 def row_of(request: Request) -> dict[str, Any]:
     """A request that was understood as columns; its answers stand in its sentence."""
     own = {name: getattr(request, name) for name in _AS_THEY_ARE}
-    paths = {name: None if (path := getattr(request, name)) is None else str(path) for name in ("file", "stack")}
+    paths = {name: None if (path := getattr(request, name)) is None else str(path) for name in ("file", "stack", "map")}
     flags = {"require_wake": _WORLD if request.require_wake is None else request.require_wake, "record": request.record}
     start = None if request.start is None else str(request.start)
     told = {"given": json.dumps(dict(request.given)), "start": start}
@@ -62,6 +62,7 @@ def request_of(row: Mapping[str, Any]) -> Request:
         commands=tuple(json.loads(row["commands"])),
         file=None if row["file"] is None else Path(row["file"]),
         stack=None if row["stack"] is None else Path(row["stack"]),
+        map=None if row["map"] is None else Path(row["map"]),
         given=json.loads(row["given"]),
         start=None if row["start"] is None else Start.of(row["start"]),
         out=Path(row["out"]),

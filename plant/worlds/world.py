@@ -157,7 +157,8 @@ class World:
     """A world's files and what the plant needs to know of them. Lengths in metres, world frame.
 
     Only its geometry and a start are needed: no dock, rooms, surfaces or seed rules. `standing` tells where somebody
-    stands who is in a room, or at a surface.
+    stands who is in a room, or at a surface. The robot has the grids of the folder `maps`, None for those of the
+    world's own survey.
     """
 
     name: str
@@ -169,6 +170,7 @@ class World:
     surface_places: dict[str, str]
     seed_rules: SeedRules
     standing: Mapping[str, Point] = field(default_factory=dict)
+    maps: Path | None = None
 
     @property
     def corners(self) -> Polygon:
@@ -201,13 +203,13 @@ class World:
 
     @property
     def scan_map_path(self) -> Path:
-        """The surveyed grid of what the LiDAR sees."""
-        return self.folder / "map" / "scan.yaml"
+        """The grid of what the LiDAR sees."""
+        return (self.maps or self.folder / "map") / "scan.yaml"
 
     @property
     def keepout_map_path(self) -> Path:
-        """The surveyed grid of what the body would touch."""
-        return self.folder / "map" / "keepout.yaml"
+        """The grid of what the body would touch."""
+        return (self.maps or self.folder / "map") / "keepout.yaml"
 
 
 def add_package(package_map: PackageMap) -> None:

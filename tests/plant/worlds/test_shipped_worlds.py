@@ -1,4 +1,4 @@
-"""The worlds of our own are fit for the robot: doors, free poses, surfaces at their heights, maps that agree with the shapes."""
+"""The worlds of our own fit the robot: doors, free poses, heights of surfaces, maps that agree with the shapes."""
 
 from __future__ import annotations
 

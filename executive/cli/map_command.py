@@ -1,0 +1,255 @@
+"""`errand map`: the robot explores, or follows a route, and makes its own map."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+import yaml
+
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals
+from executive.cli.signals import cancelled_by_signals
+from executive.cli.worlds import open_world
+from executive.mission.errors import InputError
+from executive.run.control import Control
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from plant.simulation import Simulation
+    from plant.worlds.world import World
+    from skills.mapping.mapper import Mapper
+    from skills.mapping.survey import Survey
+    from skills.robot import Pose2D
+
+__all__ = ["map_group"]
+
+TICK_S: Final = 0.05
+TOLD_EVERY_S: Final = 10.0
+DRAWN_EVERY_S: Final = 1.5
+KEPT_EVERY_S: Final = 20.0
+"""Seconds of the robot's clock between two lines, and of the wall's between two pictures and two savings."""
+MOST_POINTS: Final = 10_000
+PICTURE: Final = "map.png"
+
+map_group = typer.Typer(name="map", help="Maps that the robot makes itself.", rich_markup_mode=None)
+
+
+@map_group.callback()
+def _group() -> None:
+    """Maps that the robot makes itself."""
+
+
+@map_group.command()
+def build(
+    world: Annotated[str, typer.Option(help="World by name or folder.")],
+    out: Annotated[Path, typer.Option("--out", help="The map's folder; a map that is in it already goes on.")],
+    seed: Annotated[int, typer.Option(min=0, help="Sets the things in the world and all noise.")] = 1,
+    route: Annotated[
+        Path | None, typer.Option(help="Points x y (m) to drive to, from the start: one in a line, or a YAML list.")
+    ] = None,
+    most_s: Annotated[
+        float, typer.Option("--max-time", min=1.0, help="End after so many seconds of driving.")
+    ] = 7200.0,
+    as_json: Annotated[bool, typer.Option("--json", help="The last line of output is the result as JSON.")] = False,
+) -> None:
+    """Explore a world, or follow a route, and save both grids and the pose graph."""
+    console = console_for(as_json)
+    with refusals():
+        opened = open_world(world)
+        points = None if route is None else _route_points(route)
+        mapper = _mapper(opened, out)
+        building = _Building(opened, seed, mapper, points, out, console)
+        with cancelled_by_signals(Control(pace=None)) as control:
+            ended = building.drive(most_s, lambda: control.poll().cancel is not None)
+        result = building.result()
+    if ended is not None:
+        console.print(f"errand: the map is not complete: {ended}", markup=False)
+    console.print(f"{result['map']}: {result['distance_m']} m driven, {result['loop_closures']} loops", markup=False)
+    if as_json:
+        print_json(result)
+    if ended is not None:
+        raise typer.Exit(NOT_ACHIEVED)
+
+
+class _Building:
+    """One drive: plant, survey, what is told and drawn meanwhile, and the truth for judging the map afterwards."""
+
+    def __init__(
+        self,
+        world: World,
+        seed: int,
+        mapper: Mapper,
+        points: Sequence[tuple[float, float]] | None,
+        out: Path,
+        console: Console,
+    ) -> None:
+        from executive.cli.assembly import simulate
+        from skills.geometry import compose
+        from skills.mapping.survey import Survey
+        from skills.robot import Pose2D
+
+        self._mapper, self._out, self._console = mapper, out, console
+        self._seed, self._world = seed, world
+        self._name = "Alice"
+        self._simulation: Simulation = simulate(world, seed=seed, robot_name=self._name, record=False)
+        self._robot = self._simulation.robots[self._name]
+        route = None
+        if points is not None:
+            there = (compose(world.start, Pose2D(x, y, 0.0)) for x, y in points)
+            route = [(pose.x_m, pose.y_m) for pose in there]
+        lease = self._robot.acquire_lease("errand map")
+        self._survey: Survey = Survey(self._robot, lease, mapper, home=world.start, route=route)
+        self._first = len(mapper.keyframes)
+        self._true: dict[float, Pose2D] = {}
+        self._begun_s = time.monotonic()
+
+    def drive(self, most_s: float, cancelled: Callable[[], bool]) -> str | None:
+        """Until the survey is done; why it ended before, None when it did not."""
+        clock, survey = self._simulation.clock, self._survey
+        told_s, drawn_s, kept_s = 0.0, -math.inf, time.monotonic()
+        try:
+            while not survey.done and clock.now() < most_s and not cancelled():
+                clock.advance(TICK_S)
+                if (scan := self._robot.scan()) is not None:
+                    self._true[round(scan.stamp_s, 4)] = self._simulation.true_pose(self._name)
+                survey.tick(clock.now())
+                wall_s = time.monotonic()
+                if clock.now() >= told_s:
+                    told_s += TOLD_EVERY_S
+                    self._tell(clock.now())
+                if wall_s - drawn_s > DRAWN_EVERY_S:
+                    self._draw()
+                    drawn_s = time.monotonic()
+                if wall_s - kept_s > KEPT_EVERY_S:
+                    self._keep()
+                    kept_s = time.monotonic()
+        finally:
+            survey.stop()
+            if self._mapper.keyframes:
+                self._keep()
+        for note in survey.notes:
+            self._console.print(note, markup=False)
+        if survey.trouble is not None or survey.done:
+            return survey.trouble
+        return "it was broken off; the same command goes on" if cancelled() else f"{most_s:g} s are over"
+
+    def result(self) -> dict[str, Any]:
+        """Save the grids; what scripts are told. Raises InputError."""
+        from plant.referee.trajectory import trajectory_error_m
+        from skills.mapping.map_folder import save_grids, surveyed
+
+        mapper = self._mapper
+        if not mapper.keyframes:
+            raise InputError("no map was made", hint="look at the robot's LiDAR")
+        with _writing(self._out):
+            path = save_grids(self._out, surveyed(mapper))
+        self._draw()
+        pairs = [
+            (pose, self._true[round(frame.stamp_s, 4)])
+            for pose, frame in list(zip(mapper.graph.poses, mapper.keyframes, strict=True))[self._first :]
+        ]
+        error_m = trajectory_error_m(*zip(*pairs, strict=True)) if len(pairs) > 1 else 0.0
+        return {
+            "world": self._world.name,
+            "seed": self._seed,
+            "map": str(path),
+            "distance_m": round(mapper.way_m, 2),
+            "loop_closures": len(mapper.graph.closures),
+            "sim_time_s": round(self._simulation.clock.now(), 2),
+            "wall_time_s": round(time.monotonic() - self._begun_s, 2),
+            "trajectory_error_m": round(error_m, 4),
+        }
+
+    def _tell(self, now_s: float) -> None:
+        mapper, goal = self._mapper, self._survey.goal
+        purpose = "" if goal is None else f", to {goal[0]}"
+        self._console.print(
+            f"{now_s:6.0f} s  {mapper.way_m:6.1f} m  {len(mapper.keyframes)} keyframes, "
+            f"{len(mapper.graph.closures)} loops{purpose}",
+            markup=False,
+        )
+
+    def _draw(self) -> None:
+        from executive.cli.map_picture import map_picture
+        from executive.cli.picture_files import write_picture
+
+        if not self._mapper.keyframes:
+            return
+        goal = self._survey.goal
+        picture = map_picture(
+            self._survey.known()[0], self._mapper.graph, self._mapper.pose, None if goal is None else goal[1]
+        )
+        draft = self._out / f".{PICTURE}"
+        write_picture(draft, picture)
+        with _writing(self._out):
+            draft.replace(self._out / PICTURE)
+
+    def _keep(self) -> None:
+        """Save what the next run goes on from."""
+        from skills.mapping.map_folder import save_graph
+
+        with _writing(self._out):
+            save_graph(self._out, self._mapper)
+
+
+class _writing:  # noqa: N801
+    """What cannot be written is bad input."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
+        if isinstance(error, OSError):
+            hint = "name another --out"
+            raise InputError(f"the map cannot be written ({error.strerror})", hint=hint, file=self._folder) from error
+
+
+def _mapper(world: World, out: Path) -> Mapper:
+    """A new map, or the one that is in a folder. Raises InputError."""
+    from skills.mapping.map_folder import GRAPH_FILE, MapFolderError, load_mapper
+    from skills.mapping.mapper import Mapper
+    from skills.mapping.pose_graph import MappingExtraMissingError, gtsam_module
+
+    logging.getLogger("drake").setLevel(logging.WARNING)
+    try:
+        gtsam_module()
+    except MappingExtraMissingError as error:
+        raise InputError(str(error), hint="pip install 'spot-errand[mapping]'") from error
+    with _writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+    if not (out / GRAPH_FILE).exists():
+        return Mapper(world.start)
+    try:
+        return load_mapper(out)
+    except MapFolderError as error:
+        raise InputError(str(error)) from error
+
+
+def _route_points(path: Path) -> list[tuple[float, float]]:
+    """The points of a route. Raises InputError."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        told = yaml.safe_load(text)
+        rows = (
+            told
+            if isinstance(told, list)
+            else [line.split("#")[0].replace(",", " ").split() for line in text.splitlines()]
+        )
+        points = [(float(x), float(y)) for x, y in (row for row in rows if row)]
+        if not 0 < len(points) <= MOST_POINTS or not all(math.isfinite(x + y) for x, y in points):
+            raise ValueError
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", hint="check the path", file=path) from error
+    except (yaml.YAMLError, ValueError, TypeError) as error:
+        hint = f"write x and y in metres from the start, one point in a line, at most {MOST_POINTS}"
+        raise InputError("it is no route", hint=hint, file=path) from error
+    return points

@@ -1,0 +1,171 @@
+"""Matching of points to a submap of normal distributions (Biber and Strasser, 2003: the NDT).
+
+Each cell keeps the moments of the points in the 3 x 3 cells about it. Where these lie on a line, only the distance
+across it counts (point to line), so that a submap of noisy scans has surfaces much finer than the noise. Surfaces that
+face different ways are kept apart by quarters, so that the two sides of a thin wall are not one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.estimate.compiled import compiled
+from skills.geometry import wrap
+from skills.robot import FloatArray, Pose2D
+
+CELL_M = 0.1
+_QUARTERS = 4
+_QUARTER_RAD = 0.5 * math.pi
+Moments = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """The pose X_AF, its covariance over x, y (m), yaw (rad), and the share of points that lie on the submap."""
+
+    pose: Pose2D
+    covariance: FloatArray
+    inlier_share: float
+
+
+@dataclass(frozen=True)
+class AlignOptions:
+    """`sigma_m` is a point's noise across a surface; all points count as `effective_points` independent ones.
+
+    Points farther off than `outlier_m` have no weight, in the first third of the iterations `coarse_outlier_m`.
+    """
+
+    sigma_m: float = 0.03
+    effective_points: float = 80.0
+    outlier_m: float = 0.12
+    coarse_outlier_m: float = 0.3
+    inlier_m: float = 0.1
+    iterations: int = 12
+
+
+class Distributions:
+    """A submap about the origin of its own frame A, `half_m` to all sides."""
+
+    def __init__(self, half_m: float = 26.0) -> None:
+        cells = math.ceil(2.0 * half_m / CELL_M)
+        self._low_m = -0.5 * cells * CELL_M
+        self._moments: Moments = np.zeros((cells, cells, _QUARTERS, 6), dtype=np.float32)
+
+    def add(self, points_F: FloatArray, X_AF: Pose2D) -> None:
+        """Add the points (N, 3) of a scan taken at a pose: x, y, and the direction that the surface faces (rad)."""
+        _add(self._moments, self._low_m, points_F, np.array([X_AF.x_m, X_AF.y_m, X_AF.yaw_rad]))
+
+    def align(
+        self, points_F: FloatArray, prior: Pose2D, covariance: FloatArray, options: AlignOptions | None = None
+    ) -> Alignment:
+        """The pose at which points (N, 3) lie best on the submap, given a prior."""
+        used = options or AlignOptions()
+        mean = np.array([prior.x_m, prior.y_m, prior.yaw_rad])
+        share = min(1.0, used.effective_points / max(1, len(points_F)))
+        limits = (used.sigma_m, share, used.coarse_outlier_m, used.outlier_m, used.inlier_m)
+        information = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
+        pose, hessian, inliers = _align(
+            self._moments, self._low_m, points_F, mean, information, limits, used.iterations
+        )
+        aligned = Pose2D(float(pose[0]), float(pose[1]), wrap(float(pose[2])))
+        return Alignment(aligned, np.asarray(np.linalg.inv(hessian)), inliers)
+
+
+@compiled
+def _add(moments: Moments, low: float, points: FloatArray, pose: FloatArray) -> None:
+    """The loop of `Distributions.add`: count, x, y, xx, xy, yy, seen from each cell's own centre."""
+    cells = moments.shape[0]
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for n in range(points.shape[0]):
+        x = pose[0] + c * points[n, 0] - s * points[n, 1]
+        y = pose[1] + s * points[n, 0] + c * points[n, 1]
+        column, row = math.floor((x - low) / CELL_M), math.floor((y - low) / CELL_M)
+        if not (1 <= column < cells - 1 and 1 <= row < cells - 1):
+            continue
+        quarter = math.floor((points[n, 2] + pose[2]) / _QUARTER_RAD) % _QUARTERS
+        for i in range(row - 1, row + 2):
+            for j in range(column - 1, column + 2):
+                u, v = x - low - (j + 0.5) * CELL_M, y - low - (i + 0.5) * CELL_M
+                cell = moments[i, j, quarter]
+                cell[0] += 1.0
+                cell[1] += u
+                cell[2] += v
+                cell[3] += u * u
+                cell[4] += u * v
+                cell[5] += v * v
+
+
+@compiled
+def _align(
+    moments: Moments,
+    low: float,
+    points: FloatArray,
+    mean: FloatArray,
+    information: FloatArray,
+    limits: tuple[float, float, float, float, float],
+    iterations: int,
+) -> tuple[FloatArray, FloatArray, float]:
+    """Pose, Hessian there, share of inliers: robust Gauss-Newton."""
+    pose, hessian, inliers = mean.copy(), information.copy(), 0
+    for iteration in range(iterations):
+        cap = limits[2] if iteration < iterations // 3 else limits[3]
+        hessian, gradient, inliers = _linearise(moments, low, points, pose, limits, cap)
+        hessian += information
+        gradient += information @ (pose - mean)
+        step = np.linalg.solve(hessian, gradient)
+        pose -= step
+        if iteration > iterations // 3 and abs(step[0]) + abs(step[1]) + abs(step[2]) < 1e-4:
+            break
+    return pose, hessian, inliers / max(1, points.shape[0])
+
+
+@compiled
+def _linearise(
+    moments: Moments,
+    low: float,
+    points: FloatArray,
+    pose: FloatArray,
+    limits: tuple[float, float, float, float, float],
+    cap: float,
+) -> tuple[FloatArray, FloatArray, int]:
+    """Hessian and gradient of the points' weighted squares (Tukey's biweight), and the count of inliers."""
+    hessian, gradient = np.zeros((3, 3)), np.zeros(3)
+    jacobian, cells, inliers = np.zeros(3), moments.shape[0], 0
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    floor = limits[0] * limits[0]
+    for n in range(points.shape[0]):
+        dx, dy = c * points[n, 0] - s * points[n, 1], s * points[n, 0] + c * points[n, 1]
+        x, y = pose[0] + dx - low, pose[1] + dy - low
+        column, row = math.floor(x / CELL_M), math.floor(y / CELL_M)
+        if not (0 <= column < cells and 0 <= row < cells):
+            continue
+        cell = moments[row, column, math.floor((points[n, 2] + pose[2]) / _QUARTER_RAD) % _QUARTERS]
+        count = float(cell[0])
+        if count < 5.0:
+            continue
+        mx, my = cell[1] / count, cell[2] / count
+        xx, xy, yy = cell[3] / count - mx * mx, cell[4] / count - mx * my, cell[5] / count - my * my
+        ex, ey = x - (column + 0.5) * CELL_M - mx, y - (row + 0.5) * CELL_M - my
+        middle, spread = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+        narrow, wide = max(0.0, middle - spread), middle + spread
+        angle = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
+        flat = wide > 3.0 * narrow + 1e-6
+        for axis in range(1 if flat else 2):
+            nx, ny = math.cos(angle + axis * 0.5 * math.pi), math.sin(angle + axis * 0.5 * math.pi)
+            residual = nx * ex + ny * ey
+            if abs(residual) >= cap:
+                continue
+            if axis == 0:
+                inliers += abs(residual) < limits[4]
+            variance = floor + (0.0 if flat else (narrow if axis == 0 else wide))
+            robust = limits[1] / variance * (1.0 - (residual / cap) ** 2) ** 2
+            jacobian[0], jacobian[1], jacobian[2] = nx, ny, ny * dx - nx * dy
+            for k in range(3):
+                gradient[k] += robust * residual * jacobian[k]
+                for m in range(3):
+                    hessian[k, m] += robust * jacobian[k] * jacobian[m]
+    return hessian, gradient, inliers

@@ -1,0 +1,99 @@
+"""Keyframes: LiDAR revolutions that a map keeps, thinned out and without the robot's own body."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.estimate.compiled import compiled
+from skills.estimate.scan_points import scan_points, sensor_pose
+from skills.estimate.self_filter import SelfFilter
+from skills.robot import FloatArray, Joints, Pose2D, Scan, unit_rays
+
+BAND_M = (0.7, 1.3)
+"""Heights (m) of the points that scans are matched by."""
+_NEIGHBOURS: Final = 24
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """A scan and where the odometry had the robot.
+
+    `ranges_m` is (rings, azimuths) float32 with NaN for no return; `rotation` (3, 3) and `translation` (3,) are the
+    LiDAR's pose in the levelled body frame F; `points_F` (N, 3) are the points that scans are matched by: x, y, and
+    the direction (rad) that the surface there faces.
+    """
+
+    stamp_s: float
+    X_OF: Pose2D
+    ranges_m: NDArray[np.float32]
+    elevations_rad: FloatArray
+    azimuths_rad: FloatArray
+    rotation: FloatArray
+    translation: FloatArray
+    points_F: FloatArray
+
+    @staticmethod
+    def of(scan: Scan, points_F: FloatArray, own: SelfFilter, joints: Joints, *, stride: int = 2) -> Keyframe:
+        """Every `stride`-th column of a scan, without the returns from the robot itself."""
+        rotation, translation = sensor_pose(scan)
+        ranges, azimuths = scan.ranges_m[:, ::stride].copy(), scan.azimuths_rad[::stride]
+        rays = unit_rays(scan.elevations_rad, azimuths) * np.nan_to_num(ranges, nan=0.0)[..., None]
+        hits_F = rays.reshape(-1, 3) @ rotation.T + translation
+        arm_F = np.empty((0, 3))
+        if own.arm is not None:
+            arm_L = scan.X_BL.inverse().multiply(own.arm.points_B(joints).T)
+            arm_F = np.asarray((rotation @ arm_L).T + translation)
+        near = np.flatnonzero(np.hypot(hits_F[:, 0], hits_F[:, 1]) < 1.5)
+        ranges.reshape(-1)[near[~own.foreign(hits_F[near], arm_F)]] = np.nan
+        return Keyframe(
+            stamp_s=scan.stamp_s,
+            X_OF=Pose2D.from_transform(scan.X_OB),
+            ranges_m=ranges,
+            elevations_rad=scan.elevations_rad,
+            azimuths_rad=azimuths,
+            rotation=rotation,
+            translation=translation,
+            points_F=points_F,
+        )
+
+
+def matching_points(scan: Scan, *, azimuths: int, most: int, max_range_m: float) -> FloatArray:
+    """At most so many points of a scan in the band that scans are matched by, as `Keyframe.points_F` has them."""
+    points = scan_points(scan, azimuths=azimuths, heights_m=BAND_M, max_range_m=max_range_m)
+    facing = _facing(points)
+    chosen = slice(None) if len(points) <= most else np.linspace(0, len(points) - 1, most).astype(np.int64)
+    return np.column_stack([points[chosen, :2], facing[chosen]])
+
+
+@compiled
+def _facing(points: FloatArray) -> FloatArray:
+    """The direction (rad) that the surface at each point faces: across the points about it, towards the sensor.
+
+    The points are ordered by azimuth. One that is alone faces the sensor.
+    """
+    count = points.shape[0]
+    facing = np.empty(count)
+    for n in range(count):
+        x, y = points[n, 0], points[n, 1]
+        reach = 0.15 + 0.03 * math.hypot(x, y)
+        near, u, v, xx, xy, yy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(n - _NEIGHBOURS, n + _NEIGHBOURS + 1):
+            dx, dy = points[k % count, 0] - x, points[k % count, 1] - y
+            if dx * dx + dy * dy < reach * reach:
+                near += 1
+                u, v, xx, xy, yy = u + dx, v + dy, xx + dx * dx, xy + dx * dy, yy + dy * dy
+        u, v = u / near, v / near
+        xx, xy, yy = xx / near - u * u, xy / near - u * v, yy / near - v * v
+        middle, spread = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+        if near < 4 or middle + spread < 2.0 * (middle - spread):
+            facing[n] = math.atan2(-y, -x)
+            continue
+        angle = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
+        away = math.cos(angle) * x + math.sin(angle) * y > 0.0
+        facing[n] = angle + math.pi if away else angle
+    return facing

@@ -1,0 +1,158 @@
+"""Occupancy in layers of height: log-odds of every cell, from rays traced through the grid (Moravec and Elfes, 1985).
+
+A beam that passes over a low table says nothing of the table's own layer, so both stay right in one grid; the two maps
+that the robot needs are bands of its layers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.estimate.compiled import compiled
+from skills.mapping.keyframe import Keyframe
+from skills.robot import FloatArray, Pose2D
+
+LOWEST_M: Final = 0.05
+LAYER_M: Final = 0.05
+LAYERS: Final = 25
+BANDS_M: Final = {"scan": (0.7, 1.3), "keepout": (0.05, 1.0)}
+"""The heights that each map speaks of."""
+UNIT: Final = 0.2
+"""Log-odds of one step of a cell's value."""
+_HIT, _MISS, _MOST = 4, -2, 120
+_OCCUPIED = 4
+_BLOCK_M: Final = 8.0
+Values = NDArray[np.int8]
+
+
+class LayeredOccupancy:
+    """A grid that grows with what is inserted. `values` is (layers, rows, columns) of log-odds in steps of UNIT."""
+
+    def __init__(self, resolution_m: float, max_range_m: float = 8.0) -> None:
+        self.resolution_m, self._max_range_m = resolution_m, max_range_m
+        self.origin_m = (0.0, 0.0)
+        self.values: Values = np.zeros((LAYERS, 0, 0), dtype=np.int8)
+
+    def insert(self, frame: Keyframe, X_WF: Pose2D, *, stride: int = 1) -> None:
+        """Trace the beams of every `stride`-th column of a keyframe that was taken at a pose."""
+        self._reach(X_WF)
+        c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        sensor = turn @ frame.translation + np.array([X_WF.x_m, X_WF.y_m, 0.0])
+        place = (self.origin_m[0], self.origin_m[1], self.resolution_m, self._max_range_m)
+        _trace(
+            self.values,
+            place,
+            frame.ranges_m[:, ::stride].copy(),
+            frame.elevations_rad,
+            frame.azimuths_rad[::stride].copy(),
+            np.ascontiguousarray(turn @ frame.rotation),
+            sensor,
+        )
+
+    def probability(self, band: str) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        """The probability that a cell is occupied anywhere in a band's heights, and whether it was observed at all."""
+        layers = self.values[_layers(BANDS_M[band])]
+        observed = (layers != 0).any(axis=0)
+        odds = _greatest(layers).astype(np.float32) * np.float32(UNIT)
+        probability = 1.0 / (1.0 + np.exp(-odds))
+        return np.where(observed, probability, 0.5).astype(np.float32), observed
+
+    def ground(self, window: tuple[slice, slice], low_m: float) -> tuple[NDArray[np.bool_], ...]:
+        """Of a window of cells: which are occupied for the body, which were observed, and which of these below low_m.
+
+        Occupied cells count as observed below.
+        """
+        values = self.values[:, window[0], window[1]]
+        layers = values[_layers(BANDS_M["keepout"])]
+        occupied = _greatest(layers) >= _OCCUPIED
+        low = (values[_layers((LOWEST_M, low_m))] != 0).any(axis=0)
+        return occupied, (layers != 0).any(axis=0), low | occupied
+
+    def _reach(self, X_WF: Pose2D) -> None:
+        """Grow so that all within the range of a pose lies on the grid."""
+        rows, columns = self.values.shape[1:]
+        need = [
+            (
+                math.floor((at - self._max_range_m - 1.0) / _BLOCK_M),
+                math.ceil((at + self._max_range_m + 1.0) / _BLOCK_M),
+            )
+            for at in (X_WF.x_m, X_WF.y_m)
+        ]
+        block = round(_BLOCK_M / self.resolution_m)
+        if rows == 0:
+            self.origin_m = (need[0][0] * _BLOCK_M, need[1][0] * _BLOCK_M)
+        have = [
+            (round(start / _BLOCK_M), round(start / _BLOCK_M) + size // block)
+            for start, size in zip(self.origin_m, (columns, rows), strict=True)
+        ]
+        pads = [
+            (max(0, had[0] - want[0]) * block, max(0, want[1] - had[1]) * block)
+            for had, want in zip(have, need, strict=True)
+        ]
+        if any(pads[0]) or any(pads[1]):
+            self.values = np.ascontiguousarray(np.pad(self.values, ((0, 0), pads[1], pads[0])))
+            low = [start - before * self.resolution_m for start, (before, _) in zip(self.origin_m, pads, strict=True)]
+            self.origin_m = (low[0], low[1])
+
+
+def _layers(band_m: tuple[float, float]) -> slice:
+    """The layers that lie in a band of heights by more than half."""
+    low, high = band_m
+    return slice(math.floor((low - LOWEST_M) / LAYER_M + 0.5), math.ceil((high - LOWEST_M) / LAYER_M - 0.5))
+
+
+def _greatest(layers: Values) -> Values:
+    """The greatest value of the layers that were observed; -128 where none was."""
+    return np.asarray(np.where(layers == 0, np.int8(-128), layers).max(axis=0), dtype=np.int8)
+
+
+@compiled
+def _trace(
+    values: Values,
+    place: tuple[float, float, float, float],
+    ranges: NDArray[np.float32],
+    elevations: FloatArray,
+    azimuths: FloatArray,
+    rotation: FloatArray,
+    sensor: FloatArray,
+) -> None:
+    """The loop of `LayeredOccupancy.insert`: misses along each beam, a hit at its end."""
+    layers = values.shape[0]
+    for i in range(elevations.shape[0]):
+        ce, se = math.cos(elevations[i]), math.sin(elevations[i])
+        for j in range(azimuths.shape[0]):
+            r = float(ranges[i, j])
+            if not r > 0.0:
+                continue
+            ca, sa = ce * math.cos(azimuths[j]), ce * math.sin(azimuths[j])
+            dx = rotation[0, 0] * ca + rotation[0, 1] * sa + rotation[0, 2] * se
+            dy = rotation[1, 0] * ca + rotation[1, 1] * sa + rotation[1, 2] * se
+            dz = rotation[2, 0] * ca + rotation[2, 1] * sa + rotation[2, 2] * se
+            flat = math.hypot(dx, dy)
+            end = min(r, place[3] / max(flat, 1e-3))
+            last_row = math.floor((sensor[1] + r * dy - place[1]) / place[2])
+            last_column = math.floor((sensor[0] + r * dx - place[0]) / place[2])
+            steps = math.floor(end * flat / place[2])
+            before_row, before_column, before_layer = -1, -1, -1
+            for n in range(steps):
+                t = (n + 0.5) * place[2] / flat
+                layer = math.floor((sensor[2] + t * dz - LOWEST_M) / LAYER_M)
+                if layer < 0 or layer >= layers:
+                    break
+                row = math.floor((sensor[1] + t * dy - place[1]) / place[2])
+                column = math.floor((sensor[0] + t * dx - place[0]) / place[2])
+                if row == last_row and column == last_column:
+                    break
+                if row == before_row and column == before_column and layer == before_layer:
+                    continue
+                before_row, before_column, before_layer = row, column, layer
+                values[layer, row, column] = max(values[layer, row, column] + _MISS, -_MOST)
+            layer = math.floor((sensor[2] + r * dz - LOWEST_M) / LAYER_M)
+            if end == r and 0 <= layer < layers:
+                old = values[layer, last_row, last_column]
+                values[layer, last_row, last_column] = min(old + _HIT, _MOST)

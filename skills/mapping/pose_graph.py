@@ -1,0 +1,106 @@
+"""The pose graph: where all keyframes are, given what the scans say of pairs of them. Solved by GTSAM."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from skills.geometry import relative
+from skills.robot import FloatArray, Pose2D
+
+_HUBER_SIGMAS = 1.5
+
+
+class MappingExtraMissingError(ImportError):
+    """GTSAM is not installed."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Keyframe `second` as seen from keyframe `first`, with its covariance; a `closure` may be taken out again."""
+
+    first: int
+    second: int
+    measured: Pose2D
+    covariance: FloatArray
+    closure: bool = False
+
+    def sigmas(self, poses: list[Pose2D]) -> float:
+        """How far the poses are off the measurement, in standard deviations (Mahalanobis)."""
+        off = relative(self.measured, relative(poses[self.first], poses[self.second]))
+        error = np.array([off.x_m, off.y_m, off.yaw_rad])
+        return math.sqrt(float(error @ np.linalg.solve(self.covariance, error)))
+
+
+class PoseGraph:
+    """Poses of keyframes in the map's frame; the first stays where it is."""
+
+    def __init__(self, poses: list[Pose2D] | None = None, edges: list[Edge] | None = None) -> None:
+        self.poses: list[Pose2D] = poses or []
+        self.edges: list[Edge] = edges or []
+
+    @property
+    def closures(self) -> list[Edge]:
+        """The loop closures."""
+        return [edge for edge in self.edges if edge.closure]
+
+    def optimise(self) -> None:
+        """Move the poses to where all edges fit best: first plainly, then with Huber's loss for closures."""
+        for robust in (False, True) if self.closures else (False,):
+            self.poses = self._solved(robust)
+
+    def drop_outliers(self, most_sigmas: float) -> list[Edge]:
+        """Take out closures that the rest contradicts, the worst first, and optimise again; those taken out."""
+        dropped: list[Edge] = []
+        while self.closures:
+            worst = max(self.closures, key=lambda edge: edge.sigmas(self.poses))
+            if worst.sigmas(self.poses) <= most_sigmas:
+                break
+            self.edges = [edge for edge in self.edges if edge is not worst]
+            dropped.append(worst)
+            self.optimise()
+        return dropped
+
+    def covariance(self, index: int) -> FloatArray:
+        """The marginal covariance of a pose, x, y (m) and yaw (rad) in its own axes."""
+        gtsam = gtsam_module()
+        marginals = gtsam.Marginals(self._factors(False), self._values())
+        return np.asarray(marginals.marginalCovariance(index))
+
+    def _values(self) -> Any:
+        gtsam = gtsam_module()
+        values = gtsam.Values()
+        for index, pose in enumerate(self.poses):
+            values.insert(index, gtsam.Pose2(pose.x_m, pose.y_m, pose.yaw_rad))
+        return values
+
+    def _factors(self, robust: bool) -> Any:
+        gtsam = gtsam_module()
+        factors, noise = gtsam.NonlinearFactorGraph(), gtsam.noiseModel
+        first = self.poses[0]
+        anchor = noise.Diagonal.Sigmas(np.full(3, 1e-4))
+        factors.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(first.x_m, first.y_m, first.yaw_rad), anchor))
+        for edge in self.edges:
+            model = noise.Gaussian.Covariance(edge.covariance)
+            if robust and edge.closure:
+                model = noise.Robust.Create(noise.mEstimator.Huber.Create(_HUBER_SIGMAS), model)
+            seen = gtsam.Pose2(edge.measured.x_m, edge.measured.y_m, edge.measured.yaw_rad)
+            factors.add(gtsam.BetweenFactorPose2(edge.first, edge.second, seen, model))
+        return factors
+
+    def _solved(self, robust: bool) -> list[Pose2D]:
+        solved = gtsam_module().LevenbergMarquardtOptimizer(self._factors(robust), self._values()).optimize()
+        found = (solved.atPose2(index) for index in range(len(self.poses)))
+        return [Pose2D(pose.x(), pose.y(), pose.theta()) for pose in found]
+
+
+def gtsam_module() -> Any:
+    """GTSAM, imported when it is needed. Raises MappingExtraMissingError."""
+    try:
+        import gtsam
+    except ImportError as error:
+        raise MappingExtraMissingError("GTSAM is not installed") from error
+    return gtsam

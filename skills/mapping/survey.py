@@ -1,0 +1,397 @@
+"""A survey: the robot drives about, by frontiers or along a route, and makes its map meanwhile."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from skills.api import PlanningError
+from skills.estimate.costmap import LayeredCostmap
+from skills.estimate.grid_map import BoolGrid, GridMap
+from skills.geometry import relative
+from skills.mapping.frontiers import Ground
+from skills.mapping.mapper import Mapper
+from skills.mapping.occupancy import LayeredOccupancy
+from skills.navigate.follower import FollowerOptions, PathFollower
+from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
+from skills.navigate.planner import LatticePlanner
+from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
+
+_EXPIRY_S = 0.3
+
+
+@dataclass(frozen=True)
+class SurveyOptions:
+    """Metres, m/s and seconds of the robot's clock.
+
+    Ground counts as explored within `explored_m`. The robot goes back to a known place when the standard deviation of
+    its own place passes `unsure_m`, once `back_after_m` were driven since the last loop.
+    """
+
+    resolution_m: float = 0.05
+    explored_m: float = 5.0
+    max_speed_m_s: float = 0.7
+    margin_m: float = 0.05
+    clear_m: float = 0.33
+    frontier_m: float = 0.5
+    frontier_within_m: float = 1.5
+    tried_m: float = 0.6
+    route_tolerance_m: float = 0.3
+    unsure_m: float = 0.12
+    back_after_m: float = 25.0
+    refresh_m: float = 0.5
+    moved_m: float = 0.04
+    around_m: float = 5.0
+    low_m: float = 0.3
+    refresh_s: float = 1.5
+    stuck_s: float = 3.0
+    blind_stop_s: float = 1.0
+    blind_patience_s: float = 10.0
+    planner: LatticePlanner = field(default_factory=LatticePlanner)
+    controller: FollowerOptions = field(default_factory=FollowerOptions)
+
+
+class Purpose(enum.Enum):
+    """What the robot drives for."""
+
+    FRONTIER = "a frontier"
+    ROUTE = "the route"
+    LOOP = "a known place, to close a loop"
+    HOME = "the start"
+
+
+@dataclass(frozen=True)
+class _Goal:
+    purpose: Purpose
+    pose: Pose2D
+    about: tuple[float, float]
+
+
+class Survey:
+    """Call `tick` after each advance of the clock until `done`; `trouble` says why it ended early, if it did."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        lease: Lease,
+        mapper: Mapper,
+        *,
+        home: Pose2D,
+        route: Sequence[tuple[float, float]] | None = None,
+        options: SurveyOptions | None = None,
+    ) -> None:
+        """Without a `route` (points in the map's frame, m) it explores by frontiers. In the end it goes `home`."""
+        self._robot, self._lease, self.mapper = robot, lease, mapper
+        self._options = options or SurveyOptions()
+        self._home = home
+        self._route = None if route is None else list(route)
+        self._footprint = Footprint.of(robot.capabilities())
+        self.done = False
+        self.trouble: str | None = None
+        self.notes: list[str] = []
+        self._grid = LayeredOccupancy(self._options.resolution_m, self._options.explored_m)
+        self._inserted: list[Pose2D] = []
+        self._revision = 0
+        self._costmap: LayeredCostmap | None = None
+        self._whole: LayeredCostmap | None = None
+        self._refreshed = (-math.inf, -math.inf)
+        self._goal: _Goal | None = None
+        self._follower: PathFollower | None = None
+        self._last: FloatArray = np.zeros(3)
+        self._tried: list[tuple[float, float]] = []
+        self._best_m, self._best_s = math.inf, -math.inf
+        self._failures = 0
+        self._explored_since_loop = True
+        self._closed = 0
+
+    @property
+    def goal(self) -> tuple[str, Pose2D] | None:
+        """What the robot drives for now, and where to."""
+        return None if self._goal is None else (self._goal.purpose.value, self._goal.pose)
+
+    def tick(self, now_s: float) -> None:
+        """Take in what the robot senses, and drive on."""
+        self.mapper.update(self._robot)
+        if self._blind(now_s) or not self.mapper.keyframes:
+            return
+        corrected = self.mapper.revision != self._revision
+        self._refresh(now_s, force=corrected or self._costmap is None)
+        assert self._costmap is not None
+        self._costmap.update(self._robot, self.mapper.estimate())
+        if corrected and self._goal is not None:
+            self._whole = LayeredCostmap(self.known()[0])
+            self._begin(self._goal, now_s)
+        if self._goal is None or self._seen(self._goal, now_s):
+            self._choose(now_s)
+        if not self.done:
+            self._drive(now_s)
+
+    def stop(self) -> None:
+        """Stop the robot."""
+        self._last = np.zeros(3)
+        self._robot.stop(lease=self._lease)
+
+    def _blind(self, now_s: float) -> bool:
+        """Stand while the LiDAR gives nothing to go by; end when that lasts."""
+        since_s = self.mapper.blind_since_s
+        if since_s is None or now_s - since_s < self._options.blind_stop_s:
+            return False
+        self.stop()
+        if now_s - since_s > self._options.blind_patience_s:
+            self.trouble = (
+                f"the LiDAR has given no usable scan for {now_s - since_s:.0f} s (no returns, repeated, or unlike "
+                "everything seen before); the robot stands"
+            )
+            self.done = True
+        return True
+
+    # ---- the map so far
+
+    def _refresh(self, now_s: float, *, force: bool) -> None:
+        """Bring the grid for driving up to date, and about the robot the costmap."""
+        mapper, options = self.mapper, self._options
+        due = mapper.way_m - self._refreshed[0] > options.refresh_m or now_s - self._refreshed[1] > options.refresh_s
+        if not force and not (due and len(self._inserted) < len(mapper.keyframes)):
+            return
+        if self._moved():
+            self._grid, self._inserted = LayeredOccupancy(options.resolution_m, options.explored_m), []
+        for index in range(len(self._inserted), len(mapper.keyframes)):
+            self._grid.insert(mapper.keyframes[index], mapper.graph.poses[index], stride=2)
+            self._inserted.append(mapper.graph.poses[index])
+        self._refreshed = mapper.way_m, now_s
+        self._costmap = LayeredCostmap(self.known(options.around_m)[0])
+
+    def _moved(self) -> bool:
+        """Whether keyframes have been corrected by more than the grid for driving stands."""
+        if self.mapper.revision == self._revision:
+            return False
+        self._revision = self.mapper.revision
+        pairs = zip(self._inserted, self.mapper.graph.poses, strict=False)
+        return any(math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) > self._options.moved_m for a, b in pairs)
+
+    def known(self, around_m: float | None = None) -> tuple[GridMap, BoolGrid]:
+        """The keep-out grid as known so far, or of it what lies about the robot, and which cells were explored.
+
+        Explored is what was seen near the floor, too; where the robot itself stood is free.
+        """
+        grid, poses = self._grid, [*self._inserted, self.mapper.pose]
+        shape = grid.values.shape[1:]
+        rows, columns = slice(0, shape[0]), slice(0, shape[1])
+        if around_m is not None:
+            rows, columns = (
+                slice(
+                    max(0, math.floor((at - around_m - start) / grid.resolution_m)),
+                    math.ceil((at + around_m - start) / grid.resolution_m),
+                )
+                for at, start in ((poses[-1].y_m, grid.origin_m[1]), (poses[-1].x_m, grid.origin_m[0]))
+            )
+        origin_m = (
+            grid.origin_m[0] + columns.start * grid.resolution_m,
+            grid.origin_m[1] + rows.start * grid.resolution_m,
+        )
+        occupied, observed, low = grid.ground((rows, columns), self._options.low_m)
+        close = np.ones((3, 3), np.uint8)
+        observed, low = (
+            cv2.morphologyEx(seen.astype(np.uint8), cv2.MORPH_CLOSE, close) > 0 for seen in (observed, low)
+        )
+        stood = _stood(poses, occupied.shape, origin_m, grid.resolution_m, self._footprint.inscribed_m)
+        unknown = ~observed & ~stood & ~occupied
+        return GridMap(occupied & ~stood, grid.resolution_m, origin_m, unknown), (low & observed) | stood | occupied
+
+    # ---- goals
+
+    def _seen(self, goal: _Goal, now_s: float) -> bool:
+        """Whether a frontier is none any more, looked at when the costmap has been refreshed."""
+        if goal.purpose is not Purpose.FRONTIER or self._refreshed[1] != now_s:
+            return False
+        window = tuple(
+            slice(
+                max(0, math.floor((at - start) / self._grid.resolution_m) - 6),
+                math.floor((at - start) / self._grid.resolution_m) + 7,
+            )
+            for at, start in zip(reversed(goal.about), reversed(self._grid.origin_m), strict=True)
+        )
+        _, _, low = self._grid.ground((window[0], window[1]), self._options.low_m)
+        return int(np.count_nonzero(~low)) < 8
+
+    def _choose(self, now_s: float) -> None:
+        """The next goal, or the end."""
+        self._goal = None
+        self._refresh(now_s, force=True)
+        pose, (known, explored) = self.mapper.pose, self.known()
+        self._whole = LayeredCostmap(known)
+        ground = Ground(known, explored, (pose.x_m, pose.y_m), clear_m=self._options.clear_m)
+        if self._unsure() and (goal := self._loop_goal(ground)) is not None:
+            self._explored_since_loop = False
+            if self._begin(goal, now_s):
+                return
+        while (goal := self._next_goal(ground)) is not None:
+            if self._begin(goal, now_s):
+                return
+            self._tried.append(goal.about)
+        home = _Goal(Purpose.HOME, self._home, (self._home.x_m, self._home.y_m))
+        if not self._at(home.pose) and self._begin(home, now_s):
+            return
+        self.stop()
+        self.done = True
+
+    def _next_goal(self, ground: Ground) -> _Goal | None:
+        return self._frontier_goal(ground) if self._route is None else self._route_goal(ground)
+
+    def _frontier_goal(self, ground: Ground) -> _Goal | None:
+        """The nearest frontier that was not tried."""
+        options = self._options
+        for frontier in ground.frontiers(least_m=options.frontier_m, within_m=options.frontier_within_m):
+            if any(math.dist(frontier.at, tried) < options.tried_m for tried in self._tried):
+                continue
+            pose = self._standing(frontier.stand, frontier.at)
+            if pose is None:
+                self._tried.append(frontier.at)
+                continue
+            return _Goal(Purpose.FRONTIER, pose, frontier.at)
+        return None
+
+    def _route_goal(self, ground: Ground) -> _Goal | None:
+        """As near to the next point of the route as is known to be free."""
+        assert self._route is not None
+        here, near_m = (self.mapper.pose.x_m, self.mapper.pose.y_m), self._options.route_tolerance_m
+        while self._route:
+            point = self._route[0]
+            away_m = math.dist(here, point)
+            if away_m >= near_m:
+                for stand in ground.stands_near(*point, most=60, apart_m=0.25):
+                    if math.dist(stand, point) > away_m - 0.5 * near_m:
+                        break
+                    pose = self._standing(stand, _beyond(here, stand, point))
+                    if pose is not None and stand not in self._tried:
+                        return _Goal(Purpose.ROUTE, pose, stand)
+                self.notes.append(f"the route's point ({point[0]:.1f}, {point[1]:.1f}) cannot be reached")
+            self._route.pop(0)
+        return None
+
+    def _loop_goal(self, ground: Ground) -> _Goal | None:
+        """The nearest place of an old submap."""
+        mapper = self.mapper
+        newest = mapper.submaps[-3].anchor if len(mapper.submaps) > 3 else 0
+        old = [pose for pose in mapper.graph.poses[:newest] if math.isfinite(ground.cost_to(pose.x_m, pose.y_m))]
+        if not old:
+            return None
+        pose = min(old, key=lambda each: ground.cost_to(each.x_m, each.y_m))
+        return _Goal(Purpose.LOOP, pose, (pose.x_m, pose.y_m))
+
+    def _unsure(self) -> bool:
+        """Whether the robot should recognise a place before it goes on."""
+        mapper, options = self.mapper, self._options
+        if mapper.way_since_closure_m < options.back_after_m or not self._explored_since_loop:
+            return False
+        covariance = mapper.graph.covariance(len(mapper.graph.poses) - 1)
+        return math.sqrt(float(covariance[0, 0] + covariance[1, 1])) > options.unsure_m
+
+    def _standing(self, stand: tuple[float, float], towards: tuple[float, float]) -> Pose2D | None:
+        """A pose at a place with room for the body, as nearly facing a point as can be."""
+        assert self._whole is not None
+        facing = math.atan2(towards[1] - stand[1], towards[0] - stand[0])
+        turns = np.array([0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2, 1.57, -1.57, 2.2, -2.2, 2.8, -2.8, math.pi])
+        poses = np.column_stack([np.full(len(turns), stand[0]), np.full(len(turns), stand[1]), facing + turns])
+        clear = footprint_clearance_m(self._whole, self._footprint, poses)
+        free = np.flatnonzero(clear > self._options.margin_m + 0.01)
+        return Pose2D(stand[0], stand[1], float(poses[free[0], 2])) if len(free) else None
+
+    # ---- driving
+
+    def _begin(self, goal: _Goal, now_s: float) -> bool:
+        """Plan a path to a goal; False when there is none."""
+        assert self._whole is not None
+        options = self._options
+        problem = options.planner.problem(
+            self._whole, self._footprint, self.mapper.pose, goal.pose, max_speed_m_s=options.max_speed_m_s
+        )
+        try:
+            path = problem()
+        except PlanningError:
+            self._goal, self._follower = None, None
+            return False
+        if goal is not self._goal:
+            self._failures = 0
+        self._goal = goal
+        self._follower = options.controller.build(path, self._footprint, max_speed_m_s=options.max_speed_m_s)
+        self._best_m, self._best_s = math.inf, now_s
+        return True
+
+    def _drive(self, now_s: float) -> None:
+        """One command along the path; a new path when the robot is stuck or off it."""
+        if self._goal is None or self._follower is None or self._costmap is None:
+            self.stop()
+            return
+        velocity = self._robot.odometry().velocity
+        drive = self._follower.command(self.mapper.pose, velocity, self._last, self._costmap)
+        if drive.remaining_m < 0.03 or (drive.remaining_m < 0.3 and self._at(self._goal.pose)):
+            self._arrived()
+            return
+        if drive.remaining_m < self._best_m - 0.05:
+            self._best_m, self._best_s = drive.remaining_m, now_s
+        stuck = now_s - self._best_s > self._options.stuck_s
+        if stuck or drive.off_path_m > self._options.controller.lost_path_m:
+            self._replan(now_s)
+            return
+        self._last = np.array(drive.velocity)
+        command = self._robot.drive(*drive.velocity, until_s=now_s + _EXPIRY_S, lease=self._lease)
+        status = self._robot.command_status(command)
+        if status.state is CommandState.REFUSED:
+            self.trouble, self.done = f"the robot refused to drive: {status.reason}", True
+
+    def _arrived(self) -> None:
+        assert self._goal is not None
+        if self._goal.purpose is not Purpose.LOOP:
+            self._explored_since_loop = True
+        if self._goal.purpose is Purpose.HOME:
+            self.done = True
+        if self._goal.purpose is Purpose.FRONTIER:
+            self._tried.append(self._goal.about)
+        self._goal = None
+        self._last = np.zeros(3)
+        self._robot.stop(lease=self._lease)
+
+    def _replan(self, now_s: float) -> None:
+        """Plan again; after three times give the goal up."""
+        goal = self._goal
+        assert goal is not None
+        self._failures += 1
+        self._last = np.zeros(3)
+        self._refresh(now_s, force=True)
+        self._whole = LayeredCostmap(self.known()[0])
+        if self._failures < 3 and self._begin(goal, now_s):
+            return
+        self._tried.append(goal.about)
+        if goal.purpose is Purpose.HOME:
+            self.done = True
+        self._goal = None
+
+    def _at(self, pose: Pose2D) -> bool:
+        off = relative(pose, self.mapper.pose)
+        return math.hypot(off.x_m, off.y_m) < 0.1 and abs(off.yaw_rad) < 0.15
+
+
+def _stood(
+    poses: Sequence[Pose2D], shape: tuple[int, ...], origin_m: tuple[float, float], cell_m: float, radius_m: float
+) -> BoolGrid:
+    """The cells under the body's middle at some poses."""
+    x, y, yaw = pose_array(poses).T
+    shown = np.zeros(shape, dtype=np.uint8)
+    for reach_m in (-0.25, 0.0, 0.25):
+        row = np.floor((y + reach_m * np.sin(yaw) - origin_m[1]) / cell_m).astype(int)
+        column = np.floor((x + reach_m * np.cos(yaw) - origin_m[0]) / cell_m).astype(int)
+        inside = (row >= 0) & (column >= 0) & (row < shape[0]) & (column < shape[1])
+        shown[row[inside], column[inside]] = 1
+    size = 2 * math.ceil(radius_m / cell_m) + 1
+    return np.asarray(cv2.dilate(shown, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))) > 0)
+
+
+def _beyond(here: tuple[float, float], stand: tuple[float, float], point: tuple[float, float]) -> tuple[float, float]:
+    """What to face at a place on a route: the route's point, or ahead where that is the place itself."""
+    return point if math.dist(stand, point) > 0.1 else (2.0 * stand[0] - here[0], 2.0 * stand[1] - here[1])

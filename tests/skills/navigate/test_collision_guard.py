@@ -73,21 +73,19 @@ def test_it_stands_while_somebody_crosses_and_goes_on(from_x):
     assert isinstance(drive.step, Succeeded)
 
 
-def test_it_stands_at_once_for_who_comes_from_nowhere_just_ahead():
-    drive = Drive(lambda now_s, x: (4.6, 5.6) if x > 3.58 else None, most_s=9.0)
-    assert drive.stood()
-    assert drive.nearest_while_moving_m() > 0.2
+def test_it_brakes_harder_than_without_for_who_comes_from_nowhere_just_ahead():
+    def just_ahead(now_s, x):
+        return (4.6, 5.6) if x > 3.58 else None
 
+    def off(*_):
+        return None
 
-def test_without_the_guard_it_comes_nearer_to_who_comes_from_nowhere():
-    class Off(CollisionGuard):
-        def danger(self, *_):
-            return None
-
+    drive = Drive(just_ahead, most_s=9.0)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("skills.navigate.skill.CollisionGuard", Off)
-        without = Drive(lambda now_s, x: (4.6, 5.6) if x > 3.58 else None, most_s=9.0)
-    assert not without.stood()
+        patched.setattr(CollisionGuard, "danger", off)
+        without = Drive(just_ahead, most_s=9.0)
+    assert drive.stood() and not without.stood()
+    assert drive.nearest_while_moving_m() > max(0.2, without.nearest_while_moving_m() + 0.03)
 
 
 def test_who_walks_beside_the_way_does_not_stop_it():

@@ -1,0 +1,20 @@
+"""A far room in each of the larger worlds: through aisles and doors, through narrow corridors and a door of 0.75 m."""
+
+from __future__ import annotations
+
+import pytest
+
+from executive.cli.requests import prepare
+from executive.cli.simulated import run_simulated
+from executive.mission.request import Request
+
+pytestmark = pytest.mark.mission
+
+
+@pytest.mark.parametrize(("world", "room"), [("shop", "office"), ("lab", "server room")])
+def test_the_robot_goes_to_a_far_room_and_touches_nothing(world, room, tmp_path):
+    request = Request(sentence=f"go to the {room}", world=world, seed=1, out=tmp_path, record=False)
+    report = run_simulated(prepare(request)).report
+    assert report.achieved, (report.message, report.referee.why)
+    assert report.referee.success, report.referee.why
+    assert report.referee.collisions == 0

@@ -1,7 +1,8 @@
 """Matching of points to a submap of normal distributions (Biber and Strasser, 2003: the NDT).
 
-Each cell keeps the moments of the points in the 3 x 3 cells about it. Where these lie on a line, only the distance
-across it counts (point to line), so that a submap of noisy scans has surfaces much finer than the noise. Surfaces that
+Each cell keeps the moments of the points in the 3 x 3 cells about it. Where these lie on a line, the distance across it
+counts (point to line), and only there, so that a submap of noisy scans has surfaces much finer than the noise, and the
+pattern of the beams does not hold the robot where it is. Surfaces that
 face different ways are kept apart by quarters, so that the two sides of a thin wall are not one.
 """
 
@@ -19,6 +20,8 @@ from skills.robot import FloatArray, Pose2D
 
 CELL_M = 0.1
 _QUARTERS = 4
+_LEAST_SPREAD_M = 0.05
+"""A line has at least this standard deviation along it; the noise of the range alone has less."""
 _QUARTER_RAD = 0.5 * math.pi
 Moments = NDArray[np.float32]
 
@@ -50,7 +53,7 @@ class AlignOptions:
 class Distributions:
     """A submap about the origin of its own frame A, `half_m` to all sides."""
 
-    def __init__(self, half_m: float = 26.0) -> None:
+    def __init__(self, half_m: float = 30.0) -> None:
         cells = math.ceil(2.0 * half_m / CELL_M)
         self._low_m = -0.5 * cells * CELL_M
         self._moments: Moments = np.zeros((cells, cells, _QUARTERS, 6), dtype=np.float32)
@@ -136,7 +139,6 @@ def _linearise(
     hessian, gradient = np.zeros((3, 3)), np.zeros(3)
     jacobian, cells, inliers = np.zeros(3), moments.shape[0], 0
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    floor = limits[0] * limits[0]
     for n in range(points.shape[0]):
         dx, dy = c * points[n, 0] - s * points[n, 1], s * points[n, 0] + c * points[n, 1]
         x, y = pose[0] + dx - low, pose[1] + dy - low
@@ -153,19 +155,17 @@ def _linearise(
         middle, spread = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
         narrow, wide = max(0.0, middle - spread), middle + spread
         angle = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
-        flat = wide > 3.0 * narrow + 1e-6
-        for axis in range(1 if flat else 2):
-            nx, ny = math.cos(angle + axis * 0.5 * math.pi), math.sin(angle + axis * 0.5 * math.pi)
-            residual = nx * ex + ny * ey
-            if abs(residual) >= cap:
-                continue
-            if axis == 0:
-                inliers += abs(residual) < limits[4]
-            variance = floor + (0.0 if flat else (narrow if axis == 0 else wide))
-            robust = limits[1] / variance * (1.0 - (residual / cap) ** 2) ** 2
-            jacobian[0], jacobian[1], jacobian[2] = nx, ny, ny * dx - nx * dy
-            for k in range(3):
-                gradient[k] += robust * residual * jacobian[k]
-                for m in range(3):
-                    hessian[k, m] += robust * jacobian[k] * jacobian[m]
+        if wide < max(3.0 * narrow, _LEAST_SPREAD_M**2):
+            continue
+        nx, ny = math.cos(angle), math.sin(angle)
+        residual = nx * ex + ny * ey
+        if abs(residual) >= cap:
+            continue
+        inliers += abs(residual) < limits[4]
+        robust = limits[1] / (limits[0] * limits[0]) * (1.0 - (residual / cap) ** 2) ** 2
+        jacobian[0], jacobian[1], jacobian[2] = nx, ny, ny * dx - nx * dy
+        for k in range(3):
+            gradient[k] += robust * residual * jacobian[k]
+            for m in range(3):
+                hessian[k, m] += robust * jacobian[k] * jacobian[m]
     return hessian, gradient, inliers

@@ -14,9 +14,9 @@ from skills.estimate.scan_points import scan_points, sensor_pose
 from skills.estimate.self_filter import SelfFilter
 from skills.robot import FloatArray, Joints, Pose2D, Scan, unit_rays
 
-BAND_M = (0.7, 1.3)
+BAND_M = (0.5, 1.6)
 """Heights (m) of the points that scans are matched by."""
-_NEIGHBOURS: Final = 24
+_NEIGHBOURS: Final = 32
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,8 @@ def matching_points(scan: Scan, *, azimuths: int, most: int, max_range_m: float)
     """At most so many points of a scan in the band that scans are matched by, as `Keyframe.points_F` has them."""
     points = scan_points(scan, azimuths=azimuths, heights_m=BAND_M, max_range_m=max_range_m)
     facing = _facing(points)
-    chosen = slice(None) if len(points) <= most else np.linspace(0, len(points) - 1, most).astype(np.int64)
+    known = np.flatnonzero(np.isfinite(facing))
+    chosen = known if len(known) <= most else known[np.linspace(0, len(known) - 1, most).astype(np.int64)]
     return np.column_stack([points[chosen, :2], facing[chosen]])
 
 
@@ -74,24 +75,27 @@ def matching_points(scan: Scan, *, azimuths: int, most: int, max_range_m: float)
 def _facing(points: FloatArray) -> FloatArray:
     """The direction (rad) that the surface at each point faces: across the points about it, towards the sensor.
 
-    The points are ordered by azimuth. One that is alone faces the sensor.
+    The points are ordered by azimuth. NaN where those about a point make no line, or are of one column only: their
+    spread is the noise of the range.
     """
     count = points.shape[0]
     facing = np.empty(count)
     for n in range(count):
         x, y = points[n, 0], points[n, 1]
         reach = 0.15 + 0.03 * math.hypot(x, y)
+        first, last = 1e9, -1e9
         near, u, v, xx, xy, yy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(n - _NEIGHBOURS, n + _NEIGHBOURS + 1):
             dx, dy = points[k % count, 0] - x, points[k % count, 1] - y
             if dx * dx + dy * dy < reach * reach:
                 near += 1
+                first, last = min(first, points[k % count, 4]), max(last, points[k % count, 4])
                 u, v, xx, xy, yy = u + dx, v + dy, xx + dx * dx, xy + dx * dy, yy + dy * dy
         u, v = u / near, v / near
         xx, xy, yy = xx / near - u * u, xy / near - u * v, yy / near - v * v
         middle, spread = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
-        if near < 4 or middle + spread < 2.0 * (middle - spread):
-            facing[n] = math.atan2(-y, -x)
+        if near < 4 or last == first or middle + spread < 2.0 * (middle - spread):
+            facing[n] = math.nan
             continue
         angle = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
         away = math.cos(angle) * x + math.sin(angle) * y > 0.0

@@ -38,16 +38,16 @@ class MapperOptions:
     looked for every `closure_m`, within `closure_window` plus `window_per_m` of the way since the last one found.
     """
 
-    azimuths: int = 225
+    azimuths: int = 450
     most_points: int = 450
     least_points: int = 40
-    max_range_m: float = 20.0
+    max_range_m: float = 24.0
     keyframe_m: float = 0.3
     keyframe_rad: float = 0.25
     submap_m: float = 6.0
     submap_keyframes: int = 60
-    drift_per_m: float = 0.03
-    yaw_drift_rad_per_m: float = 0.01
+    drift_per_m: float = 0.1
+    yaw_drift_rad_per_m: float = 0.02
     yaw_drift_per_rad: float = 0.02
     least_share: float = 0.35
     blind_s: float = 2.0
@@ -191,7 +191,7 @@ class Mapper:
         new = self._X_AF
         jacobian = np.array([[1.0, 0.0, old.y_m - new.y_m], [0.0, 1.0, new.x_m - old.x_m], [0.0, 0.0, 1.0]])
         along = 5e-4 + options.drift_per_m * way
-        yaw = 3e-4 + options.yaw_drift_rad_per_m * way + options.yaw_drift_per_rad * turn
+        yaw = 1e-3 + options.yaw_drift_rad_per_m * way + options.yaw_drift_per_rad * turn
         self._covariance = jacobian @ self._covariance @ jacobian.T + np.diag([along**2, along**2, yaw**2])
         self.way_m += way
         self._since_keyframe = (self._since_keyframe[0] + way, self._since_keyframe[1] + turn)

@@ -42,7 +42,7 @@ class SurveyOptions:
     frontier_within_m: float = 1.5
     tried_m: float = 0.6
     route_tolerance_m: float = 0.3
-    unsure_m: float = 0.12
+    unsure_m: float = 0.3
     back_after_m: float = 25.0
     refresh_m: float = 0.5
     moved_m: float = 0.04

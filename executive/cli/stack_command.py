@@ -10,13 +10,24 @@ import yaml
 
 from executive.cli.output import refusals
 from executive.mission.stack_file import load_stack
-from skills.stack import plain
+from skills.stack import DEFAULT_FILE, plain
 
-__all__ = ["STACK", "stack"]
+__all__ = ["STACK", "stack", "stack_file"]
+
+
+def stack_file(given: Path | None) -> Path | None:
+    """A stack file as it was given, or the one of that name that comes with Errand."""
+    own = DEFAULT_FILE.with_name(f"{given}_stack.yaml")
+    return own if given is not None and not given.exists() and own.is_file() else given
+
 
 STACK = Annotated[
     Path | None,
-    typer.Option("--stack", help="A stack file: localiser, planners, detector and so on; see errand stack show."),
+    typer.Option(
+        "--stack",
+        callback=stack_file,
+        help="A stack file: localiser, planners and so on; see errand stack show. 'no_map': for unknown places.",
+    ),
 ]
 
 stack = typer.Typer(

@@ -4,31 +4,41 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
-from skills.estimate.costmap import CostmapOptions, LayeredCostmap
+from skills.estimate.compiled import bilinear, compiled
 from skills.estimate.grid_map import GridMap
-from skills.quantities import Count, Delay, Height, Length
-from skills.robot import FloatArray, Pose2D, Robot
+from skills.estimate.scan_points import scan_points, sensor_pose
+from skills.estimate.self_filter import ArmShape, SelfFilter, in_body_axes
+from skills.geometry import compose
+from skills.quantities import Count, Factor, Height, Length, Margin
+from skills.robot import FloatArray, Pose2D, Robot, Scan
+
+_MOST = 3.5
 
 
 @dataclass(frozen=True)
 class RollingCostmapOptions:
-    """No map: obstacles are what the LiDAR sees between the heights and nearer than max_range_m; the rest is free.
+    """No map: what the LiDAR sees between the heights and nearer than max_range_m; ground not seen may be crossed.
 
-    The window is `window_m` wide and moves once the robot is farther than a quarter of it off its middle. Cells count
-    once two scans within `confirm_s` agree and are remembered for `memory_s`, unless a beam sees past them.
+    Each beam adds `hit` to the log odds of the cell that it ends in and takes `miss` from those that it passes at the
+    height of what was seen there (Moravec and Elfes 1985). The window is `window_m` wide and moves once the robot is a
+    quarter of that off its middle. Ground not seen yet counts as `unknown_clearance_m` from the next obstacle at most.
     """
 
     heights_m: tuple[Height, Height] = (0.1, 1.0)
-    window_m: Length = 40.0
-    max_range_m: Length = 15.0
+    window_m: Length = 30.0
+    max_range_m: Length = 14.0
     azimuths: Count = 900
-    confirm_s: Delay = 0.6
-    memory_s: Delay = 600.0
-    cell_m: Length = 0.05
+    cell_m: Length = 0.04
+    hit: Factor = 0.9
+    miss: Factor = 0.35
+    unknown_clearance_m: Margin = 0.5
     min_points_per_cell: Count = 3
 
     def build(self, keepout: GridMap) -> RollingCostmap:
@@ -36,63 +46,231 @@ class RollingCostmapOptions:
         return RollingCostmap(self)
 
 
-class RollingCostmap(LayeredCostmap):
+class RollingCostmap:
     """Implements `skills.api.Costmap` in any frame that drifts slowly, such as odometry's."""
 
     def __init__(self, options: RollingCostmapOptions | None = None) -> None:
-        self._rolling = options or RollingCostmapOptions()
-        self._centred = False
-        used = self._rolling
-        layered = CostmapOptions(
-            heights_m=used.heights_m,
-            max_range_m=used.max_range_m,
-            azimuths=used.azimuths,
-            explained_m=0.0,
-            confirm_s=used.confirm_s,
-            memory_s=used.memory_s,
-            cell_m=used.cell_m,
-            min_points_per_cell=used.min_points_per_cell,
-        )
-        super().__init__(self._window((0.0, 0.0)), layered)
+        self._options = options or RollingCostmapOptions()
+        count = max(2, round(self._options.window_m / self._options.cell_m))
+        self._odds = np.zeros((count, count), dtype=np.float32)
+        self._known = np.zeros((count, count), dtype=np.bool_)
+        self._height_m = np.zeros((count, count), dtype=np.float32)
+        self._corner_m: tuple[float, float] | None = None
+        self._field: NDArray[np.float32] | None = None
+        self._stamp_s = -math.inf
+        self._X_WB = Pose2D(0.0, 0.0, 0.0)
+        self._filter: SelfFilter | None = None
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
         """Distance (m) from each (x, y) row to the nearest obstacle seen; off the window as at its edge."""
-        low = np.array(self._layer.origin_m) + 1e-6
-        high = low + self._layer.size_m - 2e-6
-        return super().clearance_m(np.clip(np.asarray(points_W, dtype=np.float64)[:, :2], low, high))
+        if self._field is None:
+            self._field = self._distances()
+        x0_m, y0_m = self._corner_m or (0.0, 0.0)
+        points = np.ascontiguousarray(points_W, dtype=np.float64)
+        return _looked_up(self._field, self._options.cell_m, x0_m, y0_m, points)
+
+    def forget_seen(self) -> int:
+        """Forget all; the number of cells that were blocked."""
+        blocked = int(np.count_nonzero(self._odds > 0.0))
+        self._odds.fill(0.0)
+        self._known.fill(False)
+        self._field = None
+        return blocked
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Move the window along, then take in the newest scan."""
-        here = Pose2D.from_transform(localisation.X_WO @ robot.odometry().X_OB)
-        middle = np.array(self._layer.origin_m) + 0.5 * np.array(self._layer.size_m)
-        off_m = float(np.max(np.abs(middle - [here.x_m, here.y_m])))
-        if not self._centred or off_m > 0.25 * self._rolling.window_m:
-            self._centre((here.x_m, here.y_m))
-        super().update(robot, localisation)
+        """Move the window along, and take in the newest scan, if it is new."""
+        X_WO = Pose2D.from_transform(localisation.X_WO)
+        self._X_WB = compose(X_WO, robot.odometry().pose)
+        self._filter = self._filter or SelfFilter.of(robot.capabilities())
+        scan = robot.scan()
+        if scan is None or scan.stamp_s <= self._stamp_s or not localisation.localised:
+            return
+        self._stamp_s = scan.stamp_s
+        X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
+        self._follow(X_WF)
+        self._take(robot, scan, X_WF)
+        self._field = None
 
-    def _window(self, centre: tuple[float, float]) -> GridMap:
-        """An empty window about a place, its cells on one raster over the whole world."""
-        cell, count = self._rolling.cell_m, max(2, round(self._rolling.window_m / self._rolling.cell_m))
-        x, y = (cell * math.floor(value / cell - 0.5 * count) for value in centre)
-        return GridMap(np.zeros((count, count), dtype=np.bool_), cell, (x, y))
+    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
+        """Take in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
+        if self._corner_m is None or self._filter is None or len(points_W) == 0:
+            return
+        points = points_W[self._filter.foreign(in_body_axes(points_W, self._X_WB), np.empty((0, 3)))]
+        cells, first, counts = np.unique(self._cells(points), axis=0, return_index=True, return_counts=True)
+        kept = (counts >= self._options.min_points_per_cell) & self._inside(cells)
+        rows, columns = cells[kept].T
+        self._odds[rows, columns] = _MOST
+        self._height_m[rows, columns] = points[first[kept], 2]
+        self._field = None
 
-    def _centre(self, place: tuple[float, float]) -> None:
-        """Move the window's middle to a place; what lies in both windows is kept."""
-        before, self._layer = self._layer, self._window(place)
-        self._keepout, self._centred = self._layer, True
-        shift = (np.array(self._layer.origin_m) - before.origin_m) / self._rolling.cell_m
-        columns, rows = (int(round(value)) for value in shift)
-        self._until_s = _shifted(self._until_s, rows, columns, -math.inf)
-        self._candidate_s = _shifted(self._candidate_s, rows, columns, -math.inf)
-        self._height_m = _shifted(self._height_m, rows, columns, 0.0)
-        self._note_change()
+    def _cells(self, points_W: FloatArray) -> NDArray[np.int64]:
+        """The (row, column) of each point."""
+        scaled = (points_W[:, :2] - (self._corner_m or (0.0, 0.0))) / self._options.cell_m
+        return np.asarray(np.floor(scaled[:, ::-1]).astype(np.int64))
+
+    def _inside(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+        return np.asarray(np.all((cells >= 0) & (cells < self._odds.shape), axis=1))
+
+    def _follow(self, X_WF: Pose2D) -> None:
+        """Keep the robot in the middle half of the window; what lies in the old and the new one is kept."""
+        cell, count = self._options.cell_m, self._odds.shape[0]
+        place = np.array([X_WF.x_m, X_WF.y_m])
+        corner = np.round(place / cell - 0.5 * count)
+        before = corner if self._corner_m is None else np.round(np.array(self._corner_m) / cell)
+        if self._corner_m is not None and np.max(np.abs(corner - before)) < 0.25 * count:
+            return
+        columns, rows = (int(value) for value in corner - before)
+        self._odds = _shifted(self._odds, rows, columns)
+        self._known = _shifted(self._known, rows, columns)
+        self._height_m = _shifted(self._height_m, rows, columns)
+        self._corner_m = (float(corner[0] * cell), float(corner[1] * cell))
+
+    def _take(self, robot: Robot, scan: Scan, X_WF: Pose2D) -> None:
+        """Trace each column of beams to the nearest thing in it.
+
+        A column is seen past only where all beams that lead down came back: none is lost, or too near to be measured.
+        """
+        assert self._corner_m is not None and self._filter is not None
+        options = self._options
+        points = scan_points(
+            scan, azimuths=options.azimuths, heights_m=options.heights_m, max_range_m=options.max_range_m
+        )
+        foreign = self._filter.foreign(points[:, :3], _arm_F(self._filter.arm, robot, scan))
+        stride = max(1, len(scan.azimuths_rad) // options.azimuths)
+        seen_past = np.asarray(np.all(np.isfinite(scan.ranges_m[scan.elevations_rad < 0.0, ::stride]), axis=0))
+        seen_past[points[~foreign, 4].astype(np.int64) // stride] = False
+        points = np.ascontiguousarray(points[foreign])
+        _, origin_F = sensor_pose(scan)
+        nearest = _nearest(points, origin_F, np.zeros(len(seen_past)), stride)
+        directions = np.ascontiguousarray(scan.azimuths_rad[::stride])
+        own = self._filter.outline_m
+        _trace(
+            self._odds,
+            self._known,
+            self._height_m,
+            (options.cell_m, *self._corner_m),
+            (X_WF.x_m, X_WF.y_m, X_WF.yaw_rad),
+            origin_F,
+            nearest,
+            seen_past,
+            directions,
+            math.tan(float(np.min(scan.elevations_rad))),
+            (options.hit, options.miss, options.max_range_m),
+            own,
+        )
+
+    def _distances(self) -> NDArray[np.float32]:
+        """Distance (m) from each cell to the nearest blocked one."""
+        blocked = self._odds > 0.0
+        cell = np.float32(self._options.cell_m)
+        if not blocked.any():
+            field = np.full(blocked.shape, self._options.window_m, dtype=np.float32)
+        else:
+            free = (~blocked).astype(np.uint8)
+            field = (cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) - np.float32(0.5)) * cell
+        if self._corner_m is not None:
+            np.minimum(field, np.float32(self._options.unknown_clearance_m), out=field, where=~self._known)
+        return field
 
 
-def _shifted(values: FloatArray, rows: int, columns: int, fill: float) -> FloatArray:
+def _arm_F(arm: ArmShape | None, robot: Robot, scan: Scan) -> FloatArray:
+    """The arm's segments in the levelled body frame."""
+    if arm is None:
+        return np.empty((0, 3))
+    rotation, translation = sensor_pose(scan)
+    points_L = scan.X_BL.inverse().multiply(arm.points_B(robot.joints()).T)
+    return np.asarray((rotation @ points_L).T + translation)
+
+
+def _shifted(values: NDArray[Any], rows: int, columns: int) -> NDArray[Any]:
     """A grid's values in a window that lies so many cells on."""
-    moved = np.full_like(values, fill)
+    moved = np.zeros_like(values)
     height, width = values.shape
     if abs(rows) < height and abs(columns) < width:
         target = moved[max(0, -rows) : height - max(0, rows), max(0, -columns) : width - max(0, columns)]
         target[...] = values[max(0, rows) : height + min(0, rows), max(0, columns) : width + min(0, columns)]
     return moved
+
+
+@compiled
+def _looked_up(
+    field: NDArray[np.float32], cell_m: float, x0_m: float, y0_m: float, points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The field at (N, 2) points; off it, that of its edge."""
+    values = np.empty(points.shape[0])
+    for n in range(points.shape[0]):
+        values[n] = bilinear(field, (points[n, 0] - x0_m) / cell_m - 0.5, (points[n, 1] - y0_m) / cell_m - 0.5)
+    return values
+
+
+@compiled
+def _nearest(points: FloatArray, origin: FloatArray, weight: FloatArray, stride: int) -> FloatArray:
+    """Range and height (columns, 2) of the nearest thing in each column of beams, infinite where there is none.
+
+    Of the returns within 0.15 m behind the first, the mean range and the greatest height: beams on one upright face.
+    """
+    count = weight.shape[0]
+    first = np.full(count, np.inf)
+    nearest = np.zeros((count, 2))
+    for n in range(points.shape[0]):
+        column = int(points[n, 4]) // stride
+        first[column] = min(first[column], math.hypot(points[n, 0] - origin[0], points[n, 1] - origin[1]))
+    for n in range(points.shape[0]):
+        column = int(points[n, 4]) // stride
+        flat = math.hypot(points[n, 0] - origin[0], points[n, 1] - origin[1])
+        if flat < first[column] + 0.15:
+            nearest[column, 0] += flat
+            nearest[column, 1] = max(nearest[column, 1], points[n, 2])
+            weight[column] += 1.0
+    for column in range(count):
+        nearest[column, 0] = nearest[column, 0] / weight[column] if weight[column] > 0.0 else np.inf
+    return nearest
+
+
+@compiled
+def _trace(
+    odds: NDArray[np.float32],
+    known: NDArray[np.bool_],
+    heights: NDArray[np.float32],
+    frame: tuple[float, float, float],
+    pose: tuple[float, float, float],
+    origin: FloatArray,
+    nearest: FloatArray,
+    seen_past: NDArray[np.bool_],
+    directions: FloatArray,
+    slope: float,
+    gains: tuple[float, float, float],
+    own: tuple[float, float, float, float],
+) -> None:
+    """Lower the odds along each column of beams and raise them at its end, in place.
+
+    `frame` is the cell size and the corner, `gains` hit, miss and the range; `slope` is that of the lowest beam. The
+    ground under the robot is known.
+    """
+    cell, x0, y0 = frame
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    rows, columns = odds.shape
+    ox, oy = pose[0] + c * origin[0] - s * origin[1], pose[1] + s * origin[0] + c * origin[1]
+    for n in range(directions.shape[0]):
+        reach = nearest[n, 0]
+        dx, dy = math.cos(pose[2] + directions[n]), math.sin(pose[2] + directions[n])
+        free_m = min(reach - 1.5 * cell, gains[2]) if seen_past[n] else 0.0
+        for k in range(int(free_m / (0.8 * cell))):
+            r = (k + 0.5) * 0.8 * cell
+            i, j = int((oy + r * dy - y0) / cell), int((ox + r * dx - x0) / cell)
+            if not (0 <= i < rows and 0 <= j < columns):
+                break
+            known[i, j] = True
+            if origin[2] + slope * r < heights[i, j] or odds[i, j] <= 0.0:
+                odds[i, j] = max(odds[i, j] - gains[1], -1.0)
+        i, j = int((oy + reach * dy - y0) / cell), int((ox + reach * dx - x0) / cell)
+        if reach < gains[2] and 0 <= i < rows and 0 <= j < columns:
+            known[i, j] = True
+            odds[i, j] = min(odds[i, j] + gains[0], 3.5)
+            heights[i, j] = max(heights[i, j] if odds[i, j] > gains[0] else 0.0, nearest[n, 1])
+    for a in range(int((own[1] - own[0]) / (0.7 * cell)) + 1):
+        for b in range(int((own[3] - own[2]) / (0.7 * cell)) + 1):
+            x, y = own[0] + 0.7 * cell * a, own[2] + 0.7 * cell * b
+            i, j = int((pose[1] + s * x + c * y - y0) / cell), int((pose[0] + c * x - s * y - x0) / cell)
+            if 0 <= i < rows and 0 <= j < columns:
+                known[i, j] = True

@@ -7,21 +7,24 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+
 from skills.api import Cause, Costmap, Failed, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import relative
 from skills.navigate.base import Base
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
-from skills.navigate.footprint import Footprint
+from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
 from skills.navigate.scan_health import ScanHealth, ScanHealthOptions
 from skills.perception.people_watch import PeopleOptions, PeopleWatch
-from skills.quantities import Delay, Duration, Length, Speed, Tries, Turn, TurnRate
+from skills.quantities import Delay, Duration, Length, Margin, Speed, Tries, Turn, TurnRate
 from skills.robot import Pose2D
 from skills.stack import LocalController
 
 _STILL_THERE_M = 1.0
+_REVIEWED_M = 0.02
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,7 @@ class NavigateInputs:
 class NavigateOptions:
     """Patience and bounds of the skill, times in seconds of the robot's clock.
 
+    Every `review_s` the path is checked `review_m` ahead, and planned anew, while driving, where something blocks it.
     While people are near, and for `after_person_s` (longer than a costmap remembers them), plans that fail are tried
     again without being counted, up to person_patience_s.
     """
@@ -49,6 +53,8 @@ class NavigateOptions:
     replan_pause_s: Delay = 2.0
     replans: Tries = 6
     stuck_s: Duration = 4.0
+    review_s: Duration = 0.2
+    review_m: Margin = 0.0
     settle_s: Delay = 2.0
     still_m_s: Speed = 0.03
     still_rad_s: TurnRate = 0.05
@@ -106,6 +112,7 @@ class Navigate(Skill[NavigateInputs]):
         self._lost_since_s: float | None = None
         self._obstacle: tuple[float, float] | None = None
         self._best_m, self._best_s = math.inf, self._now()
+        self._review_due_s = -math.inf
 
     def step(self) -> Step:
         """One tick: see `Skill.step`."""
@@ -269,6 +276,7 @@ class Navigate(Skill[NavigateInputs]):
         trouble = self._trouble(answer.remaining_m, answer.off_path_m)
         if trouble is not None and self._job is None:
             return self._replan(trouble)
+        self._review(self._follower, costmap)
         return self._progress(answer.remaining_m)
 
     def _stand_at_once(self, place_W: tuple[float, float]) -> Step:
@@ -313,6 +321,18 @@ class Navigate(Skill[NavigateInputs]):
         if now - self._best_s > self.options.stuck_s:
             return "The robot does not get on."
         return None
+
+    def _review(self, follower: LocalController, costmap: Costmap) -> None:
+        """Plan anew, while the robot drives on, once what is seen leaves the path too little clearance."""
+        if self._job is not None or not self.options.review_m or self._now() < self._review_due_s:
+            return
+        self._review_due_s = self._now() + self.options.review_s
+        ahead = follower.ahead(self.options.review_m)
+        clearance = footprint_clearance_m(costmap, self._footprint, ahead)
+        blocked = np.flatnonzero(clearance < min(_REVIEWED_M, float(clearance[0]) - 0.01))
+        if len(blocked):
+            self._obstacle = (float(ahead[blocked[0], 0]), float(ahead[blocked[0], 1]))
+            self._ask_for_plan(self._pose_then())
 
     def _replan(self, why: str) -> Step:
         """Plan anew from here; fail when that was done too often."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,10 +16,12 @@ import numpy as np
 from executive.run.worker import LockStepWorker
 from plant.simulation import Simulation
 from plant.worlds.world import World
-from skills.api import Failed, Running, SkillContext
+from skills.api import Failed, PlanningError, Running, SkillContext
 from skills.estimate.grid_map import GridMap
 from skills.geometry import relative
+from skills.navigate.footprint import Footprint
 from skills.navigate.low_obstacles import WatchOptions
+from skills.navigate.planner import plan_path
 from skills.navigate.skill import Navigate, NavigateInputs, NavigateOptions
 from skills.robot import Pose2D
 from skills.stack import RobotStack
@@ -114,7 +117,11 @@ class Driver:
             seed=seed,
             stack=stack,
         )
-        self.tick()
+        for _ in range(8):
+            self.tick()
+        here = self.context.pose()
+        with suppress(PlanningError):
+            plan_path(self.context.costmap, Footprint.of(robot.capabilities()), here, here)
 
     def tick(self) -> None:
         """A tick's time passes, and the estimators see."""

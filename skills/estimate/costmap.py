@@ -158,7 +158,7 @@ class LayeredCostmap:
         points_F = scan_points(
             scan, azimuths=options.azimuths, heights_m=options.heights_m, max_range_m=options.max_range_m
         )
-        points = self._unexplained(_placed(points_F, X_WF))
+        points = self._unexplained(placed_points(points_F, X_WF))
         if len(points):
             points = points[foreign(in_body_axes(points, X_WF))]
         self._returns_W = points
@@ -200,7 +200,7 @@ def _empty_like(grid: GridMap, cell_m: float) -> GridMap:
     return GridMap(np.zeros((rows, columns), dtype=np.bool_), cell_m, grid.origin_m)
 
 
-def _placed(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:
+def placed_points(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:
     """Points of the levelled body frame in the world, (N, 3)."""
     c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
     x, y = points_F[:, 0], points_F[:, 1]

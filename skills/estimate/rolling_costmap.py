@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
 from skills.estimate.compiled import bilinear, compiled
+from skills.estimate.costmap import placed_points
 from skills.estimate.grid_map import GridMap
 from skills.estimate.scan_points import scan_points, sensor_pose
 from skills.estimate.self_filter import ArmShape, SelfFilter, in_body_axes
@@ -20,6 +21,7 @@ from skills.quantities import Count, Factor, Height, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 _MOST = 3.5
+_NEAR_M, _NEAR_SURE_M, _NEW_M = 7.0, 1.0, 0.15
 
 
 @dataclass(frozen=True)
@@ -56,25 +58,35 @@ class RollingCostmap:
         self._known = np.zeros((count, count), dtype=np.bool_)
         self._height_m = np.zeros((count, count), dtype=np.float32)
         self._corner_m: tuple[float, float] | None = None
-        self._field: NDArray[np.float32] | None = None
+        self._all: NDArray[np.float32] | None = None
+        self._near: tuple[NDArray[np.float32], float, float] | None = None
+        self._returns_W: FloatArray = np.empty((0, 3))
         self._stamp_s = -math.inf
         self._X_WB = Pose2D(0.0, 0.0, 0.0)
         self._filter: SelfFilter | None = None
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
         """Distance (m) from each (x, y) row to the nearest obstacle seen; off the window as at its edge."""
-        if self._field is None:
-            self._field = self._distances()
-        x0_m, y0_m = self._corner_m or (0.0, 0.0)
         points = np.ascontiguousarray(points_W, dtype=np.float64)
-        return _looked_up(self._field, self._options.cell_m, x0_m, y0_m, points)
+        off_m = np.abs(points[:, :2] - (self._X_WB.x_m, self._X_WB.y_m))
+        if len(points) and self._corner_m is not None and float(off_m.max()) < _NEAR_M - _NEAR_SURE_M:
+            self._near = self._near or self._near_field()
+            field, x0_m, y0_m = self._near
+            return np.minimum(_looked_up(field, self._options.cell_m, x0_m, y0_m, points), _NEAR_SURE_M)
+        if self._all is None:
+            self._all = self._distances(slice(None), slice(None))
+        return _looked_up(self._all, self._options.cell_m, *(self._corner_m or (0.0, 0.0)), points)
+
+    def unexplained(self) -> tuple[float, FloatArray]:
+        """The last scan's stamp and those of its returns (N, 3) that lie away from all that was seen before."""
+        return self._stamp_s, self._returns_W
 
     def forget_seen(self) -> int:
         """Forget all; the number of cells that were blocked."""
         blocked = int(np.count_nonzero(self._odds > 0.0))
         self._odds.fill(0.0)
         self._known.fill(False)
-        self._field = None
+        self._changed()
         return blocked
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
@@ -89,7 +101,7 @@ class RollingCostmap:
         X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
         self._follow(X_WF)
         self._take(robot, scan, X_WF)
-        self._field = None
+        self._changed()
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
         """Take in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
@@ -101,7 +113,10 @@ class RollingCostmap:
         rows, columns = cells[kept].T
         self._odds[rows, columns] = _MOST
         self._height_m[rows, columns] = points[first[kept], 2]
-        self._field = None
+        self._changed()
+
+    def _changed(self) -> None:
+        self._all = self._near = None
 
     def _cells(self, points_W: FloatArray) -> NDArray[np.int64]:
         """The (row, column) of each point."""
@@ -140,6 +155,8 @@ class RollingCostmap:
         seen_past = np.asarray(np.all(np.isfinite(scan.ranges_m[scan.elevations_rad < 0.0, ::stride]), axis=0))
         seen_past[points[~foreign, 4].astype(np.int64) // stride] = False
         points = np.ascontiguousarray(points[foreign])
+        placed = placed_points(points, X_WF)
+        self._returns_W = placed[self.clearance_m(placed) > _NEW_M]
         _, origin_F = sensor_pose(scan)
         nearest = _nearest(points, origin_F, np.zeros(len(seen_past)), stride)
         directions = np.ascontiguousarray(scan.azimuths_rad[::stride])
@@ -159,17 +176,24 @@ class RollingCostmap:
             own,
         )
 
-    def _distances(self) -> NDArray[np.float32]:
-        """Distance (m) from each cell to the nearest blocked one."""
-        blocked = self._odds > 0.0
-        cell = np.float32(self._options.cell_m)
-        if not blocked.any():
-            field = np.full(blocked.shape, self._options.window_m, dtype=np.float32)
-        else:
-            free = (~blocked).astype(np.uint8)
-            field = (cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) - np.float32(0.5)) * cell
+    def _near_field(self) -> tuple[NDArray[np.float32], float, float]:
+        """The distances about the robot and the corner of what they are for."""
+        assert self._corner_m is not None
+        cell, (x0_m, y0_m) = self._options.cell_m, self._corner_m
+        half, most = round(_NEAR_M / cell), self._odds.shape[0]
+        (row, column), *_ = self._cells(np.array([[self._X_WB.x_m, self._X_WB.y_m]])).tolist()
+        rows, columns = (slice(max(0, middle - half), min(most, middle + half)) for middle in (row, column))
+        return self._distances(rows, columns), x0_m + columns.start * cell, y0_m + rows.start * cell
+
+    def _distances(self, rows: slice, columns: slice) -> NDArray[np.float32]:
+        """Distance (m) from each cell of a part to the nearest blocked one in it."""
+        blocked, known = self._odds[rows, columns] > 0.0, self._known[rows, columns]
+        field = np.full(blocked.shape, self._options.window_m, dtype=np.float32)
+        if blocked.any():
+            cells = cv2.distanceTransform((~blocked).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+            field = (cells - np.float32(0.5)) * np.float32(self._options.cell_m)
         if self._corner_m is not None:
-            np.minimum(field, np.float32(self._options.unknown_clearance_m), out=field, where=~self._known)
+            np.minimum(field, np.float32(self._options.unknown_clearance_m), out=field, where=~known)
         return field
 
 
@@ -242,7 +266,7 @@ def _trace(
     gains: tuple[float, float, float],
     own: tuple[float, float, float, float],
 ) -> None:
-    """Lower the odds along each column of beams and raise them at its end, in place.
+    """Lower the odds along each column of beams and raise them half a cell behind its end, in place.
 
     `frame` is the cell size and the corner, `gains` hit, miss and the range; `slope` is that of the lowest beam. The
     ground under the robot is known.
@@ -263,8 +287,11 @@ def _trace(
             known[i, j] = True
             if origin[2] + slope * r < heights[i, j] or odds[i, j] <= 0.0:
                 odds[i, j] = max(odds[i, j] - gains[1], -1.0)
-        i, j = int((oy + reach * dy - y0) / cell), int((ox + reach * dx - x0) / cell)
-        if reach < gains[2] and 0 <= i < rows and 0 <= j < columns:
+        if not reach < gains[2]:
+            continue
+        end = reach + 0.5 * cell
+        i, j = int((oy + end * dy - y0) / cell), int((ox + end * dx - x0) / cell)
+        if 0 <= i < rows and 0 <= j < columns:
             known[i, j] = True
             odds[i, j] = min(odds[i, j] + gains[0], 3.5)
             heights[i, j] = max(heights[i, j] if odds[i, j] > gains[0] else 0.0, nearest[n, 1])

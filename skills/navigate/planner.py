@@ -31,9 +31,10 @@ class NoWayError(PlanningError):
 class LatticePlanner:
     """A lattice over place and heading, searched for the whole footprint, then smoothed.
 
-    Speeds (m/s, rad/s) say how dear each way of moving is. Poses keep `margin_m`; nearer than `soft_m` to an obstacle
-    the cost grows up to (1 + soft_weight) fold. A start that is blocked by noise may be left through poses that are no
-    worse, within `escape_m`. The search covers the box about start and goal, `around_m` wider to all sides.
+    Speeds (m/s, rad/s) say how dear each way of moving is. Poses keep `margin_m`, or `least_margin_m` where there is no
+    way with more; nearer than `soft_m` to an obstacle the cost grows up to (1 + soft_weight) fold. A start that is
+    blocked by noise may be left through poses that are no worse, within `escape_m`. The search covers the box about
+    start and goal, `around_m` wider to all sides.
     """
 
     forward_m_s: Speed = 0.8
@@ -41,6 +42,7 @@ class LatticePlanner:
     lateral_m_s: Speed = 0.25
     turn_rad_s: TurnRate = 0.9
     margin_m: Margin = SAFE_MARGIN_M
+    least_margin_m: Margin = SAFE_MARGIN_M
     soft_m: Length = 0.35
     soft_weight: Factor = 3.0
     escape_m: Margin = 0.6
@@ -131,7 +133,18 @@ def _used(best: NDArray[np.float32]) -> slice:
 
 
 def solve(problem: Problem) -> Path:
-    """The cheapest way, smoothed. Raises PlanningError."""
+    """The cheapest way, smoothed, with less margin where there is none with more. Raises PlanningError."""
+    options = problem.options
+    try:
+        return _solve(problem)
+    except PlanningError:
+        if options.least_margin_m >= options.margin_m:
+            raise
+        return _solve(replace(problem, options=replace(options, margin_m=options.least_margin_m)))
+
+
+def _solve(problem: Problem) -> Path:
+    """The cheapest way with the margin that is wanted."""
     needs = _needs(problem)
     _check_goal(problem)
     for yaw0_rad in (0.0, problem.goal.yaw_rad):

@@ -124,3 +124,11 @@ def test_all_pairs_of_places_of_the_flat_can_be_planned():
     for start, goal in zip(poses, poses[1:] + poses[:1], strict=True):
         path = plan_path(costmap, FOOTPRINT, start, goal)
         assert footprint_clearance_m(costmap, FOOTPRINT, path.poses).min() > 0.05
+
+
+def test_less_margin_is_taken_where_there_is_no_way_with_more():
+    costmap = costmap_of()
+    with pytest.raises(PlanningError):
+        plan_path(costmap, FOOTPRINT, LEFT_ROOM, RIGHT_ROOM, LatticePlanner(margin_m=0.25, least_margin_m=0.25))
+    path = plan_path(costmap, FOOTPRINT, LEFT_ROOM, RIGHT_ROOM, LatticePlanner(margin_m=0.25, least_margin_m=0.1))
+    assert 0.09 < path.clearance_m.min() < 0.25

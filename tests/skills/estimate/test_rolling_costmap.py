@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+from planar_robot import TWO_ROOMS, Bench, Box
+
+from skills.estimate.dead_reckoning import DeadReckoning
+from skills.estimate.rolling_costmap import RollingCostmap, RollingCostmapOptions
+from skills.robot import Pose2D
+
+START = Pose2D(1.5, 5.4, 0.0)
+PERSON = Box(3.2, 5.2, 3.6, 5.6, 0.0, 1.7)
+
+
+def bench_of(*more: Box, **options) -> Bench:
+    bench = Bench(START, surveyed=[*TWO_ROOMS, *more], component=DeadReckoning(), cameras=False)
+    bench.costmap = RollingCostmap(RollingCostmapOptions(**options))
+    return bench
+
+
+def ticked(bench: Bench, ticks: int = 20) -> Bench:
+    for _ in range(ticks):
+        bench.tick()
+    return bench
+
+
+def test_before_the_first_scan_all_is_free():
+    assert RollingCostmap().clearance_m(np.array([[3.0, 4.0]]))[0] > 1.0
+
+
+def test_walls_stand_where_the_beams_end_within_a_cell():
+    bench = ticked(bench_of())
+    off = bench.costmap.clearance_m(np.array([[3.5, 4.6], [3.5, 5.9], [1.5, 4.3]]))
+    assert off == pytest.approx([0.5, 1.0, 0.2], abs=0.05)  # no more than 1 m near the robot
+
+
+def test_a_gap_is_as_wide_as_it_is_in_spite_of_noise():
+    bench = ticked(bench_of(), 100)
+    across = np.column_stack([np.linspace(2.0, 2.9, 91), np.full(91, 4.05)])
+    free = across[bench.costmap.clearance_m(across) > 0.0, 0]
+    assert free.max() - free.min() == pytest.approx(0.9, abs=0.09)
+
+
+def test_what_was_seen_before_is_remembered_after_it_is_out_of_sight():
+    bench = ticked(bench_of())
+    bench.robot.push(7.0, 0.0, 0.0)
+    ticked(bench)
+    assert bench.costmap.clearance_m(np.array([[0.5, 4.05]]))[0] < 0.05
+
+
+def test_who_walks_away_is_cleared_and_ground_that_nothing_has_seen_is_only_a_little_free():
+    bench = ticked(bench_of(PERSON))
+    behind = np.array([[4.6, 5.4]])
+    assert bench.costmap.clearance_m(np.array([[3.22, 5.4]]))[0] < 0.05
+    assert bench.costmap.clearance_m(behind)[0] <= RollingCostmapOptions().unknown_clearance_m
+    bench.robot.boxes.remove(PERSON)
+    ticked(bench, 40)
+    assert bench.costmap.clearance_m(np.array([[3.4, 5.4]]))[0] > 0.5
+    assert bench.costmap.clearance_m(behind)[0] > RollingCostmapOptions().unknown_clearance_m
+
+
+def test_what_is_too_near_for_the_lidar_is_not_cleared():
+    beside = Box(1.2, 5.75, 1.4, 5.85, 0.0, 1.0)
+    bench = ticked(bench_of(beside), 1)
+    bench.robot.push(0.0, -0.5, 0.0)
+    ticked(bench)
+    bench.robot.push(0.0, 0.5, 0.0)
+    ticked(bench, 40)
+    assert bench.costmap.clearance_m(np.array([[1.3, 5.78]]))[0] < 0.05
+
+
+def test_the_window_follows_the_robot_and_keeps_what_it_still_covers():
+    bench = ticked(bench_of(window_m=8.0))
+    before = bench.costmap.clearance_m(np.array([[4.0, 4.6]]))[0]
+    bench.robot.push(3.0, 0.0, 0.0)
+    ticked(bench, 2)
+    assert bench.costmap.clearance_m(np.array([[4.0, 4.6]]))[0] == pytest.approx(before, abs=0.05)
+    assert bench.costmap.clearance_m(np.array([[7.0, 6.9]]))[0] == pytest.approx(0.1, abs=0.06)
+
+
+def test_only_what_is_new_counts_as_unexplained():
+    bench = ticked(bench_of())
+    assert len(bench.costmap.unexplained()[1]) < 20
+    bench.robot.boxes.append(PERSON)
+    ticked(bench, 2)
+    near = bench.costmap.unexplained()[1]
+    assert np.count_nonzero(np.hypot(near[:, 0] - 3.3, near[:, 1] - 5.4) < 0.5) > 20
+
+
+def test_all_is_forgotten_on_request():
+    bench = ticked(bench_of())
+    assert bench.costmap.forget_seen() > 100
+    assert bench.costmap.clearance_m(np.array([[3.5, 4.05]]))[0] > 0.3

@@ -17,6 +17,7 @@ UP = np.array([0.0, 0.0, 1.0])
 _NOTHING_M = 1e-6
 
 Span = tuple[float, float]
+_Gap = tuple[Rectangle, Door]
 
 
 def shell_collisions(plan: Plan) -> list[Shape]:
@@ -27,19 +28,31 @@ def shell_collisions(plan: Plan) -> list[Shape]:
 
 
 def _wall_boxes(plan: Plan, wall: Rectangle) -> Iterator[Box]:
-    """A wall beside its doors, then the lintels over them. It runs along its longer side."""
+    """A wall beside its doors, then the lintels over them."""
+    gaps, sides = _divided(plan, wall, plan.doors)
+    spans = [(side, 0.0) for side in sides] + [(gap, plan.door_height_m) for gap, door in gaps if not door.open]
+    for (x0, y0, x1, y1), z0 in spans:
+        yield Box(
+            size=(x1 - x0, y1 - y0, plan.wall_height_m - z0),
+            p=((x0 + x1) / 2, (y0 + y1) / 2, (z0 + plan.wall_height_m) / 2),
+        )
+
+
+def _divided(plan: Plan, wall: Rectangle, doors: Iterable[Door]) -> tuple[list[_Gap], list[Rectangle]]:
+    """The openings of these doors in a wall, as far as they lie in it, and what is left of it.
+
+    A wall runs along its longer side.
+    """
     x0, y0, x1, y1 = wall
     along_x = x1 - x0 > y1 - y0
     low, high = (x0, x1) if along_x else (y0, y1)
-    doors = [d for d in plan.doors if x0 <= d.x <= x1 and y0 <= d.y <= y1 and d.along_x == along_x]
-    gaps, sides = _around(plan, low, high, [(d.x if along_x else d.y, d) for d in doors])
-    spans = [(a, b, 0.0) for a, b in sides] + [(a, b, plan.door_height_m) for a, b, door in gaps if not door.open]
-    for a, b, z0 in spans:
-        ends = (a, y0, b, y1) if along_x else (x0, a, x1, b)
-        yield Box(
-            size=(ends[2] - ends[0], ends[3] - ends[1], plan.wall_height_m - z0),
-            p=((ends[0] + ends[2]) / 2, (ends[1] + ends[3]) / 2, (z0 + plan.wall_height_m) / 2),
-        )
+    inside = [d for d in doors if x0 <= d.x <= x1 and y0 <= d.y <= y1 and d.along_x == along_x]
+    gaps, sides = _around(plan, low, high, [(d.x if along_x else d.y, d) for d in inside])
+
+    def part(a: float, b: float) -> Rectangle:
+        return (a, y0, b, y1) if along_x else (x0, a, x1, b)
+
+    return [(part(a, b), door) for a, b, door in gaps], [part(a, b) for a, b in sides]
 
 
 def _around(
@@ -61,8 +74,10 @@ def shell_mesh(plan: Plan, materials: Mapping[str, Material]) -> Mesh:
         mesh.add_rectangle(one.floor, (x0, y0, 0), (x1 - x0, 0, 0), (0, y1 - y0, 0))
         for side in _sides(one).values():
             _add_panel(mesh, plan, one, side)
-    for x0, y0, x1, y1 in plan.walls:
-        mesh.add_rectangle("cap", (x0, y0, plan.wall_height_m), (x1 - x0, 0, 0), (0, y1 - y0, 0))
+    open_doors = [door for door in plan.doors if door.open]
+    for wall in plan.walls:
+        for x0, y0, x1, y1 in _divided(plan, wall, open_doors)[1]:
+            mesh.add_rectangle("cap", (x0, y0, plan.wall_height_m), (x1 - x0, 0, 0), (0, y1 - y0, 0))
     for door in plan.doors:
         if not door.open:
             _add_door(mesh, plan, door)

@@ -231,6 +231,12 @@ def test_people_and_things_are_not_surveyed(world: World, keepout: Map) -> None:
             assert np.all(keepout.at(footprint(around, (1.4, 1.4))) == FREE), one.name
 
 
+def test_things_lie_where_the_robot_is_told_that_they_usually_are(world: World, knowledge: dict[str, Any]) -> None:
+    for seed in range(10):
+        for thing in place_objects(world, seed):
+            assert thing.surface in knowledge["things"][thing.class_name]["usual"]
+
+
 def test_things_stay_where_the_seed_put_them(world: World, furnished: tuple[Diagram, Context]) -> None:
     diagram, context = furnished
     simulator = Simulator(diagram, context.Clone())

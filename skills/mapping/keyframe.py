@@ -38,14 +38,14 @@ class Keyframe:
     points_F: FloatArray
 
     @staticmethod
-    def of(scan: Scan, points_F: FloatArray, own: SelfFilter, joints: Joints, *, stride: int = 2) -> Keyframe:
-        """Every `stride`-th column of a scan, without the returns from the robot itself."""
+    def of(scan: Scan, points_F: FloatArray, own: SelfFilter, joints: Joints | None, *, stride: int = 2) -> Keyframe:
+        """Every `stride`-th column of a scan, without returns from the robot itself (its arm by its joints)."""
         rotation, translation = sensor_pose(scan)
         ranges, azimuths = scan.ranges_m[:, ::stride].copy(), scan.azimuths_rad[::stride]
         rays = unit_rays(scan.elevations_rad, azimuths) * np.nan_to_num(ranges, nan=0.0)[..., None]
         hits_F = rays.reshape(-1, 3) @ rotation.T + translation
         arm_F = np.empty((0, 3))
-        if own.arm is not None:
+        if own.arm is not None and joints is not None:
             arm_L = scan.X_BL.inverse().multiply(own.arm.points_B(joints).T)
             arm_F = np.asarray((rotation @ arm_L).T + translation)
         near = np.flatnonzero(np.hypot(hits_F[:, 0], hits_F[:, 1]) < 1.5)

@@ -157,7 +157,8 @@ class Mapper:
             return
         self.blind_since_s = None
         if not self._active or self._keyframe_is_due():
-            self._keep(Keyframe.of(scan, points_F, self._filter, robot.joints()))
+            joints = None if self._filter.arm is None else robot.joints()
+            self._keep(Keyframe.of(scan, points_F, self._filter, joints))
 
     def _recognised(self, points_F: FloatArray) -> bool:
         """Find the robot on the map that it goes on from, about where that began; its keyframe then joins the graph."""

@@ -51,6 +51,7 @@ class SurveyOptions:
     around_m: float = 5.0
     low_m: float = 0.3
     refresh_s: float = 1.5
+    look_s: float = 0.09
     stuck_s: float = 3.0
     blind_stop_s: float = 1.0
     blind_patience_s: float = 10.0
@@ -101,6 +102,7 @@ class Survey:
         self._revision = 0
         self._costmap: LayeredCostmap | None = None
         self._whole: LayeredCostmap | None = None
+        self._looked_s = -math.inf
         self._refreshed = (-math.inf, -math.inf)
         self._goal: _Goal | None = None
         self._follower: PathFollower | None = None
@@ -120,12 +122,15 @@ class Survey:
     def tick(self, now_s: float) -> None:
         """Take in what the robot senses, and drive on."""
         self.mapper.update(self._robot)
+        options = self._options
         if self._blind(now_s) or not self.mapper.keyframes:
             return
         corrected = self.mapper.revision != self._revision
         self._refresh(now_s, force=corrected or self._costmap is None)
         assert self._costmap is not None
-        self._costmap.update(self._robot, self.mapper.estimate())
+        if now_s - self._looked_s > options.look_s:
+            self._looked_s = now_s
+            self._costmap.update(self._robot, self.mapper.estimate())
         if corrected and self._goal is not None:
             self._whole = LayeredCostmap(self.known()[0])
             self._begin(self._goal, now_s)

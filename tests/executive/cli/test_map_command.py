@@ -1,6 +1,7 @@
 """`errand map build`, and what it refuses."""
 
 import json
+import sys
 from pathlib import Path
 
 import cv2
@@ -102,3 +103,18 @@ def test_what_is_no_route_is_refused(tmp_path, text):
     (tmp_path / "route").write_text(text)
     with pytest.raises(InputError, match="it is no route"):
         _route_points(tmp_path / "route")
+
+
+def test_without_its_extra_it_says_what_to_install(room, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "gtsam", None)
+    ran = invoke("map", "build", "--world", room, "--out", tmp_path / "map")
+    assert ran.exit_code == 2
+    assert "pip install 'spot-errand[mapping]'" in ran.stderr
+
+
+def test_a_damaged_map_is_refused(room, tmp_path):
+    pytest.importorskip("gtsam")
+    (tmp_path / "pose_graph.json").write_text("{}")
+    ran = invoke("map", "build", "--world", room, "--out", tmp_path)
+    assert ran.exit_code == 2
+    assert "no map that can be continued" in ran.stderr

@@ -1,6 +1,6 @@
 """Simultaneous localisation and mapping from LiDAR and odometry: submaps, keyframes, loop closures.
 
-Each scan is matched to the current submap from where odometry and gyroscope have the robot. A keyframe is kept every
+Each scan is matched to the current submap from where odometry has the robot. A keyframe is kept every
 few decimetres and joins the pose graph by its pose in the submap; it also goes into the submap that follows, which
 takes over when the current one is full (as in Hess et al., 2016). Keyframes are looked for in old submaps as well: what
 is found counts once another keyframe agrees with it.

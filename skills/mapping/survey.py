@@ -103,6 +103,7 @@ class Survey:
         self._costmap: LayeredCostmap | None = None
         self._whole: LayeredCostmap | None = None
         self._looked_s = -math.inf
+        self._begun_s: float | None = None
         self._refreshed = (-math.inf, -math.inf)
         self._goal: _Goal | None = None
         self._follower: PathFollower | None = None
@@ -146,14 +147,17 @@ class Survey:
 
     def _blind(self, now_s: float) -> bool:
         """Stand while the LiDAR gives nothing to go by; end when that lasts."""
-        since_s = self.mapper.blind_since_s
+        scan = self._robot.scan()
+        self._begun_s = now_s if self._begun_s is None else self._begun_s
+        seen_s = self._begun_s if scan is None else scan.stamp_s
+        since_s = seen_s if now_s - seen_s > self._options.blind_stop_s else self.mapper.blind_since_s
         if since_s is None or now_s - since_s < self._options.blind_stop_s:
             return False
         self.stop()
         if now_s - since_s > self._options.blind_patience_s:
             self.trouble = (
-                f"the LiDAR has given no usable scan for {now_s - since_s:.0f} s (no returns, repeated, or unlike "
-                "everything seen before); the robot stands"
+                f"the LiDAR has given no usable scan for {now_s - since_s:.0f} s (none, no returns, repeated, or "
+                "unlike everything seen before); the robot stands"
             )
             self.done = True
         return True

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,11 +28,10 @@ class Trip:
         lease = self.robot.acquire_lease("test")
         self.survey = Survey(self.robot, lease, self.mapper, home=START, route=route)
 
-    def go_on(self, most_s: float, *, blind: bool = False) -> None:
+    def go_on(self, most_s: float) -> None:
         end_s = self.clock.now() + most_s
         while self.clock.now() < end_s and not self.survey.done:
             self.clock.advance(0.05)
-            self.robot._scan = None if self.robot._scan is None or blind else self.robot._scan
             self.survey.tick(self.clock.now())
 
     def off(self) -> tuple[float, float]:
@@ -102,11 +102,18 @@ def test_a_route_is_driven_and_what_cannot_be_reached_is_told():
     assert trip.mapper.way_m > 4.0
 
 
-def test_without_a_usable_scan_the_robot_stands_and_says_why():
+@pytest.mark.parametrize("fault", ["blank", "frozen", "gone"])
+def test_without_a_usable_scan_the_robot_stands_and_says_why(fault):
     trip = Trip()
     trip.go_on(4.0)
     assert trip.robot.driving
-    trip.robot.scan = lambda: blank(PlanarRobot.scan(trip.robot))
+    last = trip.robot.scan()
+    scans = {
+        "blank": lambda: blank(PlanarRobot.scan(trip.robot)),
+        "frozen": lambda: replace(PlanarRobot.scan(trip.robot), ranges_m=last.ranges_m),
+        "gone": lambda: last,
+    }
+    trip.robot.scan = scans[fault]
     trip.go_on(20.0)
     assert trip.survey.done and not trip.robot.driving
     assert "no usable scan" in trip.survey.trouble
@@ -114,6 +121,4 @@ def test_without_a_usable_scan_the_robot_stands_and_says_why():
 
 def blank(scan):
     """All ranges invalid."""
-    from dataclasses import replace
-
     return replace(scan, ranges_m=np.full_like(scan.ranges_m, np.nan))

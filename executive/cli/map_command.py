@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -198,19 +199,14 @@ class _Building:
             save_graph(self._out, self._mapper)
 
 
-class _writing:  # noqa: N801
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
     """What cannot be written is bad input."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
-        if isinstance(error, OSError):
-            hint = "name another --out"
-            raise InputError(f"the map cannot be written ({error.strerror})", hint=hint, file=self._folder) from error
+    try:
+        yield
+    except OSError as error:
+        hint = "name another --out"
+        raise InputError(f"the map cannot be written ({error.strerror})", hint=hint, file=folder) from error
 
 
 def _mapper(world: World, out: Path) -> Mapper:

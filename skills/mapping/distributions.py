@@ -89,7 +89,7 @@ def _add(moments: Moments, low: float, points: FloatArray, pose: FloatArray) -> 
         column, row = math.floor((x - low) / CELL_M), math.floor((y - low) / CELL_M)
         if not (1 <= column < cells - 1 and 1 <= row < cells - 1):
             continue
-        quarter = math.floor((points[n, 2] + pose[2]) / _QUARTER_RAD) % _QUARTERS
+        quarter = math.floor((points[n, 2] + pose[2]) / _QUARTER_RAD + 0.5) % _QUARTERS
         for i in range(row - 1, row + 2):
             for j in range(column - 1, column + 2):
                 u, v = x - low - (j + 0.5) * CELL_M, y - low - (i + 0.5) * CELL_M
@@ -145,7 +145,7 @@ def _linearise(
         column, row = math.floor(x / CELL_M), math.floor(y / CELL_M)
         if not (0 <= column < cells and 0 <= row < cells):
             continue
-        cell = moments[row, column, math.floor((points[n, 2] + pose[2]) / _QUARTER_RAD) % _QUARTERS]
+        cell = moments[row, column, math.floor((points[n, 2] + pose[2]) / _QUARTER_RAD + 0.5) % _QUARTERS]
         count = float(cell[0])
         if count < 5.0:
             continue

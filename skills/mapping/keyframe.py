@@ -38,14 +38,14 @@ class Keyframe:
     points_F: FloatArray
 
     @staticmethod
-    def of(scan: Scan, points_F: FloatArray, own: SelfFilter, joints: Joints, *, stride: int = 2) -> Keyframe:
-        """Every `stride`-th column of a scan, without the returns from the robot itself."""
+    def of(scan: Scan, points_F: FloatArray, own: SelfFilter, joints: Joints | None, *, stride: int = 2) -> Keyframe:
+        """Every `stride`-th column of a scan, without returns from the robot itself (its arm by its joints)."""
         rotation, translation = sensor_pose(scan)
         ranges, azimuths = scan.ranges_m[:, ::stride].copy(), scan.azimuths_rad[::stride]
         rays = unit_rays(scan.elevations_rad, azimuths) * np.nan_to_num(ranges, nan=0.0)[..., None]
         hits_F = rays.reshape(-1, 3) @ rotation.T + translation
         arm_F = np.empty((0, 3))
-        if own.arm is not None:
+        if own.arm is not None and joints is not None:
             arm_L = scan.X_BL.inverse().multiply(own.arm.points_B(joints).T)
             arm_F = np.asarray((rotation @ arm_L).T + translation)
         near = np.flatnonzero(np.hypot(hits_F[:, 0], hits_F[:, 1]) < 1.5)
@@ -65,22 +65,25 @@ class Keyframe:
 def matching_points(scan: Scan, *, azimuths: int, most: int, max_range_m: float) -> FloatArray:
     """At most so many points of a scan in the band that scans are matched by, as `Keyframe.points_F` has them."""
     points = scan_points(scan, azimuths=azimuths, heights_m=BAND_M, max_range_m=max_range_m)
-    facing = _facing(points)
-    known = np.flatnonzero(np.isfinite(facing))
-    chosen = known if len(known) <= most else known[np.linspace(0, len(known) - 1, most).astype(np.int64)]
-    return np.column_stack([points[chosen, :2], facing[chosen]])
+    chosen = np.arange(len(points))
+    if len(points) > most:
+        chosen = np.linspace(0, len(points) - 1, most).astype(np.int64)
+    facing = _facing(points, chosen)
+    known = np.isfinite(facing)
+    return np.column_stack([points[chosen[known], :2], facing[known]])
 
 
 @compiled
-def _facing(points: FloatArray) -> FloatArray:
-    """The direction (rad) that the surface at each point faces: across the points about it, towards the sensor.
+def _facing(points: FloatArray, chosen: NDArray[np.int64]) -> FloatArray:
+    """The direction (rad) that the surface at each chosen point faces: across the points about it, towards the sensor.
 
     The points are ordered by azimuth. NaN where those about a point make no line, or are of one column only: their
     spread is the noise of the range.
     """
     count = points.shape[0]
-    facing = np.empty(count)
-    for n in range(count):
+    facing = np.empty(chosen.shape[0])
+    for m in range(chosen.shape[0]):
+        n = chosen[m]
         x, y = points[n, 0], points[n, 1]
         reach = 0.15 + 0.03 * math.hypot(x, y)
         first, last = 1e9, -1e9
@@ -95,9 +98,9 @@ def _facing(points: FloatArray) -> FloatArray:
         xx, xy, yy = xx / near - u * u, xy / near - u * v, yy / near - v * v
         middle, spread = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
         if near < 4 or last == first or middle + spread < 2.0 * (middle - spread):
-            facing[n] = math.nan
+            facing[m] = math.nan
             continue
         angle = 0.5 * math.atan2(2.0 * xy, xx - yy) + 0.5 * math.pi
         away = math.cos(angle) * x + math.sin(angle) * y > 0.0
-        facing[n] = angle + math.pi if away else angle
+        facing[m] = angle + math.pi if away else angle
     return facing

@@ -40,8 +40,8 @@ class Surveyed:
 def surveyed(mapper: Mapper, resolution_m: float = RESOLUTION_M) -> Surveyed:
     """Both grids of all keyframes at their optimised poses, cut to what was observed."""
     grid = LayeredOccupancy(resolution_m)
-    for frame, pose in zip(mapper.keyframes, mapper.graph.poses, strict=True):
-        grid.insert(frame, pose)
+    for index, (frame, pose) in enumerate(zip(mapper.keyframes, mapper.graph.poses, strict=True)):
+        grid.insert(frame, pose, stride=2, first=index % 2)
     bands = {band: grid.probability(band) for band in BANDS_M}
     seen = np.any([observed for _, observed in bands.values()], axis=0)
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))

@@ -1,6 +1,6 @@
 """Simultaneous localisation and mapping from LiDAR and odometry: submaps, keyframes, loop closures.
 
-Each scan is matched to the current submap from where odometry and gyroscope have the robot. A keyframe is kept every
+Each scan is matched to the current submap from where odometry has the robot. A keyframe is kept every
 few decimetres and joins the pose graph by its pose in the submap; it also goes into the submap that follows, which
 takes over when the current one is full (as in Hess et al., 2016). Keyframes are looked for in old submaps as well: what
 is found counts once another keyframe agrees with it.
@@ -32,14 +32,15 @@ _FIELD_CELL_M = 0.05
 class MapperOptions:
     """Distances in metres, angles in radians.
 
-    A keyframe is kept after `keyframe_m` or `keyframe_rad`; a submap is full after `submap_m` of way. Odometry is
-    expected to err by `drift_per_m` of the way, `yaw_drift_rad_per_m` and `yaw_drift_per_rad` of a turn. Scans of
-    which the submap explains less than `least_share` do not count; none that does for `blind_s` means blind. Loops are
+    A scan is matched every `period_s`. A keyframe is kept after `keyframe_m` or `keyframe_rad`; a submap is full after
+    `submap_m` of way. Odometry is expected to err by `drift_per_m` of the way, `yaw_drift_rad_per_m` and
+    `yaw_drift_per_rad` of a turn. Scans of which the submap explains less than `least_share` do not count. Loops are
     looked for every `closure_m`, within `closure_window` plus `window_per_m` of the way since the last one found.
     """
 
     azimuths: int = 450
-    most_points: int = 450
+    most_points: int = 550
+    period_s: float = 0.09
     least_points: int = 40
     max_range_m: float = 24.0
     keyframe_m: float = 0.3
@@ -50,7 +51,6 @@ class MapperOptions:
     yaw_drift_rad_per_m: float = 0.02
     yaw_drift_per_rad: float = 0.02
     least_share: float = 0.35
-    blind_s: float = 2.0
     closure_m: float = 1.0
     closure_reach_m: float = 8.0
     closure_window: Window = field(default_factory=lambda: Window(0.4, 0.05))
@@ -103,6 +103,7 @@ class Mapper:
         self._tried_at_m = 0.0
         self._closed_at_m = 0.0
         self._pending: list[Edge] = []
+        self._matched_s = -math.inf
         self._active: list[Submap] = []
         self._returning = False
         self._joint: Edge | None = None
@@ -149,6 +150,9 @@ class Mapper:
         if before is not None:
             step = relative(X_OF, self._X_OF)
         self._predict(step)
+        if self._active and scan.stamp_s - self._matched_s < options.period_s:
+            return
+        self._matched_s = scan.stamp_s
         points_F = matching_points(
             scan, azimuths=options.azimuths, most=options.most_points, max_range_m=options.max_range_m
         )
@@ -157,7 +161,8 @@ class Mapper:
             return
         self.blind_since_s = None
         if not self._active or self._keyframe_is_due():
-            self._keep(Keyframe.of(scan, points_F, self._filter, robot.joints()))
+            joints = None if self._filter.arm is None else robot.joints()
+            self._keep(Keyframe.of(scan, points_F, self._filter, joints))
 
     def _recognised(self, points_F: FloatArray) -> bool:
         """Find the robot on the map that it goes on from, about where that began; its keyframe then joins the graph."""

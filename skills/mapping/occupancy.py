@@ -37,8 +37,8 @@ class LayeredOccupancy:
         self.origin_m = (0.0, 0.0)
         self.values: Values = np.zeros((LAYERS, 0, 0), dtype=np.int8)
 
-    def insert(self, frame: Keyframe, X_WF: Pose2D, *, stride: int = 1) -> None:
-        """Trace the beams of every `stride`-th column of a keyframe that was taken at a pose."""
+    def insert(self, frame: Keyframe, X_WF: Pose2D, *, stride: int = 1, first: int = 0) -> None:
+        """Trace the beams of every `stride`-th column, from the `first` on, of a keyframe that was taken at a pose."""
         self._reach(X_WF)
         c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -47,9 +47,9 @@ class LayeredOccupancy:
         _trace(
             self.values,
             place,
-            frame.ranges_m[:, ::stride].copy(),
+            frame.ranges_m[:, first::stride].copy(),
             frame.elevations_rad,
-            frame.azimuths_rad[::stride].copy(),
+            frame.azimuths_rad[first::stride].copy(),
             np.ascontiguousarray(turn @ frame.rotation),
             sensor,
         )
@@ -139,13 +139,14 @@ def _trace(
             last_column = math.floor((sensor[0] + r * dx - place[0]) / place[2])
             steps = math.floor(end * flat / place[2])
             before_row, before_column, before_layer = -1, -1, -1
+            u, v = (sensor[0] - place[0]) / place[2], (sensor[1] - place[1]) / place[2]
+            w, du, dv = (sensor[2] - LOWEST_M) / LAYER_M, dx / flat, dy / flat
+            dw = dz / flat * place[2] / LAYER_M
             for n in range(steps):
-                t = (n + 0.5) * place[2] / flat
-                layer = math.floor((sensor[2] + t * dz - LOWEST_M) / LAYER_M)
-                if layer < 0 or layer >= layers:
+                height = w + (n + 0.5) * dw
+                if height < 0.0 or height >= layers:
                     break
-                row = math.floor((sensor[1] + t * dy - place[1]) / place[2])
-                column = math.floor((sensor[0] + t * dx - place[0]) / place[2])
+                layer, row, column = int(height), int(v + (n + 0.5) * dv), int(u + (n + 0.5) * du)
                 if row == last_row and column == last_column:
                     break
                 if row == before_row and column == before_column and layer == before_layer:

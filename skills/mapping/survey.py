@@ -14,7 +14,7 @@ from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import BoolGrid, GridMap
 from skills.geometry import relative
-from skills.mapping.frontiers import Ground
+from skills.mapping.frontiers import Frontier, Ground
 from skills.mapping.mapper import Mapper
 from skills.mapping.occupancy import LayeredOccupancy
 from skills.navigate.follower import FollowerOptions, PathFollower
@@ -23,6 +23,8 @@ from skills.navigate.planner import LatticePlanner
 from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
 
 _EXPIRY_S = 0.3
+_FAR_STAND_M = 2.5
+"""Frontiers are looked at from so near at least."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class SurveyOptions:
     around_m: float = 5.0
     low_m: float = 0.3
     refresh_s: float = 1.5
+    look_s: float = 0.09
     stuck_s: float = 3.0
     blind_stop_s: float = 1.0
     blind_patience_s: float = 10.0
@@ -99,11 +102,14 @@ class Survey:
         self._revision = 0
         self._costmap: LayeredCostmap | None = None
         self._whole: LayeredCostmap | None = None
+        self._looked_s = -math.inf
+        self._begun_s: float | None = None
         self._refreshed = (-math.inf, -math.inf)
         self._goal: _Goal | None = None
         self._follower: PathFollower | None = None
         self._last: FloatArray = np.zeros(3)
         self._tried: list[tuple[float, float]] = []
+        self._refused: list[tuple[float, float]] = []
         self._best_m, self._best_s = math.inf, -math.inf
         self._failures = 0
         self._explored_since_loop = True
@@ -117,12 +123,15 @@ class Survey:
     def tick(self, now_s: float) -> None:
         """Take in what the robot senses, and drive on."""
         self.mapper.update(self._robot)
+        options = self._options
         if self._blind(now_s) or not self.mapper.keyframes:
             return
         corrected = self.mapper.revision != self._revision
         self._refresh(now_s, force=corrected or self._costmap is None)
         assert self._costmap is not None
-        self._costmap.update(self._robot, self.mapper.estimate())
+        if now_s - self._looked_s > options.look_s:
+            self._looked_s = now_s
+            self._costmap.update(self._robot, self.mapper.estimate())
         if corrected and self._goal is not None:
             self._whole = LayeredCostmap(self.known()[0])
             self._begin(self._goal, now_s)
@@ -138,14 +147,17 @@ class Survey:
 
     def _blind(self, now_s: float) -> bool:
         """Stand while the LiDAR gives nothing to go by; end when that lasts."""
-        since_s = self.mapper.blind_since_s
+        scan = self._robot.scan()
+        self._begun_s = now_s if self._begun_s is None else self._begun_s
+        seen_s = self._begun_s if scan is None else scan.stamp_s
+        since_s = seen_s if now_s - seen_s > self._options.blind_stop_s else self.mapper.blind_since_s
         if since_s is None or now_s - since_s < self._options.blind_stop_s:
             return False
         self.stop()
         if now_s - since_s > self._options.blind_patience_s:
             self.trouble = (
-                f"the LiDAR has given no usable scan for {now_s - since_s:.0f} s (no returns, repeated, or unlike "
-                "everything seen before); the robot stands"
+                f"the LiDAR has given no usable scan for {now_s - since_s:.0f} s (none, no returns, repeated, or "
+                "unlike everything seen before); the robot stands"
             )
             self.done = True
         return True
@@ -233,7 +245,7 @@ class Survey:
         while (goal := self._next_goal(ground)) is not None:
             if self._begin(goal, now_s):
                 return
-            self._tried.append(goal.about)
+            self._refused.append(goal.about)
         home = _Goal(Purpose.HOME, self._home, (self._home.x_m, self._home.y_m))
         if not self._at(home.pose) and self._begin(home, now_s):
             return
@@ -247,13 +259,23 @@ class Survey:
         """The nearest frontier that was not tried."""
         options = self._options
         for frontier in ground.frontiers(least_m=options.frontier_m, within_m=options.frontier_within_m):
-            if any(math.dist(frontier.at, tried) < options.tried_m for tried in self._tried):
+            if any(math.dist(frontier.at, tried) < options.tried_m for tried in (*self._tried, *self._refused)):
                 continue
-            pose = self._standing(frontier.stand, frontier.at)
-            if pose is None:
-                self._tried.append(frontier.at)
-                continue
-            return _Goal(Purpose.FRONTIER, pose, frontier.at)
+            pose = self._before(frontier, ground)
+            if pose is not None:
+                return _Goal(Purpose.FRONTIER, pose, frontier.at)
+            self._refused.append(frontier.at)
+        return None
+
+    def _before(self, frontier: Frontier, ground: Ground) -> Pose2D | None:
+        """Where the body has room before a frontier, as near as can be, on this side of walls."""
+        others = ground.stands_near(*frontier.at, most=16, apart_m=0.25)
+        for stand in (frontier.stand, *others):
+            near = math.dist(stand, frontier.at) < _FAR_STAND_M
+            if near and ground.cost_to(*stand) < frontier.cost_m + 1.0:
+                pose = self._standing(stand, frontier.at)
+                if pose is not None:
+                    return pose
         return None
 
     def _route_goal(self, ground: Ground) -> _Goal | None:
@@ -268,7 +290,7 @@ class Survey:
                     if math.dist(stand, point) > away_m - 0.5 * near_m:
                         break
                     pose = self._standing(stand, _beyond(here, stand, point))
-                    if pose is not None and stand not in self._tried:
+                    if pose is not None and stand not in self._refused:
                         return _Goal(Purpose.ROUTE, pose, stand)
                 self.notes.append(f"the route's point ({point[0]:.1f}, {point[1]:.1f}) cannot be reached")
             self._route.pop(0)
@@ -346,7 +368,9 @@ class Survey:
             self.trouble, self.done = f"the robot refused to drive: {status.reason}", True
 
     def _arrived(self) -> None:
+        """At a goal; what could not be reached before is tried again, as more is known now."""
         assert self._goal is not None
+        self._refused.clear()
         if self._goal.purpose is not Purpose.LOOP:
             self._explored_since_loop = True
         if self._goal.purpose is Purpose.HOME:
@@ -368,6 +392,7 @@ class Survey:
         if self._failures < 3 and self._begin(goal, now_s):
             return
         self._tried.append(goal.about)
+        self._refused.append(goal.about)
         if goal.purpose is Purpose.HOME:
             self.done = True
         self._goal = None

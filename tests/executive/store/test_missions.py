@@ -4,6 +4,7 @@ import sqlite3
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from py_trees.common import Status
@@ -18,7 +19,7 @@ from skills.robot import Pose2D
 
 REQUEST = Request(
     "fetch me a drink", seed=3, name="fetch drink", world_name="flat", robot="Alice", commands=("Take ...",),
-    fingerprint="print",
+    fingerprint="print", map=Path("own/map"),
 )  # fmt: skip
 
 
@@ -197,7 +198,7 @@ def test_a_store_of_another_version_is_refused(path):
     with sqlite3.connect(path) as other:
         other.execute("PRAGMA user_version = 9")
     other.close()
-    with pytest.raises(InputError, match="version 9, and this errand reads 3"):
+    with pytest.raises(InputError, match="version 9, and this errand reads 4"):
         MissionStore(path)
 
 

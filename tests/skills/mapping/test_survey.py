@@ -1,0 +1,124 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planar_robot import TWO_ROOMS, PlanarClock, PlanarRobot
+
+from skills.estimate.grid_map import load_grid_map
+from skills.geometry import relative
+from skills.mapping.map_folder import MapFolderError, load_mapper, save_graph, save_grids, surveyed
+from skills.mapping.mapper import Mapper
+from skills.mapping.survey import Survey
+from skills.robot import Pose2D
+from skills.testing.blocks import grid_of
+
+pytest.importorskip("gtsam")
+
+START = Pose2D(1.5, 5.4, 0.0)
+
+
+class Trip:
+    """A robot among boxes that makes a map."""
+
+    def __init__(self, *, mapper: Mapper | None = None, route=None, pose: Pose2D = START) -> None:
+        self.clock = PlanarClock()
+        self.robot = PlanarRobot(self.clock, TWO_ROOMS, pose, azimuths=450, cameras=False)
+        self.mapper = mapper or Mapper(START)
+        lease = self.robot.acquire_lease("test")
+        self.survey = Survey(self.robot, lease, self.mapper, home=START, route=route)
+
+    def go_on(self, most_s: float) -> None:
+        end_s = self.clock.now() + most_s
+        while self.clock.now() < end_s and not self.survey.done:
+            self.clock.advance(0.05)
+            self.survey.tick(self.clock.now())
+
+    def off(self) -> tuple[float, float]:
+        off = relative(self.robot.pose, self.mapper.pose)
+        return math.hypot(off.x_m, off.y_m), abs(off.yaw_rad)
+
+
+@pytest.fixture(scope="module")
+def explored(tmp_path_factory) -> tuple[Trip, object]:
+    trip = Trip()
+    trip.go_on(240.0)
+    folder = tmp_path_factory.mktemp("map")
+    save_graph(folder, trip.mapper)
+    save_grids(folder, surveyed(trip.mapper))
+    return trip, folder
+
+
+def test_all_rooms_are_explored_without_a_touch_and_the_robot_comes_home(explored):
+    trip, folder = explored
+    assert trip.survey.done and trip.survey.trouble is None
+    assert trip.robot.least_clearance_m > 0.0
+    off = relative(START, trip.robot.pose)
+    assert math.hypot(off.x_m, off.y_m) < 0.2
+    made, true = load_grid_map(folder / "keepout.yaml"), grid_of(TWO_ROOMS, (0.05, 1.0))
+    free = true.centres(np.argwhere(true.distance > 0.4))
+    inside = free[(free > 0.0).all(axis=1) & (free < [10.0, 7.0]).all(axis=1)]
+    rows, columns = made.cells(inside).T
+    assert np.mean(~(made.occupied | made.unknown)[rows, columns]) > 0.97
+
+
+def test_the_walls_of_the_map_are_those_of_the_truth(explored):
+    _, folder = explored
+    made, true = load_grid_map(folder / "scan.yaml"), grid_of(TWO_ROOMS, (0.7, 1.3))
+    walls = made.centres(np.argwhere(made.occupied))
+    assert len(walls) > 1000
+    assert np.mean(true.distance_m(walls) < 0.05) > 0.95
+
+
+def test_the_pose_stays_within_centimetres(explored):
+    trip, _ = explored
+    distance_m, yaw_rad = trip.off()
+    assert distance_m < 0.05 and yaw_rad < math.radians(1.0)
+
+
+def test_a_saved_map_goes_on_where_the_robot_begins_again(explored):
+    trip, folder = explored
+    before = len(trip.mapper.keyframes)
+    again = Trip(mapper=load_mapper(folder), pose=Pose2D(START.x_m + 0.2, START.y_m - 0.1, 0.1))
+    again.go_on(3.0)
+    assert len(again.mapper.keyframes) > before
+    assert again.off()[0] < 0.05
+    assert again.survey.trouble is None
+
+
+def test_a_damaged_map_is_refused(explored, tmp_path):
+    _, folder = explored
+    (tmp_path / "pose_graph.json").write_text((folder / "pose_graph.json").read_text()[:200])
+    (tmp_path / "keyframes.npz").write_bytes((folder / "keyframes.npz").read_bytes())
+    with pytest.raises(MapFolderError, match="no map that can be continued"):
+        load_mapper(tmp_path)
+
+
+def test_a_route_is_driven_and_what_cannot_be_reached_is_told():
+    trip = Trip(route=[(4.0, 5.4), (4.25, 3.0), (3.0, 5.4)])
+    trip.go_on(90.0)
+    assert trip.survey.done
+    assert [note for note in trip.survey.notes if "(4.2, 3.0)" in note]
+    assert trip.mapper.way_m > 4.0
+
+
+@pytest.mark.parametrize("fault", ["blank", "frozen", "gone"])
+def test_without_a_usable_scan_the_robot_stands_and_says_why(fault):
+    trip = Trip()
+    trip.go_on(4.0)
+    assert trip.robot.driving
+    last = trip.robot.scan()
+    scans = {
+        "blank": lambda: blank(PlanarRobot.scan(trip.robot)),
+        "frozen": lambda: replace(PlanarRobot.scan(trip.robot), ranges_m=last.ranges_m),
+        "gone": lambda: last,
+    }
+    trip.robot.scan = scans[fault]
+    trip.go_on(20.0)
+    assert trip.survey.done and not trip.robot.driving
+    assert "no usable scan" in trip.survey.trouble
+
+
+def blank(scan):
+    """All ranges invalid."""
+    return replace(scan, ranges_m=np.full_like(scan.ranges_m, np.nan))

@@ -49,7 +49,7 @@ class LatticePlanner:
     deepest_start_m: Margin = 0.2
     cell_m: Length = 0.1
     headings: Count = 16
-    greed: Factor = 1.3
+    greed: Factor = 2.0
     around_m: Margin = 8.0
 
     def weights(self) -> Weights:

@@ -17,8 +17,10 @@ __all__ = ["STACK", "stack", "stack_file"]
 
 def stack_file(given: Path | None) -> Path | None:
     """A stack file as it was given, or the one of that name that comes with Errand."""
+    if given is None or given.exists() or given != Path(given.name):
+        return given
     own = DEFAULT_FILE.with_name(f"{given}_stack.yaml")
-    return own if given is not None and not given.exists() and own.is_file() else given
+    return own if own.is_file() else given
 
 
 STACK = Annotated[

@@ -21,6 +21,7 @@ from skills.quantities import Count, Factor, Length, Margin, Speed, TurnRate
 from skills.robot import FloatArray, Pose2D
 
 FIELD_CELL_M = 0.05
+STEP_M = 0.06
 
 
 class NoWayError(PlanningError):
@@ -49,7 +50,7 @@ class LatticePlanner:
     deepest_start_m: Margin = 0.2
     cell_m: Length = 0.1
     headings: Count = 16
-    greed: Factor = 1.3
+    greed: Factor = 2.0
     around_m: Margin = 8.0
 
     def weights(self) -> Weights:
@@ -272,6 +273,6 @@ def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | Non
 def _smooth(problem: Problem, rough: FloatArray, needs: Needs) -> Path:
     """Shortcut, fill in and relax."""
     knots = shortcut(problem.space, rough, needs, 25)
-    band = relax(problem.space, densify(knots), 60, problem.options.margin_m, 0.25)
-    poses = densify(band)
+    band = relax(problem.space, densify(knots, STEP_M), 60, problem.options.margin_m, 0.25)
+    poses = densify(band, STEP_M)
     return Path(poses, clearances(problem.space, poses))

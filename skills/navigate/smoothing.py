@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
@@ -41,14 +40,20 @@ def shortcut(space: Space, poses: FloatArray, needs: Needs, window: int) -> Floa
     return poses[kept]
 
 
-def densify(poses: FloatArray, step_m: float = 0.06) -> FloatArray:
+@compiled
+def densify(poses: FloatArray, step_m: float) -> FloatArray:
     """The same way with poses at most step_m apart (a radian counting 0.6 m)."""
-    pieces = [poses[:1]]
-    for a, b in pairwise(poses):
-        way = math.hypot(b[0] - a[0], b[1] - a[1]) + 0.6 * abs(b[2] - a[2])
-        shares = np.linspace(0.0, 1.0, max(1, math.ceil(way / step_m)) + 1)[1:]
-        pieces.append(a + shares[:, None] * (b - a))
-    return np.ascontiguousarray(np.concatenate(pieces))
+    counts = np.empty(len(poses) - 1, dtype=np.int64)
+    for n in range(len(counts)):
+        way = math.hypot(poses[n + 1, 0] - poses[n, 0], poses[n + 1, 1] - poses[n, 1])
+        counts[n] = max(1, math.ceil((way + 0.6 * abs(poses[n + 1, 2] - poses[n, 2])) / step_m))
+    dense = np.empty((counts.sum() + 1, 3))
+    dense[0], row = poses[0], 1
+    for n in range(len(counts)):
+        for k in range(1, counts[n] + 1):
+            dense[row] = poses[n] + (k / counts[n]) * (poses[n + 1] - poses[n])
+            row += 1
+    return dense
 
 
 @compiled

@@ -6,17 +6,25 @@ import pytest
 from planar_robot import Bench, Box, NamingWorker
 
 from skills.api import Cause, Failed, Running, Step, Succeeded
-from skills.navigate.skill import Navigate, NavigateInputs
+from skills.estimate.dead_reckoning import DeadReckoning
+from skills.estimate.rolling_costmap import RollingCostmap
+from skills.navigate.skill import Navigate, NavigateInputs, NavigateOptions
 from skills.robot import Pose2D
 
+PILLAR = Box(6.2, 5.3, 6.4, 5.6, 0.0, 1.7)
 START, CORRIDOR, OTHER_ROOM = Pose2D(1.5, 2.0, 0.0), Pose2D(1.2, 5.5, math.pi), Pose2D(8.5, 2.0, -1.57)
 
 
 def go(
-    bench: Bench, goal: Pose2D, *, limit_s: float = 90.0, each: Callable[[], None] | None = None
+    bench: Bench,
+    goal: Pose2D,
+    *,
+    limit_s: float = 90.0,
+    each: Callable[[], None] | None = None,
+    options: NavigateOptions | None = None,
 ) -> tuple[Step, list[Step]]:
     """Run the skill as its leaf would; the last step and all before."""
-    skill = Navigate(bench.context())
+    skill = Navigate(bench.context(), options)
     skill.begin(NavigateInputs(goal))
     begun_s, steps = bench.clock.now(), []
     step = skill.step()
@@ -82,7 +90,7 @@ def test_goes_around_a_thing_that_the_lidar_sees():
 
 
 def test_goes_around_a_thing_too_low_for_the_lidar():
-    bench = Bench(START, unmapped=[Box(4.5, 5.0, 4.9, 5.8, 0.0, 0.2)])
+    bench = Bench(START, unmapped=[Box(4.5, 4.87, 4.9, 5.8, 0.0, 0.2)])
     step, _ = go(bench, OTHER_ROOM)
     assert isinstance(step, Succeeded), step.message
     assert bench.robot.least_clearance_m > 0.0
@@ -91,7 +99,7 @@ def test_goes_around_a_thing_too_low_for_the_lidar():
 
 def test_without_cameras_a_low_thing_is_hit():
     """The world of the test before really needs the cameras."""
-    bench = Bench(START, unmapped=[Box(4.5, 5.0, 4.9, 5.8, 0.0, 0.2)], cameras=False)
+    bench = Bench(START, unmapped=[Box(4.5, 4.87, 4.9, 5.8, 0.0, 0.2)], cameras=False)
     go(bench, OTHER_ROOM)
     assert bench.robot.least_clearance_m < 0.0
 
@@ -261,3 +269,25 @@ def test_the_way_is_the_same_whether_work_is_done_at_once_or_beside_the_ticks():
         bench.worker.close()
     assert len(ways[0][0]) > 50
     assert ways[0] == ways[1]
+
+
+def test_a_path_that_something_new_blocks_is_planned_anew_without_standing():
+    start, goal = Pose2D(1.2, 5.4, 0.0), Pose2D(8.6, 5.4, 0.0)
+    bench = Bench(start, component=DeadReckoning(), cameras=False)
+    bench.costmap = RollingCostmap()
+    for _ in range(10):
+        bench.tick()
+    slowest = [math.inf]
+
+    def pillar_appears() -> None:
+        x = bench.robot.pose.x_m
+        if x > 3.0 and PILLAR not in bench.robot.boxes:
+            bench.robot.boxes.append(PILLAR)
+        if 3.2 < x < 6.5:
+            slowest.append(float(bench.robot.velocity[0]))
+
+    step, _ = go(bench, goal, each=pillar_appears, options=NavigateOptions(review_m=5.0))
+    assert isinstance(step, Succeeded), step.message
+    assert bench.robot.least_clearance_m > 0.03
+    assert min(slowest) > 0.1
+    assert bench.worker.names.count("plan a path") >= 2

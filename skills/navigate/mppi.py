@@ -1,0 +1,198 @@
+"""Model-predictive path integral control: the path follower, with its next velocity chosen by sampled rollouts.
+
+Williams, Aldrich and Theodorou, "Model Predictive Path Integral Control", 2017.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.api import Costmap
+from skills.estimate.compiled import compiled
+from skills.geometry import wrap
+from skills.navigate.follower import Drive, FollowerOptions, PathFollower
+from skills.navigate.footprint import Footprint, clearance_at, footprint_clearance_m
+from skills.navigate.path import Path
+from skills.quantities import Count, Duration, Factor, Margin, Speed, TurnRate
+from skills.robot import FloatArray, Pose2D
+
+_CELL_M, _NOISES = 0.08, 8
+
+
+@dataclass(frozen=True)
+class MppiOptions(FollowerOptions):
+    """Model-predictive path integral control: follows a path by sampled rollouts, within the path follower's limits.
+
+    Of `samples` rollouts, `steps` times `step_s` long, those of little cost weigh more, the more so the lower the
+    `temperature`. Cost is the distance from where the path leads by then (m squared, a radian counting `yaw_m`),
+    clearance below `near_m` with `clearance_weight`, and change of velocity with `change_weight`. Near the goal, and
+    while something blocks the path, it is the path follower.
+    """
+
+    samples: Count = 200
+    steps: Count = 14
+    step_s: Duration = 0.1
+    temperature: Factor = 0.02
+    spread_m_s: Speed = 0.25
+    spread_rad_s: TurnRate = 0.5
+    yaw_m: Margin = 0.5
+    clearance_weight: Factor = 30.0
+    change_weight: Factor = 0.02
+
+    def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> MppiController:
+        """A controller of one path, at most so fast."""
+        return MppiController(path, footprint, replace(self, max_speed_m_s=min(self.max_speed_m_s, max_speed_m_s)))
+
+
+class MppiController(PathFollower):
+    """Follows one path. Equal inputs give equal velocities: the noise is drawn once, from a fixed seed."""
+
+    def __init__(self, path: Path, footprint: Footprint, options: MppiOptions | None = None) -> None:
+        self._mppi = options or MppiOptions()
+        super().__init__(path, footprint, self._mppi)
+        self._noise, self._tick = _noise(self._mppi), 0
+        self._plan: FloatArray | None = None
+
+    def command(
+        self,
+        pose: Pose2D,
+        velocity: tuple[float, float, float],
+        last: FloatArray,
+        costmap: Costmap,
+        most_m_s: float = math.inf,
+    ) -> Drive:
+        """As the path follower's, with the velocity of the weighted rollouts where the way ahead is free."""
+        plain = super().command(pose, velocity, last, costmap, most_m_s)
+        if plain.remaining_m < 0.3 or plain.blocked_at is not None or not any(plain.velocity):
+            self._plan = None
+            return plain
+        here = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
+        reference, feed = self._reference(here, most_m_s)
+        nominal = feed if self._plan is None else self._shifted(self._plan)
+        self._tick += 1
+        field, frame = _sampled(costmap, pose)
+        options = self._mppi
+        limits = np.array([options.max_speed_m_s, options.backward_m_s, options.lateral_m_s, options.turn_rad_s])
+        rates = np.array([options.acceleration_m_s2, options.acceleration_m_s2, options.turn_acceleration_rad_s2])
+        weights = np.array([options.yaw_m, options.clearance_weight, options.change_weight, options.near_m])
+        self._plan = _improved(
+            field,
+            frame,
+            self._footprint.discs,
+            here,
+            last,
+            nominal,
+            feed,
+            self._noise[self._tick % _NOISES],
+            reference,
+            limits,
+            rates * options.step_s,
+            weights,
+            options.step_s,
+            options.temperature,
+        )
+        wanted = self._slew(self._clip(self._plan[0]), last)
+        now_m = float(footprint_clearance_m(costmap, self._footprint, here[None, :])[0])
+        wanted = wanted if now_m > 0.0 else np.array(plain.velocity)
+        safe = self._brake(wanted, here, costmap)
+        return replace(plain, velocity=(float(safe[0]), float(safe[1]), float(safe[2])))
+
+    def _reference(self, here: FloatArray, most_m_s: float) -> tuple[FloatArray, FloatArray]:
+        """Where the path leads at each step (steps, 3), and the body-frame velocities that lead there."""
+        options, along = self._mppi, float(self._progress[self._index])
+        poses = np.empty((options.steps + 1, 3))
+        poses[0] = self._at(along)
+        for n in range(options.steps):
+            speed = min(float(np.interp(along, self._progress, self._limits)), most_m_s)
+            along = min(along + max(speed, options.creep_m_s) * options.step_s, self.length_m)
+            poses[n + 1] = self._at(along)
+        steps = np.diff(poses, axis=0) / options.step_s
+        c, s = np.cos(poses[:-1, 2]), np.sin(poses[:-1, 2])
+        feed = np.column_stack([c * steps[:, 0] + s * steps[:, 1], c * steps[:, 1] - s * steps[:, 0], steps[:, 2]])
+        poses[:, 2] += here[2] - poses[0, 2] + wrap(poses[0, 2] - here[2])
+        return np.ascontiguousarray(poses[1:]), np.ascontiguousarray(feed)
+
+    def _shifted(self, plan: FloatArray) -> FloatArray:
+        """The last plan as it looks a control period later."""
+        share = min(1.0, self._mppi.period_s / self._mppi.step_s)
+        return np.ascontiguousarray((1.0 - share) * plan + share * np.vstack([plan[1:], plan[-1:]]))
+
+
+def _noise(options: MppiOptions) -> FloatArray:
+    """Changes of velocity (sets, samples, steps, 3), smooth in time; the first sample of a set has none."""
+    rng = np.random.default_rng(0)
+    white = rng.standard_normal((_NOISES, options.samples, options.steps, 3))
+    for n in range(1, options.steps):
+        white[:, :, n] = 0.8 * white[:, :, n - 1] + 0.6 * white[:, :, n]
+    white *= (options.spread_m_s, 0.5 * options.spread_m_s, options.spread_rad_s)
+    white[:, 0] = 0.0
+    return np.ascontiguousarray(white)
+
+
+def _sampled(costmap: Costmap, pose: Pose2D) -> tuple[NDArray[np.float32], tuple[float, float, float]]:
+    """Clearance on a grid about the robot, and the grid's frame (see `clearance_at`)."""
+    offsets = np.arange(-2.8, 2.8 + _CELL_M, _CELL_M)
+    points = np.stack(np.meshgrid(pose.x_m + offsets, pose.y_m + offsets), axis=-1).reshape(-1, 2)
+    field = costmap.clearance_m(points).reshape(len(offsets), -1).astype(np.float32)
+    return field, (_CELL_M, pose.x_m - 2.8, pose.y_m - 2.8)
+
+
+@compiled
+def _improved(
+    field: NDArray[np.float32],
+    frame: tuple[float, float, float],
+    discs: FloatArray,
+    here: FloatArray,
+    last: FloatArray,
+    nominal: FloatArray,
+    feed: FloatArray,
+    noise: FloatArray,
+    reference: FloatArray,
+    limits: FloatArray,
+    rates: FloatArray,
+    weights: FloatArray,
+    step_s: float,
+    temperature: float,
+) -> FloatArray:
+    """The plan (steps, 3) of body-frame velocities after one round of sampling about `nominal` and, once, `feed`."""
+    samples, steps = noise.shape[0], noise.shape[1]
+    plans = np.empty((samples, steps, 3))
+    costs = np.zeros(samples)
+    for k in range(samples):
+        x, y, yaw = here[0], here[1], here[2]
+        before = last.copy()
+        for n in range(steps):
+            for axis in range(3):
+                middle = feed[n, axis] if k == 1 else nominal[n, axis] + noise[k, n, axis]
+                most = limits[0] if axis == 0 else limits[axis + 1]
+                least = -limits[1] if axis == 0 else -most
+                value = min(max(middle, least), most)
+                plans[k, n, axis] = min(max(value, before[axis] - 2.0 * rates[axis]), before[axis] + rates[axis])
+            v = plans[k, n]
+            middle_yaw = yaw + 0.5 * step_s * v[2]
+            c, s = math.cos(middle_yaw), math.sin(middle_yaw)
+            x += step_s * (c * v[0] - s * v[1])
+            y += step_s * (s * v[0] + c * v[1])
+            yaw += step_s * v[2]
+            dx, dy, turn = x - reference[n, 0], y - reference[n, 1], yaw - reference[n, 2]
+            cost = dx * dx + dy * dy + (weights[0] * turn) ** 2
+            clear = clearance_at(field, frame, discs, x, y, yaw)
+            if clear < weights[3]:
+                cost += weights[1] * (weights[3] - clear) ** 2
+            if clear < 0.0:
+                cost += 1.0
+            for axis in range(3):
+                cost += weights[2] * (v[axis] - before[axis]) ** 2
+            costs[k] += cost / steps
+            before[:] = v
+    shares = np.exp((costs.min() - costs) / temperature)
+    shares /= shares.sum()
+    plan = np.zeros((steps, 3))
+    for k in range(samples):
+        if shares[k] > 1e-6:
+            plan += shares[k] * plans[k]
+    return plan

@@ -230,7 +230,8 @@ def test_held_fast_it_gives_up_with_a_reason():
 
     held: dict[str, Pose2D] = {}
     step, _ = go(bench, OTHER_ROOM, each=hold)
-    assert isinstance(step, Failed) and step.cause is Cause.EXECUTION
+    assert isinstance(step, Failed) and step.message
+    assert step.cause in (Cause.EXECUTION, Cause.PLANNING)  # odometry goes on, so the costmap gets ghosts
 
 
 def test_equal_seeds_go_equal_ways():

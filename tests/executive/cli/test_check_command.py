@@ -118,7 +118,7 @@ def test_a_world_that_is_not_there_is_no_traceback():
 
 def test_paths_are_planned_with_the_planner_of_a_stack_file(write):
     mission = write("name: x\nsteps:\n  - {to: kitchen}\n")
-    wide = write("planner: {use: lattice, margin_m: 3.0}\n", "wide.yaml")
+    wide = write("planner: {use: lattice, margin_m: 3.0, least_margin_m: 3.0}\n", "wide.yaml")
     assert json.loads(invoke(mission, "--json").stdout)["ok"] is True
     (error,) = json.loads(invoke(mission, "--json", "--stack", wide).stdout)["errors"]
     assert (error["file"], error["line"]) == (str(mission), 3)

@@ -177,11 +177,11 @@ def _needs(problem: Problem) -> Needs:
 
 def _check_goal(problem: Problem) -> None:
     clearance = _clearance(problem, problem.goal)
-    if clearance < problem.options.margin_m:
-        raise PlanningError(
-            f"The goal {_place(problem.goal)} is blocked: the robot would have {clearance:.2f} m to the nearest thing "
-            f"there and needs {problem.options.margin_m:.2f} m."
-        )
+    if clearance >= problem.options.margin_m:
+        return
+    needed = f"would have {clearance:.2f} m to the nearest thing there and needs {problem.options.margin_m:.2f} m"
+    why = "would stand in something there, or off the map" if clearance < 0.0 else needed
+    raise PlanningError(f"The goal {_place(problem.goal)} is blocked: the robot {why}.")
 
 
 def _lattice(problem: Problem, yaw0_rad: float) -> tuple[Lattice, int, int]:

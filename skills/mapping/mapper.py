@@ -35,8 +35,8 @@ class MapperOptions:
     A scan is matched every `period_s`. A keyframe is kept after `keyframe_m` or `keyframe_rad`; a submap is full after
     `submap_m` of way. Odometry is expected to err by `drift_per_m` of each step (with much more, the beams' pattern
     holds the robot back in bare corridors), by `yaw_drift_rad_per_m` of the way and `yaw_drift_per_rad` of a turn.
-    Scans of which the submap explains less than `least_share` do not count. Loops are looked for every `closure_m`, within
-    `closure_window` plus `window_per_m` of the way since the last one found.
+    Scans of which the submap explains less than `least_share` do not count. Loops are looked for every `closure_m`,
+    within `closure_window` plus `window_per_m` of the way since the last one found.
     """
 
     azimuths: int = 450

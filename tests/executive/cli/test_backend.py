@@ -46,7 +46,7 @@ def test_its_work_is_in_report_and_log_and_its_parts_are_timed(prepared):
     report = run_request(prepared, ScriptedBackend(), profile=profile).report
     logged = [event.data for event in read_events(prepared.request.out / "log.mcap") if event.topic == "work"]
     assert logged == [dict(report.work)]
-    assert (report.work["calls"] > 10, report.work["planner_expansions"] > 10) == (True, True)
+    assert (report.work["calls"] > 10, report.work["planner_expansions"] > 0) == (True, True)
     assert {"scripted", "planning", "costmap", "skills", "executive", "log"} <= set(profile.table())
 
 

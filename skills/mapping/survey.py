@@ -22,6 +22,8 @@ from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_arr
 from skills.navigate.planner import LatticePlanner
 from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
 
+_ROUNDS = 1
+"""So many times, once back at the start, the frontiers that were given up are tried again."""
 _EXPIRY_S = 0.3
 _FAR_STAND_M = 2.5
 """Frontiers are looked at from so near at least."""
@@ -112,6 +114,7 @@ class Survey:
         self._refused: list[tuple[float, float]] = []
         self._best_m, self._best_s = math.inf, -math.inf
         self._failures = 0
+        self._rounds_left, self._given_up = _ROUNDS, False
         self._explored_since_loop = True
         self._closed = 0
 
@@ -257,9 +260,10 @@ class Survey:
 
     def _frontier_goal(self, ground: Ground) -> _Goal | None:
         """The nearest frontier that was not tried."""
-        options = self._options
+        options, self._given_up = self._options, False
         for frontier in ground.frontiers(least_m=options.frontier_m, within_m=options.frontier_within_m):
             if any(math.dist(frontier.at, tried) < options.tried_m for tried in (*self._tried, *self._refused)):
+                self._given_up = True
                 continue
             pose = self._before(frontier, ground)
             if pose is not None:
@@ -374,7 +378,9 @@ class Survey:
         if self._goal.purpose is not Purpose.LOOP:
             self._explored_since_loop = True
         if self._goal.purpose is Purpose.HOME:
-            self.done = True
+            self.done = not self._given_up or self._rounds_left == 0
+            self._rounds_left -= 1
+            self._tried.clear()
         if self._goal.purpose is Purpose.FRONTIER:
             self._tried.append(self._goal.about)
         self._goal = None

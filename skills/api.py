@@ -26,7 +26,7 @@ from skills.robot import Clock, Lease, Pose2D, Robot, Scan
 from skills.stack import RobotStack, default_stack
 
 if TYPE_CHECKING:
-    from pydrake.math import RigidTransform
+    from pydrake.math import RigidTransform, RotationMatrix
 
 ResultT = TypeVar("ResultT")
 ReadT = TypeVar("ReadT")
@@ -308,6 +308,25 @@ class Publish(Protocol):
         """Log `message` (JSON-like values; numpy images allowed under key "image") under `topic`."""
 
 
+@dataclass
+class Payload:
+    """How large the thing in the gripper is, noted by the skill that took it: corners (N, 3) in the hand frame (m).
+
+    `R_BH` is how the hand was turned as it took the thing, which stood or lay level then. None while nobody knows, as
+    after a restart. It counts only while the gripper holds something.
+    """
+
+    corners_H: NDArray[np.float64] | None = None
+    R_BH: RotationMatrix | None = None
+
+
+@dataclass
+class SeenSolid:
+    """Solid cells (N, 3) of the world near the robot, as its depth pictures show them; see `skills.arm.solid_cells`."""
+
+    cells: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
+
+
 @dataclass(frozen=True)
 class SkillContext:
     """All that a skill may use. `seed` derives from the run's seed and the leaf's path id."""
@@ -324,6 +343,8 @@ class SkillContext:
     detector: Detector = NO_DETECTOR
     work: WorkCounter = NO_WORK_COUNTER
     stack: RobotStack = field(default_factory=default_stack)
+    payload: Payload = field(default_factory=Payload)
+    solid: SeenSolid = field(default_factory=SeenSolid)
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -60,7 +59,7 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
     """
     if start.pose is not None:
         return start.pose
-    keepout = _grid(replace(world, maps=None).keepout_map_path).with_unknown_blocked()
+    keepout = _grid(world.surveyed.keepout_map_path).with_unknown_blocked()
     places = keepout.centres(np.argwhere(keepout.distance > TURNING_M))
     for person in place_people(world, seed):
         places = places[np.hypot(*(places - person.X_WO.translation()[:2]).T) > FROM_PEOPLE_M]

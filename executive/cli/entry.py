@@ -50,6 +50,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "evaluate": _Command(
         "main", "evaluate", "Run a mission at many seeds and count what the trees claim and what the referee saw."
     ),
+    "teleop": _Command("teleop_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "dataset": _Command("dataset_command", "dataset", "Labelled pictures rendered in the plant; scores, training."),
     "stack": _Command("stack_command", "stack", "What a robot uses: localiser, planners, controller, detector."),

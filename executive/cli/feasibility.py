@@ -23,7 +23,7 @@ from skills.stack import RobotStack, default_component
 
 
 class _RoutesOnMap(RoutePlanner):
-    """Routes on a world's surveyed map for the robot's footprint; the map is read when the first is asked for.
+    """Routes on the robot's map of a world for the robot's footprint; the map is read when the first is asked for.
 
     A stack plans them with its costmap and planner; None stands for the default one, of which only these are loaded.
     """
@@ -52,7 +52,7 @@ class _RoutesOnMap(RoutePlanner):
 
 
 def route_planner_of(world: World, stack_file: Path | None = None) -> RouteCache:
-    """Routes on a world's surveyed map, as a stack file has them planned (None: the default stack).
+    """Routes on the robot's map of a world, as a stack file has them planned (None: the default stack).
 
     When there is no such map, the first route raises InputError.
 

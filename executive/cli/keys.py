@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Protocol
 
 from executive.run.control import Control, ControlState, Mode
 from executive.run.questions import OpenQuestion
@@ -37,6 +37,13 @@ class Typing:
     saying: bool = False
     reply: str = ""
     can_say: bool = False
+
+
+class Pressed(Protocol):
+    """Something that keys mean something to."""
+
+    def press(self, key: str) -> None:
+        """A key is pressed; called from the thread that reads keys."""
 
 
 class Keys:
@@ -126,7 +133,7 @@ def prompt_lines(state: ControlState, now_s: float, typing: Typing = Typing()) -
 
 
 @contextmanager
-def keys_pressed(keys: Keys, descriptor: int | None = None) -> Iterator[bool]:
+def keys_pressed(keys: Pressed, descriptor: int | None = None) -> Iterator[bool]:
     """Read keys while the block runs, in a thread that sleeps until one comes; False where there is no terminal.
 
     The terminal is put back as it was. `descriptor` is standard input unless given.
@@ -158,7 +165,7 @@ def keys_available() -> bool:
     return source is not None and os.isatty(source)
 
 
-def _read(source: int, wake: int, keys: Keys) -> None:
+def _read(source: int, wake: int, keys: Pressed) -> None:
     while True:
         ready, _, _ = select.select([source, wake], [], [])
         if wake in ready:

@@ -57,12 +57,15 @@ def build(
     most_s: Annotated[
         float, typer.Option("--max-time", min=1.0, help="End after so many seconds of driving.")
     ] = 7200.0,
+    people: Annotated[
+        bool, typer.Option(help="Whether the world's people are there; who stands about becomes part of the map.")
+    ] = True,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of output is the result as JSON.")] = False,
 ) -> None:
     """Explore a world, or follow a route, and save both grids and the pose graph."""
     console = console_for(as_json)
     with refusals():
-        opened = open_world(world)
+        opened = open_world(world) if people else open_world(world).without_people()
         points = None if route is None else _route_points(route)
         mapper = _mapper(opened, out)
         building = _Building(opened, seed, mapper, points, out, console)

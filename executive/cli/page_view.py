@@ -136,6 +136,6 @@ def scene_actions(scene: Scene) -> Mapping[str, Action]:
 
 
 def log_map(log: EventLog, prepared: Prepared) -> None:
-    """Write the surveyed map into the log, so that the log stands alone."""
+    """Write the map into the log, so that the log stands alone."""
     grid = load_grid_map(prepared.world.scan_map_path)
     log(MAP, map_message(grid, prepared.knowledge, world=prepared.world.name))

@@ -97,7 +97,7 @@ def show(
     with refusals():
         drawn = open_world(folder)
         facts = knowledge_of(drawn)
-        grid = _grid_map(drawn.keepout_map_path)
+        grid = _grid_map(drawn.surveyed.keepout_map_path)
         picture = draw_world(
             drawn,
             _grey(grid),

@@ -31,7 +31,7 @@ def _world_error(name: str, error: Exception) -> InputError:
 
 
 def refuse_blocked(world: World, pose: Pose2D) -> None:
-    """Raise InputError unless the robot's body is free at a pose on the world's map, which must be there."""
+    """Raise InputError unless the robot's body is free at a pose on the world's surveyed map, which must be there."""
     import math
 
     import numpy as np
@@ -41,7 +41,7 @@ def refuse_blocked(world: World, pose: Pose2D) -> None:
     from skills.navigate.footprint import Footprint
 
     try:
-        grid = load_grid_map(world.keepout_map_path).with_unknown_blocked()
+        grid = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     except (MapError, OSError) as error:
         raise InputError(str(error)) from error
     discs = Footprint.of(spot_capabilities()).discs

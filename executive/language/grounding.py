@@ -7,7 +7,8 @@ or only looks or sounds like something known, makes a question.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Final
 
 from executive.language.command_frames import CommandFrame
@@ -56,7 +57,7 @@ def ground_noted(frames: Sequence[CommandFrame], knowledge: Knowledge, facts: Wo
         RefusalError: a thing, place or person is unknown, or could be several; with a question where that helps.
     """
     grounder = _Grounder(knowledge, facts)
-    commands = tuple(command for frame in frames for command in grounder.commands(frame))
+    commands = tuple(command for frame in grounder.needed_there(frames) for command in grounder.commands(frame))
     return Grounded(commands, tuple(dict.fromkeys(grounder.notes)))
 
 
@@ -80,6 +81,19 @@ class _Grounder:
     knowledge: Knowledge
     facts: WordFacts | None
     notes: list[str] = field(default_factory=list)
+
+    def needed_there(self, frames: Sequence[CommandFrame]) -> tuple[CommandFrame, ...]:
+        """The frames; a thing asked for in a room without a surface to take it from is brought into that room."""
+        found = list(frames)
+        for k, (takes, brings) in enumerate(pairwise(frames)):
+            place, fetched = takes.goal, takes.task is Task.GRASP and brings.item == takes.object
+            if not fetched or place is None or place.preposition not in _INSIDE or brings.goal != HERE:
+                continue
+            name = None if place.phrase is None else self.knowledge.place(place.name)
+            if name is not None and not self.knowledge.surfaces_in(name):
+                self.notes.append(f"I bring it to the {name}: nothing can be taken from there")
+                found[k : k + 2] = [replace(takes, goal=None), replace(brings, goal=replace(place, preposition="to"))]
+        return tuple(found)
 
     def commands(self, frame: CommandFrame) -> Iterator[Command]:
         """One frame as a command; going to every room is one for each."""
@@ -312,5 +326,6 @@ def _around(location: Location) -> str | None:
     return " ".join(extra[1:]) if extra[:1] == ("of",) else None
 
 
+_INSIDE: Final = frozenset({"in", "at", "inside"})
 _KINDS: Final = ("room", "surface", "person")
 _PLURALS: Final = {Slot.THING: "things", Slot.PLACE: "places", Slot.PERSON: "people", Slot.GOAL: "places"}

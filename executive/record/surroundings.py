@@ -1,4 +1,4 @@
-"""The map that a log carries, so that it stands alone: the surveyed grid as a picture, and where the places are."""
+"""The map that a log carries, so that it stands alone: the grid as a picture, and where the places are."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Checked:
 
 
 class PlannedRoutes(RoutePlanner):
-    """Routes by a global planner on the surveyed map, as `navigate` plans them; each is planned once."""
+    """Routes by a global planner on the map, as `navigate` plans them; each is planned once."""
 
     def __init__(self, costmap: Costmap, footprint: Footprint, planner: GlobalPlanner) -> None:
         self._costmap, self._footprint, self._planner = costmap, footprint, planner

@@ -62,7 +62,7 @@ class Route:
 
 
 class RoutePlanner(Protocol):
-    """Plans routes on the surveyed map."""
+    """Plans routes on the map."""
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
         """The route from start to goal. Raises ValueError with one sentence when there is none."""

@@ -68,6 +68,11 @@ class Referee:
         return sum(history.drops for history in self._histories.values())
 
     @property
+    def objects(self) -> Mapping[str, ObjectHistory]:
+        """What is known of each loose object, by name."""
+        return dict(self._histories)
+
+    @property
     def events(self) -> tuple[str, ...]:
         """What happened, one sentence each: bumps, lifts, drops."""
         told = [event for history in self._histories.values() for event in history.events]

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 WORLDS_FOLDER = Path(__file__).resolve().parent
 PACKAGE_NAME = "errand"
+TRUTH: Final = "truth"
+"""The folder of a world's surveyed grids, where the robot has made its own map."""
 MAX_BYTES = 1_000_000
 
 Point = tuple[float, float]
@@ -157,8 +159,8 @@ class World:
     """A world's files and what the plant needs to know of them. Lengths in metres, world frame.
 
     Only its geometry and a start are needed: no dock, rooms, surfaces or seed rules. `standing` tells where somebody
-    stands who is in a room, or at a surface. The robot has the grids of the folder `maps`, None for those of the
-    world's own survey.
+    stands who is in a room, or at a surface. The robot has the grids of the folder `maps`, None for those in the
+    world's own `map`.
     """
 
     name: str
@@ -191,6 +193,10 @@ class World:
         _check_people(self.folder / "objects.yaml", changed, self.standing)
         return replace(self, seed_rules=changed)
 
+    def without_people(self) -> World:
+        """The same with nobody in it."""
+        return replace(self, seed_rules=self.seed_rules.model_copy(update={"people": ()}))
+
     @property
     def directives_path(self) -> Path:
         """Drake model directives of rooms and furniture."""
@@ -200,6 +206,12 @@ class World:
     def knowledge_path(self) -> Path:
         """What the robot is told."""
         return self.folder / "knowledge.yaml"
+
+    @property
+    def surveyed(self) -> World:
+        """The same with grids drawn from its geometry: the truth, for referees and tests, where they are kept apart."""
+        truth = self.folder / TRUTH
+        return replace(self, maps=truth if truth.is_dir() else None)
 
     @property
     def scan_map_path(self) -> Path:

@@ -19,6 +19,7 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.planning import body_height_m, within_reach
+from skills.navigate.footprint import Footprint
 from skills.navigate.skill import NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
 from skills.robot import Pose2D
@@ -103,7 +104,8 @@ class Approach(ArmSkill[ApproachInputs]):
     def _free_places(self, seen: ObjectObservation) -> list[Standing]:
         context = self.context
         point_W = (seen.position_W[0], seen.position_W[1])
-        return free_places(point_W, context.pose(), context.costmap, context.robot.capabilities())
+        footprint = Footprint.of(context.robot.capabilities())
+        return free_places(point_W, context.pose(), context.costmap, footprint)
 
     def _why_none(self, seen: ObjectObservation) -> str:
         """Whether the object itself is beyond the gripper, or only the places about it are."""

@@ -15,7 +15,7 @@ from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.robot import Capabilities, Pose2D
+from skills.robot import Pose2D
 
 DISTANCES_M = (0.90, 0.94, 0.87, 0.84, 0.98, 0.81, 1.02, 1.06)
 BEARINGS = 24
@@ -41,11 +41,8 @@ def is_comfortable(pose: Pose2D, point_W: tuple[float, float]) -> bool:
     return COMFORTABLE_M[0] <= math.hypot(dx, dy) <= COMFORTABLE_M[1] and abs(bearing) < COMFORTABLE_BEARING_RAD
 
 
-def free_places(
-    point_W: tuple[float, float], here: Pose2D, costmap: Costmap, capabilities: Capabilities
-) -> list[Standing]:
+def free_places(point_W: tuple[float, float], here: Pose2D, costmap: Costmap, footprint: Footprint) -> list[Standing]:
     """Free poses around point_W that face it, the cheapest first."""
-    footprint = Footprint.of(capabilities)
     found = []
     for k, distance in itertools.product(range(BEARINGS), DISTANCES_M):
         yaw = 2 * math.pi * k / BEARINGS

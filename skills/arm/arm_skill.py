@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, InputsT, SkillContext
+from skills.api import Cause, InputsT, Running, SkillContext
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel, arm_model
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
+from skills.arm.solid_cells import solid_boxes, with_picture
+from skills.estimate.self_filter import segment_distance
 from skills.robot import ArmTrajectory, CameraCapabilities, FloatArray, GripperCapabilities, Image
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
@@ -21,15 +25,34 @@ SETTLE_S = 0.15
 OLDEST_PICTURE_S = 0.5
 LINE_SPEED_RAD_S = 0.6
 GRIPPER_FORCE_N = 20.0
+CONTACT_LAG_M = 0.006
+"""A hand that moves slowly and freely lags by 2 mm at most (measured in the plant); in contact it lags more at once."""
+WEIGHING_S = 0.3
+_STEP_RAD, _GRAVITY_M_S2 = 1e-4, 9.81
+_AT_ARM_M = 0.12
+_BEYOND_M = 0.5
+
+
+def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> float:
+    """The mass (kg) at p_HO of the hand that explains efforts `extra_nm` (J,) best, by least squares."""
+    steps = _STEP_RAD * np.eye(len(q_rad))
+    rises = [(model.X_BH(q_rad + step) @ p_HO - model.X_BH(q_rad - step) @ p_HO)[2] for step in steps]
+    lever_nm = _GRAVITY_M_S2 * np.array(rises) / (2.0 * _STEP_RAD)
+    return float(lever_nm @ extra_nm / (lever_nm @ lever_nm))
 
 
 class ArmSkill(RoutineSkill[InputsT]):
-    """A routine with an arm. `boxes` stand around it (frame B), `held` is in the hand (frame H)."""
+    """A routine with an arm. `boxes` stand around it (frame B), `held` is in the hand (frame H).
+
+    Around it stands also what the hand camera has seen so far, but in `known_W` (least and greatest corner, world)
+    what `boxes` say.
+    """
 
     def __init__(self, context: SkillContext) -> None:
         super().__init__(context)
         self.boxes: Sequence[Box] = ()
         self.held: Sequence[Box] = ()
+        self.known_W: tuple[FloatArray, FloatArray] | None = None
         self._scene: ArmScene | None = None
         self._model: ArmModel | None = None
         self._rng = np.random.default_rng(context.seed)
@@ -46,7 +69,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         super().resume(inputs)
 
     def _forget(self) -> None:
-        self.boxes, self.held, self._scene = (), (), None
+        self.boxes, self.held, self.known_W, self._scene = (), (), None, None
         self._rng = np.random.default_rng(self.context.seed)
 
     def hand_near(self, p_W: FloatArray, within_m: float) -> bool:
@@ -88,7 +111,7 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def scene_now(self) -> Callable[[], ArmScene]:
         """Gives, inside a Worker job, the collision scene with what stands around and what is held just now."""
-        robot, model, boxes, held = self.context.robot, self.model, self.boxes, self.held
+        robot, model, boxes, held = self.context.robot, self.model, [*self.boxes, *self.seen_boxes()], self.held
         capabilities, joints = robot.capabilities(), robot.joints()
         work, opening_rad = self.context.work, max(0.0, robot.gripper().opening_rad)
 
@@ -101,6 +124,33 @@ class ArmSkill(RoutineSkill[InputsT]):
             return scene
 
         return prepared
+
+    def seen_boxes(self) -> list[Box]:
+        """What the hand camera has seen within reach, but what is known better and what is at the arm itself."""
+        X_WB, q_rad = self.X_WB(), self.q_rad()
+        arm_W = self.model.points_B(q_rad) @ X_WB.rotation().matrix().T + X_WB.translation()
+        tip_W = X_WB @ self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])
+        segments = list(pairwise([*arm_W, tip_W]))
+
+        def left_out(points_W: FloatArray) -> NDArray[np.bool_]:
+            out = np.any([segment_distance(points_W, *each) < _AT_ARM_M for each in segments], axis=0)
+            if self.known_W is not None:
+                out |= np.all((points_W > self.known_W[0]) & (points_W < self.known_W[1]), axis=1)
+            return np.asarray(out | self._own(points_W))
+
+        return solid_boxes(self.context.solid.cells, X_WB, self._reach_m(), left_out)
+
+    def _reach_m(self) -> float:
+        """How far from the body's origin the arm and what it holds may come."""
+        arm = self.context.robot.capabilities().arm
+        return _BEYOND_M + (0.0 if arm is None else arm.max_reach_m)
+
+    def _own(self, points_W: FloatArray) -> NDArray[np.bool_]:
+        """Which world points (N, 3) lie within the body's outline."""
+        corners = np.array(self.context.robot.capabilities().footprint_m)
+        points_B = (points_W - self.X_WB().translation()) @ self.X_WB().rotation().matrix()
+        inside = (points_B[:, :2] > corners.min(axis=0) - 0.05) & (points_B[:, :2] < corners.max(axis=0) + 0.05)
+        return np.asarray(np.all(inside, axis=1))
 
     def move_to(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[FloatArray]:
         """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration."""
@@ -139,6 +189,30 @@ class ArmSkill(RoutineSkill[InputsT]):
     def shift_hand(self, offset_B: FloatArray, message: str) -> Routine[None]:
         """Move the hand straight by an offset in the body frame."""
         yield from self.move_straight(self.model.X_BH(self.q_rad()).translation() + offset_B, message)
+
+    def weigh(self, p_HO: FloatArray, message: str) -> Routine[float]:
+        """The mass (kg) of what the still hand holds at p_HO (3,), from the arm's efforts; body level.
+
+        Noise that one reading has is averaged over `WEIGHING_S`.
+        """
+        scene = yield from self.compute(self.scene_now(), latency_s=0.05, name="prepare weighing", message=message)
+        end_s, found = self.context.clock.now() + WEIGHING_S, []
+        while self.context.clock.now() < end_s:
+            efforts = self.context.robot.joints().effort_nm
+            q = self.q_rad()
+            extra = np.array([efforts[name] for name in self.model.names]) - scene.gravity_efforts(q)
+            found.append(held_mass_kg(self.model, q, p_HO, extra))
+            yield Running(message)
+        return float(np.median(found))
+
+    def held_up(self, direction_B: FloatArray) -> Callable[[FloatArray], bool]:
+        """A guard for `follow`: whether the hand, which moves slowly that way, lags as far as if something stops it."""
+
+        def guard(q_wanted_rad: FloatArray) -> bool:
+            lag = self.model.X_BH(q_wanted_rad).translation() - self.model.X_BH(self.q_rad()).translation()
+            return float(lag @ direction_B) > CONTACT_LAG_M
+
+        return guard
 
     @property
     def gripper(self) -> GripperCapabilities:
@@ -195,6 +269,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         if image.stamp_s < asked_s - OLDEST_PICTURE_S:
             age_s = asked_s - image.stamp_s
             raise SkillFailure(Cause.EXECUTION, f"the hand camera gives only a picture that is {age_s:.1f} s old")
+        solid = self.context.solid
+        solid.cells = with_picture(solid.cells, image, self.context.localiser.estimate().X_WO, self._own)
         return image
 
     def try_stow(self) -> Routine[None]:

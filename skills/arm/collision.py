@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,8 @@ from skills.arm.kinematics import ArmModel
 from skills.robot import Capabilities, FloatArray
 
 _WORLD = "WorldModelInstance"
-_EDGE_STEP_RAD = 0.05
+EDGE_STEP_RAD = 0.05
+"""How far apart (rad, all joints together) the configurations of a motion are checked."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,13 @@ class Box:
 
     X_FG: RigidTransform
     size_m: tuple[float, float, float]
+
+
+def box_corners(box: Box) -> FloatArray:
+    """The eight corners of a box, (8, 3) in the frame in which it is given."""
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    half = 0.5 * np.array(box.size_m)
+    return np.asarray(signs * half @ box.X_FG.rotation().matrix().T + box.X_FG.translation())
 
 
 class ArmScene:
@@ -51,7 +60,7 @@ class ArmScene:
         plant.Finalize()
         self._instance = plant.GetModelInstanceName(robot)
         self._checker = SceneGraphCollisionChecker(
-            model=builder.Build(), robot_model_instances=[robot], edge_step_size=_EDGE_STEP_RAD
+            model=builder.Build(), robot_model_instances=[robot], edge_step_size=EDGE_STEP_RAD
         )
         self._checker.SetPaddingAllRobotEnvironmentPairs(padding_m)
         self._q = np.zeros(plant.num_positions())
@@ -61,13 +70,27 @@ class ArmScene:
             self._q[start] = joint_positions_rad.get(name, 0.0)
         self._arm = np.array([starts[name] for name in model.names])
         self._gripper = starts[model.gripper.name]
+        self._boxes: tuple[Box, ...] = ()
         self._allow_stowed_contacts()
 
     def set_boxes(self, boxes: Sequence[Box]) -> None:
         """Replace the boxes around the robot (frame B)."""
+        self._boxes = tuple(boxes)
         self._checker.RemoveAllAddedCollisionShapes("around")
         for box in boxes:
             self._add("around", box, _WORLD, "world")
+
+    @contextmanager
+    def with_only(self, boxes: Sequence[Box], opening_rad: float) -> Iterator[None]:
+        """For a while other boxes stand around, and the gripper is open so far."""
+        before, gripper = self._boxes, self._q[self._gripper]
+        self.set_boxes(boxes)
+        self.set_opening(opening_rad)
+        try:
+            yield
+        finally:
+            self.set_boxes(before)
+            self._q[self._gripper] = gripper
 
     def hold(self, boxes: Sequence[Box]) -> None:
         """Replace the boxes fixed to the hand (frame H), for a thing held."""
@@ -96,6 +119,13 @@ class ArmScene:
     def path_free(self, path_rad: FloatArray) -> bool:
         """Whether every configuration of a dense path (K, J) is free."""
         return all(self.free(q) for q in path_rad)
+
+    def gravity_efforts(self, q_rad: FloatArray) -> FloatArray:
+        """Efforts (J,), N m, with which the arm holds its own weight at angles q_rad (J,), the body level."""
+        plant = self._checker.plant()
+        context = self._checker.UpdatePositions(self._full(q_rad))
+        held: FloatArray = -plant.CalcGravityGeneralizedForces(context)[self._arm]
+        return held
 
     def contacts(self, q_rad: FloatArray) -> tuple[tuple[str, str], ...]:
         """Names of the links that touch or come closer than the padding, for messages."""

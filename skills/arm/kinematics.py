@@ -71,11 +71,21 @@ class ArmModel:
 
     def X_BH(self, q_rad: FloatArray) -> RigidTransform:
         """Pose of the hand for joint angles q_rad (J,)."""
-        rotation, position = np.eye(3), np.zeros(3)
+        rotation, positions = self._chain(q_rad)
+        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(rotation), positions[-1])
+
+    def points_B(self, q_rad: FloatArray) -> FloatArray:
+        """Where the joints are, from the shoulder on, (J, 3) in the body frame; the last is the hand's origin."""
+        return np.array(self._chain(q_rad)[1])
+
+    def _chain(self, q_rad: FloatArray) -> tuple[NDArray[np.float64], list[FloatArray]]:
+        """Rotation of the hand, and the place of each joint."""
+        rotation, position, positions = np.eye(3), np.zeros(3), []
         for joint, angle in zip(self.joints, q_rad, strict=True):
             position = position + rotation @ joint.X_PF.translation()
             rotation = rotation @ joint.X_PF.rotation().matrix() @ _axis_rotation(joint.axis, float(angle))
-        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(rotation), position)
+            positions.append(position)
+        return rotation, positions
 
     def within_limits(self, q_rad: FloatArray, margin_rad: float = 0.0) -> bool:
         """Whether q_rad keeps margin_rad from every limit."""

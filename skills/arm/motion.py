@@ -1,36 +1,46 @@
 """Collision-checked arm paths and their timing.
 
 A path is an array (K, J) of joint angles. Joint motions are straight where that is free, else planned by a
-bidirectional rapidly exploring random tree and shortened; straight lines of the hand go through the inverse kinematics.
+bidirectional rapidly exploring random tree of OMPL and shortened; straight lines of the hand go through the inverse
+kinematics.
 """
 
 from __future__ import annotations
 
+import itertools
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import PlanningError
-from skills.arm.collision import ArmScene
+from skills.arm.collision import EDGE_STEP_RAD, ArmScene
 from skills.arm.kinematics import ArmModel
 from skills.quantities import Count, Duration, Length, Tries, Turn, TurnAcceleration, TurnRate
 from skills.robot import ArmTrajectory, FloatArray
 
-_FEWEST_POINTS = 9
+_FEWEST_POINTS, _ESCAPE_TRIES = 9, 40
+_ESCAPES, _PARTS_OF_ESCAPE = (1.0, 2.0, 4.0, 8.0), (0.25, 0.5, 0.75)
+_ONE_AT_A_TIME: Final = threading.Lock()
+"""OMPL's random generator is one per process, so plans of several threads take turns."""
 
 
 @dataclass(frozen=True)
 class RrtConnect:
     """Two rapidly exploring random trees that grow towards each other, then shortcuts; timed at trapezoidal speeds.
 
-    The trees grow by `step_rad`, `iterations` times at most; `shortcuts` are tried on what they find. Straight lines of
-    the hand are checked each `line_step_m`, at which no joint may turn by more than `line_jump_rad`. Trajectories keep
+    A start in contact is left by turns of up to `escape_rad`, up to eight times that where need be. The trees grow by
+    `step_rad`, `iterations` times at most; `shortcuts` are tried on what they find. Straight lines of the hand are
+    checked each `line_step_m`, at which no joint may turn by more than `line_jump_rad`. Trajectories keep
     `speed_rad_s`, or a slower one where a skill asks for it, and `acceleration_rad_s2`, in samples of `sample_s`, from
     points `dense_rad` apart.
     """
 
     step_rad: Turn = 0.25
+    escape_rad: Turn = 0.06
     iterations: Count = 1500
     shortcuts: Tries = 80
     line_step_m: Length = 0.01
@@ -43,13 +53,30 @@ class RrtConnect:
     def path(
         self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
     ) -> FloatArray:
-        """A free path from start to goal. Raises PlanningError when an end is blocked or no path was found."""
-        for name, q in (("starts", q_start_rad), ("ends", q_goal_rad)):
-            if not scene.free(q):
-                raise PlanningError(f"the arm's way {name} in contact of {_pairs(scene, q)}")
+        """A free path from start to goal. Raises PlanningError when an end is blocked or no path was found.
+
+        A start that is in contact by what the arm's servos are off is left by the least turn that frees it.
+        """
+        if not scene.free(q_goal_rad):
+            raise PlanningError(f"the arm's way ends in contact of {_pairs(scene, q_goal_rad)}")
+        if not scene.free(q_start_rad):
+            q_freed_rad = self._freed(scene, q_start_rad, rng)
+            return np.vstack([q_start_rad, self.path(scene, q_freed_rad, q_goal_rad, rng)])
         if scene.edge_free(q_start_rad, q_goal_rad):
             return np.array([q_start_rad, q_goal_rad])
-        return self._shortened(scene, self._connect(scene, q_start_rad, q_goal_rad, rng), rng)
+        return self._connected(scene, q_start_rad, q_goal_rad, rng)
+
+    def _freed(self, scene: ArmScene, q_rad: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """A free configuration near one in contact, on a way that touches nothing else. Raises PlanningError."""
+        touched = set(scene.contacts(q_rad))
+        for growth in _ESCAPES:
+            turns = rng.uniform(-1.0, 1.0, (_ESCAPE_TRIES, len(q_rad))) * growth * self.escape_rad
+            for turn in sorted(turns, key=lambda turn: float(np.max(np.abs(turn)))):
+                q_freed_rad = np.clip(q_rad + turn, scene.model.lower_rad, scene.model.upper_rad)
+                between = (q_rad + part * (q_freed_rad - q_rad) for part in _PARTS_OF_ESCAPE)
+                if scene.free(q_freed_rad) and all(set(scene.contacts(q)) <= touched for q in between):
+                    return np.asarray(q_freed_rad)
+        raise PlanningError(f"the arm's way starts in contact of {_pairs(scene, q_rad)}")
 
     def line(
         self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
@@ -91,33 +118,52 @@ class RrtConnect:
         positions = np.stack([np.interp(samples, times, dense[:, j]) for j in range(dense.shape[1])], axis=1)
         return ArmTrajectory(np.asarray(samples, dtype=float), positions)
 
-    def _connect(
+    def _connected(
         self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
-    ) -> list[FloatArray]:
-        """RRT-Connect. Raises PlanningError after a fixed number of iterations."""
-        trees = [([q_start_rad], [-1]), ([q_goal_rad], [-1])]
-        lower, upper = scene.model.lower_rad + 0.02, scene.model.upper_rad - 0.02
-        for iteration in range(self.iterations):
-            near, far = trees[iteration % 2], trees[1 - iteration % 2]
-            tip = _extend(scene, near, rng.uniform(lower, upper), self.step_rad, greedy=False)
-            if tip is None:
-                continue
-            meeting = _extend(scene, far, near[0][tip], self.step_rad, greedy=True)
-            if meeting is not None and np.allclose(far[0][meeting], near[0][tip]):
-                branches = _branch(near, tip), _branch(far, meeting)
-                first, second = branches if iteration % 2 == 0 else branches[::-1]
-                return first[::-1] + second[1:]
-        raise PlanningError("no free way was found for the arm")
+    ) -> FloatArray:
+        """RRT-Connect (Kuffner and LaValle, ICRA 2000), then OMPL's shortcuts. Raises PlanningError.
 
-    def _shortened(self, scene: ArmScene, path: list[FloatArray], rng: np.random.Generator) -> FloatArray:
-        """Replace detours by free straight pieces."""
-        for _ in range(self.shortcuts):
-            if len(path) <= 2:
-                break
-            first, last = sorted(rng.choice(len(path), size=2, replace=False))
-            if last - first > 1 and scene.edge_free(path[first], path[last]):
-                path = path[: first + 1] + path[last:]
-        return np.array(path)
+        Bounds count steps, not seconds, and the seed comes from `rng`: equal problems give equal paths.
+        """
+        from ompl import base, geometric, util
+
+        space = base.RealVectorStateSpace(len(q_start_rad))
+        bounds = base.RealVectorBounds(len(q_start_rad))
+        for joint, (lower, upper) in enumerate(zip(scene.model.lower_rad, scene.model.upper_rad, strict=True)):
+            ends = lower, upper, q_start_rad[joint], q_goal_rad[joint]
+            bounds.setLow(joint, min(ends))
+            bounds.setHigh(joint, max(ends))
+        space.setBounds(bounds)
+        joints = range(len(q_start_rad))
+
+        def free(state: base.State) -> bool:
+            return scene.free(np.array([state[joint] for joint in joints]))
+
+        with _ONE_AT_A_TIME:
+            util.noOutputHandler()
+            util.RNG.setSeed(int(rng.integers(1, 2**31)))
+            setup = geometric.SimpleSetup(space)
+            setup.setStateValidityChecker(free)
+            setup.getSpaceInformation().setStateValidityCheckingResolution(EDGE_STEP_RAD / space.getMaximumExtent())
+            start, goal = space.allocState(), space.allocState()
+            for joint in joints:
+                start[joint], goal[joint] = q_start_rad[joint], q_goal_rad[joint]
+            setup.setStartAndGoalStates(start, goal)
+            planner = geometric.RRTConnect(setup.getSpaceInformation())
+            planner.setRange(self.step_rad)
+            setup.setPlanner(planner)
+            setup.solve(base.PlannerTerminationCondition(_after(self.iterations)))
+            if not setup.haveExactSolutionPath():
+                raise PlanningError("no free way was found for the arm")
+            setup.simplifySolution(base.PlannerTerminationCondition(_after(self.shortcuts)))
+            states = setup.getSolutionPath().getStates()
+            return np.array([q_start_rad, *([state[j] for j in joints] for state in states[1:-1]), q_goal_rad])
+
+
+def _after(count: int) -> Callable[[], bool]:
+    """A condition that holds once it was asked so often."""
+    left = itertools.count(count, -1)
+    return lambda: next(left) <= 0
 
 
 def _pairs(scene: ArmScene, q_rad: FloatArray) -> str:
@@ -125,43 +171,6 @@ def _pairs(scene: ArmScene, q_rad: FloatArray) -> str:
         tuple("what stands around" if name == "world" else name for name in pair) for pair in scene.contacts(q_rad)
     }
     return ", ".join(sorted(f"{a} with {b}" for a, b in names)) or "nothing"
-
-
-def _extend(
-    scene: ArmScene,
-    tree: tuple[list[FloatArray], list[int]],
-    q_target_rad: FloatArray,
-    step_rad: float,
-    *,
-    greedy: bool,
-) -> int | None:
-    """Grow a tree by one step, or as far as it goes, towards a target; the index of the last new node or None."""
-    nodes, parents = tree
-    nearest = int(np.argmin(np.linalg.norm(np.array(nodes) - q_target_rad, axis=1)))
-    added: int | None = None
-    while True:
-        offset = q_target_rad - nodes[nearest]
-        distance = float(np.linalg.norm(offset))
-        if distance < 1e-9:
-            return nearest
-        following = q_target_rad if distance <= step_rad else nodes[nearest] + offset * (step_rad / distance)
-        if not scene.edge_free(nodes[nearest], following):
-            return added
-        nodes.append(following)
-        parents.append(nearest)
-        nearest = added = len(nodes) - 1
-        if not greedy:
-            return added
-
-
-def _branch(tree: tuple[list[FloatArray], list[int]], index: int) -> list[FloatArray]:
-    """Nodes from `index` back to the root."""
-    nodes, parents = tree
-    branch = []
-    while index >= 0:
-        branch.append(nodes[index])
-        index = parents[index]
-    return branch
 
 
 def _resampled(path_rad: FloatArray, apart_rad: float) -> FloatArray:

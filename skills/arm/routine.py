@@ -6,13 +6,14 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
 from skills.api import Cause, Failed, InputsT, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import wrap
-from skills.robot import ArmTrajectory, CommandId, CommandState, FloatArray, Pose2D
+from skills.robot import ArmTrajectory, Clock, CommandId, CommandState, FloatArray, Pose2D
 
 ResultT = TypeVar("ResultT")
 OtherT = TypeVar("OtherT")
@@ -175,21 +176,30 @@ class RoutineSkill(Skill[InputsT]):
         job = self.context.worker.sense(read, lambda given: given, latency_s=latency_s, name=name)
         return (yield from self._awaited(job, message))
 
-    def follow(self, trajectory: ArmTrajectory, message: str) -> Routine[None]:
-        """Move the arm along a trajectory. Raises SkillFailure with cause EXECUTION when it does not get there."""
+    def follow(
+        self, trajectory: ArmTrajectory, message: str, guard: Callable[[FloatArray], bool] | None = None
+    ) -> Routine[bool]:
+        """Move the arm along a trajectory; whether `guard` stopped it before its end.
+
+        `guard` is asked at each tick with the joint angles that the arm should have then. Raises SkillFailure with
+        cause EXECUTION when the arm does not get there.
+        """
         context = self.context
         while True:
             begun_s = context.clock.now()
             until_s = begun_s + float(trajectory.times_s[-1]) + ARM_EXPIRY_MARGIN_S
             command = self.issue(context.robot.move_arm(trajectory, until_s=until_s, lease=context.lease))
-            stopped_s = yield from self.finish(command, message, "the arm")
-            if stopped_s is None:
-                return
+            guarded = None if guard is None else partial(_meets, guard, trajectory, context.clock, begun_s)
+            stopped_s = yield from self.finish(command, message, "the arm", guarded)
+            if stopped_s is None or (guard is not None and command not in self._interrupted):
+                return stopped_s is not None
             trajectory = rest_of(trajectory, stopped_s - begun_s, self._stance_now().arm_rad)
 
     def move_gripper(self, opening_rad: float, force_n: float, message: str) -> Routine[None]:
         """Move the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
         context = self.context
+        if opening_rad > context.robot.gripper().opening_rad:
+            context.payload.corners_H = context.payload.R_BH = None
         stopped_s: float | None = 0.0
         while stopped_s is not None:
             until_s = context.clock.now() + GRIPPER_EXPIRY_S
@@ -219,14 +229,20 @@ class RoutineSkill(Skill[InputsT]):
             raise SkillFailure(step.cause, step.message)
         return step
 
-    def finish(self, command: CommandId, message: str, what: str) -> Routine[float | None]:
+    def finish(
+        self, command: CommandId, message: str, what: str, enough: Callable[[], bool] | None = None
+    ) -> Routine[float | None]:
         """Wait until a command is done, and give None; or, when a pause stopped it, the time (s) of its last tick.
 
-        Raises SkillFailure with cause EXECUTION when it was stopped otherwise, or refused.
+        Once `enough` holds the command is stopped, and the time is given as well. Raises SkillFailure with cause
+        EXECUTION when it was stopped otherwise, or refused.
         """
         last_s = self.context.clock.now()
         while (status := self.context.robot.command_status(command)).state is CommandState.RUNNING:
             last_s = self.context.clock.now()
+            if enough is not None and enough():
+                self.context.robot.stop(lease=self.context.lease, only=command)
+                return last_s
             yield Running(message)
         if status.state is CommandState.DONE:
             return None
@@ -240,6 +256,12 @@ class RoutineSkill(Skill[InputsT]):
         end_s = self.context.clock.now() + duration_s
         while self.context.clock.now() < end_s:
             yield Running(message)
+
+
+def _meets(guard: Callable[[FloatArray], bool], trajectory: ArmTrajectory, clock: Clock, begun_s: float) -> bool:
+    """Whether a guard wants the arm stopped, given where a trajectory has it now."""
+    elapsed_s, times = clock.now() - begun_s, trajectory.times_s
+    return guard(np.array([np.interp(elapsed_s, times, joint) for joint in trajectory.positions_rad.T]))
 
 
 def rest_of(trajectory: ArmTrajectory, elapsed_s: float, q_rad: FloatArray) -> ArmTrajectory:

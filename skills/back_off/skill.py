@@ -11,14 +11,16 @@ import numpy as np
 
 from skills.api import Cause, Failed, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import compose, relative
+from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
+from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.navigate.scan_health import ScanHealth
 from skills.quantities import Delay, Length, Speed
-from skills.robot import Pose2D
+from skills.robot import BaseKind, Pose2D
 
 DIRECTIONS_RAD = tuple(math.radians(degrees) for degrees in (180, 150, -150, 90, -90, 30, -30, 0))
-"""Ways to go, in the body frame; backwards is tried first."""
+"""Ways to go, in the body frame; backwards is tried first. A base that cannot go sideways takes the first and the last.
+"""
 _STEP_M = 0.05
 
 
@@ -63,7 +65,8 @@ class BackOff(Skill[BackOffInputs]):
         self._base.stop()
         self._base = Base(self.context)
         self._inputs = inputs
-        self._footprint = Footprint.of(self.context.robot.capabilities())
+        self._footprint = ArmFootprint(self.context).now()
+        self._sideways = self._footprint.base_kind is not BaseKind.DIFFERENTIAL
         self._scans = ScanHealth(self.context)
         self._goal_O: Pose2D | None = None
         self._least_left_m, self._best_s = math.inf, self.context.clock.now()
@@ -91,7 +94,8 @@ class BackOff(Skill[BackOffInputs]):
 
     def _choose(self) -> Pose2D | None:
         """Where to go, in the body frame: the first direction that is clear all along, else the longest."""
-        lengths = [(self._free_m(direction), direction) for direction in DIRECTIONS_RAD]
+        directions = DIRECTIONS_RAD if self._sideways else (DIRECTIONS_RAD[0], DIRECTIONS_RAD[-1])
+        lengths = [(self._free_m(direction), direction) for direction in directions]
         longest = max(lengths, key=lambda each: each[0])
         length, direction = next((each for each in lengths if each[0] >= self._inputs.distance_m - 1e-6), longest)
         if length < self._inputs.least_m:
@@ -112,7 +116,7 @@ class BackOff(Skill[BackOffInputs]):
         """Drive on; stop before what the costmap shows."""
         now_s = self.context.clock.now()
         off = relative(self.context.robot.odometry().pose, goal_O)
-        left_m = math.hypot(off.x_m, off.y_m)
+        left_m = math.hypot(off.x_m, off.y_m) if self._sideways else abs(off.x_m)
         if left_m < self._least_left_m - 0.02:
             self._least_left_m, self._best_s = left_m, now_s
         if left_m < self.options.arrived_m:
@@ -121,7 +125,8 @@ class BackOff(Skill[BackOffInputs]):
         if now_s - self._best_s > 3.0:
             return Failed(Cause.EXECUTION, f"The robot does not get on; {left_m:.2f} m are left of backing off.")
         speed = min(self.options.speed_m_s, max(0.08, 1.5 * left_m))
-        self._base.drive((speed * off.x_m / left_m, speed * off.y_m / left_m, 0.5 * off.yaw_rad))
+        aside = speed * off.y_m / left_m if self._sideways else 0.0
+        self._base.drive((speed * off.x_m / left_m, aside, 0.5 * off.yaw_rad))
         return Running(f"backing off, {left_m:.2f} m to go")
 
     def _settling(self) -> Step:

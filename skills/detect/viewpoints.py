@@ -30,6 +30,8 @@ _SPLITS = 5
 _EDGE_M = 0.05
 _PLAIN_M = 2.0
 _BEFORE_M = 0.08
+_LOWEST_TOP_M = 0.06
+"""What is lower is the floor."""
 
 
 def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
@@ -85,7 +87,8 @@ def in_plain_view(image: Image, X_WO: RigidTransform, p_W: FloatArray) -> bool:
 
 def surface_boxes(surfaces: Iterable[Surface], X_WB: RigidTransform) -> list[Box]:
     """Surfaces as solid boxes from just above the floor to their tops, in the body frame."""
-    return [_standing_box(np.asarray(s.polygon_W, dtype=float), 0.05, s.height_m, X_WB) for s in surfaces]
+    standing = (s for s in surfaces if s.height_m > _LOWEST_TOP_M)
+    return [_standing_box(np.asarray(s.polygon_W, dtype=float), 0.05, s.height_m, X_WB) for s in standing]
 
 
 def cluster_box(cluster: Cluster, X_WB: RigidTransform, grow_m: float = 0.01) -> Box:

@@ -17,9 +17,12 @@ from pydrake.math import RigidTransform, RotationMatrix
 from skills.geometry import wrap
 from skills.robot import FloatArray, GripperCapabilities
 
-_ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M = 0.009, 0.006
-_LEAST_GRIP_M = 0.014
+_ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M = 0.004, 0.003
+_LEAST_GRIP_M = 0.008
+_BIN_M, _BREADTH_M = 0.01, 0.036
 _LEAST_BEYOND_M = 0.004
+_FROM_ABOVE_RAD = np.radians(50.0)
+_BELOW_PALM_M, _OVER_TOP_M, _TIPS_UP_M = 0.05, 0.01, 0.012
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,7 @@ def grasp_candidates(
 def _attitudes(target: Target) -> Sequence[tuple[float, float]]:
     """Tilts of the fingers below level and, for what is taken from above, leans about its long axis; rad."""
     if target.upright:
-        return [(float(np.radians(tilt)), 0.0) for tilt in (10.0, 0.0, 20.0, 32.0, 45.0)]
+        return [(float(np.radians(tilt)), 0.0) for tilt in (10.0, 0.0, 20.0, 32.0, 45.0, 60.0, 75.0, 90.0)]
     down = [(90.0, 0.0), (78.0, 0.0), (66.0, 0.0), (54.0, 0.0), (44.0, 0.0)]
     leaning = [(90.0, lean) for lean in (18.0, -18.0, 32.0, -32.0, 44.0, -44.0)]
     return [(float(np.radians(tilt)), float(np.radians(lean))) for tilt, lean in (*down, *leaning)]
@@ -113,9 +116,9 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
         along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
         offsets = target.points_B[:, :2] - np.array(target.centre_B)
         s, t = offsets @ along, offsets @ across
-        middle = float(np.mean(s))
+        middle = _balance(s, t)
         for shift in (0.0,) if square else (0.0, 0.03, -0.03, 0.06, -0.06, 0.09, -0.09):
-            local = np.abs(s - middle - shift) < 0.022
+            local = np.abs(s - middle - shift) < _BREADTH_M
             if np.count_nonzero(local) < 8:
                 continue
             low, high = np.percentile(t[local], [1, 99])
@@ -123,7 +126,20 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
             half_depth = 0.5 * (target.length_m if turn == 0.0 else target.width_m) if target.upright else 0.02
             for azimuth in (yaw, yaw + np.pi):
                 off = abs(wrap(azimuth - ahead_rad))
-                yield _Placement(xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 0.15 * off)
+                yield _Placement(
+                    xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 2.0 * (high - low) + 0.15 * off
+                )
+
+
+def _balance(s: FloatArray, t: FloatArray) -> float:
+    """Where along a long object (s along, t across, m) its centre of mass is, taken as a solid of revolution.
+
+    A hammer is heavy at its head: held by the far end of its handle it would turn in the gripper.
+    """
+    bins = np.round(s / _BIN_M).astype(int)
+    found = [(k * _BIN_M, np.ptp(np.percentile(t[bins == k], [2, 98]))) for k in np.unique(bins)]
+    places, widths = np.array(found).T
+    return float(np.average(places, weights=np.maximum(widths, 1e-3) ** 2))
 
 
 def _candidate(
@@ -137,8 +153,12 @@ def _candidate(
     tilt, lean = attitude
     ahead = np.array([np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad), 0.0])
     R_BH = RotationMatrix(AngleAxis(lean, ahead)) @ hand_rotation(tilt, placement.azimuth_rad, side)
-    if target.upright:
-        height = float(np.clip(0.56 * target.height_m, 0.05, 0.095))
+    if target.upright and tilt > _FROM_ABOVE_RAD:
+        below_top, depth = _top_grip(placement.half_depth_m, tilt, gripper)
+        height = max(target.height_m - below_top, (gripper.tip_x_m - depth) * np.sin(tilt) + _TIPS_UP_M)
+        cost = placement.cost + 0.4 * abs(tilt - np.radians(10.0))
+    elif target.upright:
+        height = max(float(np.clip(0.56 * target.height_m, 0.05, 0.095)), 0.45 * target.height_m)
         depth = gripper.palm_x_m + placement.half_depth_m + 0.008
         cost = placement.cost + 0.4 * abs(tilt - np.radians(10.0))
     else:
@@ -156,6 +176,12 @@ def _candidate(
     p_BT = np.array([*placement.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
     return GraspCandidate(X_BH, placement.width_m, float(cost), tilt)
+
+
+def _top_grip(half_depth_m: float, tilt_rad: float, gripper: GripperCapabilities) -> tuple[float, float]:
+    """How far below its top what stands is taken from above, and how far before the hand that is."""
+    ahead_m = _BELOW_PALM_M + half_depth_m * np.cos(tilt_rad)
+    return ahead_m * float(np.sin(tilt_rad)) - _OVER_TOP_M, gripper.palm_x_m + ahead_m
 
 
 def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationMatrix:

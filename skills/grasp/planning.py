@@ -16,21 +16,23 @@ from skills.quantities import Margin, TurnRate
 from skills.robot import ArmTrajectory, Capabilities, FloatArray, GripperCapabilities
 from skills.stack import ArmPlanner
 
-PREGRASPS_M = (0.12, 0.07)
+PREGRASPS_M = (0.12, 0.07, 0.045)
 """How far before the grasp the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0))
 """Ways to lift, up and back towards the shoulder, the best first."""
-_HIGH_SURFACE_M = 0.72
+_LOW_SURFACE_M, _HIGH_SURFACE_M = 0.2, 0.72
 _BELOW_LIMIT_M = 0.005
+_SLOW_POINTS = 3
 
 
 @dataclass(frozen=True)
 class GraspPlan:
-    """A grasp with the motions to its pre-grasp and from there to the grasp, and how to lift (frame B)."""
+    """A grasp with the motions to its pre-grasp and from there to the grasp, the last bit slowly; how to lift (B)."""
 
     candidate: GraspCandidate
     to_pregrasp: ArmTrajectory
     to_grasp: ArmTrajectory
+    last_bit: ArmTrajectory
     lift_B: FloatArray
 
 
@@ -48,13 +50,14 @@ class GeometricGraspPlanner:
     """Grasps from the object's outline, the first that the arm can reach, approach and lift.
 
     The hand keeps `padding_m` from all around on its way and `final_padding_m` on the straight approach, on which no
-    joint is faster than `approach_rad_s`. Beside the fixed finger `beside_fixed_m` are left, `beside_fixed_low_m` about
-    objects that lie low, since a finger that comes down on top of one is stopped by it.
+    joint is faster than `approach_rad_s`, on its last bit than `last_rad_s`. Beside the fixed finger `beside_fixed_m`
+    are left, `beside_fixed_low_m` about objects that lie low, since a finger that comes down on top of one is stopped.
     """
 
     padding_m: Margin = 0.01
-    final_padding_m: Margin = 0.003
+    final_padding_m: Margin = 0.002
     approach_rad_s: TurnRate = 0.4
+    last_rad_s: TurnRate = 0.15
     beside_fixed_m: Margin = 0.010
     beside_fixed_low_m: Margin = 0.017
 
@@ -82,8 +85,9 @@ class GeometricGraspPlanner:
             except PlanningError as error:
                 reasons.append(str(error))
                 continue
-            to_grasp = arm_planner.timed(approach, speed_rad_s=self.approach_rad_s)
-            return GraspPlan(candidate, arm_planner.timed(path, scene=scene), to_grasp, lift_B)
+            to_grasp = arm_planner.timed(approach[:-_SLOW_POINTS], speed_rad_s=self.approach_rad_s)
+            last_bit = arm_planner.timed(approach[-_SLOW_POINTS - 1 :], speed_rad_s=self.last_rad_s)
+            return GraspPlan(candidate, arm_planner.timed(path, scene=scene), to_grasp, last_bit, lift_B)
         last = f": {max(set(reasons), key=reasons.count)}" if reasons else ""
         raise PlanningError(f"none of {len(candidates)} grasps is within reach and free{last}")
 
@@ -143,6 +147,8 @@ def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray, arm_planner: Arm
 
 def body_height_m(base_m: float, capabilities: Capabilities) -> float:
     """Height of the body's origin over the floor to take an object that stands base_m over the floor."""
+    if base_m < _LOW_SURFACE_M:
+        return min(capabilities.standing_height_m, capabilities.height_range_m[0] + _BELOW_LIMIT_M)
     if base_m < _HIGH_SURFACE_M:
         return capabilities.standing_height_m
     return max(capabilities.standing_height_m, capabilities.height_range_m[1] - _BELOW_LIMIT_M)

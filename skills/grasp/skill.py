@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, LocalisationEstimate, ObjectObservation, Succeeded, Surface
+from skills.api import Cause, LocalisationEstimate, ObjectObservation, PlanningError, Succeeded, Surface
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
-from skills.arm.collision import ArmScene, Box
+from skills.arm.collision import ArmScene, Box, box_corners
 from skills.arm.poses import carry_configuration, close_viewpoints, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
@@ -27,7 +27,11 @@ from skills.robot import FloatArray, Image
 
 _LOOK_HALF_SIDE_M = 0.4
 _CLOSED_RAD = 0.06
+_PER_KG_N, _MOST_OF_FORCE = 12.0, 0.95
+_RELAX_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.014, 0.12, 0.8
 _SURFACE_AROUND_M = 0.2
+_ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
+_SURFACE_BAND_M, _KNOWN_ABOVE_M = 0.06, 0.34
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
 _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
@@ -77,7 +81,7 @@ class Grasp(ArmSkill[GraspInputs]):
     options: GraspOptions
     outputs: ClassVar[Mapping[str, type]] = {"tried": tuple[TriedGrasp, ...]}
     causes: ClassVar[Mapping[Cause, str]] = {
-        Cause.PRECONDITION: "the object is not where it was seen, the gripper is full, or there is no arm",
+        Cause.PRECONDITION: "the object is not where it was seen or too heavy, the gripper is full, or there is no arm",
         Cause.PLANNING: "no grasp is within reach and free",
         Cause.EXECUTION: "the arm or the gripper did not reach its goal",
         Cause.POSTCONDITION: "the gripper closed on nothing, or the object slipped out",
@@ -104,12 +108,12 @@ class Grasp(ArmSkill[GraspInputs]):
             view = yield from self._look_closely(seen)
             plan = yield from self._plan(view, str(thing), inputs.avoid)
             self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
-            yield from self._take(plan, str(thing))
+            yield from self._take(view, plan, str(thing))
         except SkillFailure as failure:
-            yield from self._let_go()
+            yield from self._let_go(draw_back=len(self._tried) > len(inputs.avoid))
             raise self._telling(failure) from failure
         try:
-            yield from self._carry(view, plan.candidate, str(thing))
+            yield from self._carry(plan.candidate, str(thing))
         except SkillFailure as failure:
             raise self._telling(failure) from failure
         yield from self.stand_at(capabilities.standing_height_m, f"carrying the {thing}")
@@ -162,16 +166,40 @@ class Grasp(ArmSkill[GraspInputs]):
                 return
 
     def _look_closely(self, seen: ObjectObservation) -> Routine[CloseView]:
-        """A view of the object from 0.4 m; the plane and what stands around come with it."""
-        message = f"looking closely at the {seen.thing}"
+        """A view of the object from 0.4 m, from aside where something hides a part of it; what is around comes with it.
+
+        Raises SkillFailure with cause PRECONDITION when it is not seen.
+        """
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
+        best: CloseView | None = None
+        for aside_rad in _ASIDE_RAD:
+            self.boxes = surface_boxes([_square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
+            self.known_W = _about(seen.position_W, base_m, _SURFACE_AROUND_M)
+            try:
+                view = yield from self._look_from(seen, base_m, aside_rad)
+            except SkillFailure as failure:
+                if best is None or failure.cause is not Cause.PLANNING:
+                    raise
+                continue
+            if view is not None and (best is None or view.target.length_m > best.target.length_m):
+                best = view
+            if best is not None and (best.target.upright or best.target.length_m > _MOST_OF_IT * seen.size_m[0]):
+                break
+        if best is None:
+            raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} is no longer where it was seen")
+        self.known_W = _about(seen.position_W, base_m, _LOOK_HALF_SIDE_M)
+        return best
+
+    def _look_from(self, seen: ObjectObservation, base_m: float, aside_rad: float) -> Routine[CloseView | None]:
+        """What a picture from near shows of the object, the camera turned about it; None when it is not there."""
+        message = f"looking closely at the {seen.thing}"
         surface = _square(seen.position_W, base_m, seen.surface or "surface")
-        self.boxes = surface_boxes([_square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
         X_HC = self.hand_camera.X_FC
         p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            viewpoints = [*close_viewpoints(self.model.p_BS, p_BT), *overview_viewpoints(self.model, p_BT)]
+            near = close_viewpoints(self.model.p_BS, p_BT, aside_rad)
+            viewpoints = [*near, *overview_viewpoints(self.model, p_BT, aside_rad)]
             return look_configuration(scene, X_HC, viewpoints, p_BT, q)
 
         yield from self.move_to(goal, message)
@@ -185,10 +213,7 @@ class Grasp(ArmSkill[GraspInputs]):
             placed = detections_3d(image, place, same_class, [surface])
             return _examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
 
-        view = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message)
-        if view is None:
-            raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} is no longer where it was seen")
-        return view
+        return (yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message))
 
     def _plan(self, view: CloseView, thing: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         self.boxes = view.boxes
@@ -200,28 +225,72 @@ class Grasp(ArmSkill[GraspInputs]):
         opening = 0.9 * self.open_rad
         yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
 
-        scene_now, q, stack = self.scene_now(), self.q_rad(), self.context.stack
+        scene_now, q, stack, seen = self.scene_now(), self.q_rad(), self.context.stack, self.seen_boxes()
 
         def plan() -> GraspPlan:
             scene = scene_now()
             scene.set_opening(opening)
-            around = Surroundings(view.boxes, view.target_box, up_B)
+            around = Surroundings((*view.boxes, *seen), view.target_box, up_B)
             return stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng)
 
         return (
             yield from self.compute(plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}")
         )
 
-    def _take(self, plan: GraspPlan, thing: str) -> Routine[None]:
-        """Reach, close, lift; raises SkillFailure with cause POSTCONDITION when it is not held then."""
+    def _take(self, view: CloseView, plan: GraspPlan, thing: str) -> Routine[None]:
+        """Reach, close, lift, weigh.
+
+        Raises SkillFailure with cause POSTCONDITION when it is not held then, PRECONDITION when it is too heavy.
+        """
         yield from self.follow(plan.to_pregrasp, f"reaching for the {thing}")
         yield from self.follow(plan.to_grasp, f"reaching for the {thing}")
+        ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
+        touched = yield from self.follow(plan.last_bit, f"reaching for the {thing}", self.held_up(ahead))
+        yield from self._to_the_ground(ahead, touched, f"reaching for the {thing}")
+        X_BH = self.model.X_BH(self.q_rad())
         yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
+        self.held = [_held_box(X_BH.inverse(), view.target_box)]
+        self.context.payload.corners_H = box_corners(self.held[0])
+        self.context.payload.R_BH = X_BH.rotation()
         yield from self._lift(plan.lift_B, f"lifting the {thing}")
-        yield from self.pause(0.3, f"lifting the {thing}")
+        p_HO = self.held[0].X_FG.translation()
+        mass_kg = yield from self.weigh(p_HO, f"lifting the {thing}")
         self._check_held(thing, opening)
+        yield from self._refuse_heavy(mass_kg, plan.lift_B, thing)
+        firmly_n = min(self.options.force_n + _PER_KG_N * max(mass_kg, 0.0), _MOST_OF_FORCE * self.gripper.max_force_n)
+        yield from self.move_gripper(0.0, firmly_n, f"lifting the {thing}")
+
+    def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, thing: str) -> Routine[None]:
+        """Set down again what weighs more than the arm may carry, and raise SkillFailure with cause PRECONDITION."""
+        arm = self.context.robot.capabilities().arm
+        if arm is None or mass_kg <= arm.max_payload_kg:
+            return
+        planner, X_BH = self.context.stack.arm_planner, self.model.X_BH(self.q_rad())
+        lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - lift_B)
+        try:
+            down = planner.timed(planner.line(self.model, self.q_rad(), lowered), speed_rad_s=_FEEL_RAD_S)
+            yield from self.follow(down, f"setting the {thing} down again", self.held_up(-self._up_B()))
+        except PlanningError:
+            pass
+        most = f"the arm carries {arm.max_payload_kg:.1f} kg at most"
+        raise SkillFailure(Cause.PRECONDITION, f"the {thing} weighs {mass_kg:.1f} kg, and {most}")
+
+    def _to_the_ground(self, ahead_B: FloatArray, touched: bool, message: str) -> Routine[None]:
+        """Fingers that point down go on until they touch the surface, whose height is known to a few mm only."""
+        X_BH, planner = self.model.X_BH(self.q_rad()), self.context.stack.arm_planner
+        if not touched and ahead_B @ self._up_B() < -_DOWN:
+            deeper = RigidTransform(X_BH.rotation(), X_BH.translation() + _FEEL_M * ahead_B)
+            try:
+                path = planner.line(self.model, self.q_rad(), deeper)
+            except PlanningError:
+                return
+            touched = yield from self.follow(
+                planner.timed(path, speed_rad_s=_FEEL_RAD_S), message, self.held_up(ahead_B)
+            )
+        if touched:
+            yield from self.try_shift_hand(-_RELAX_M * ahead_B, message)
 
     def _lift(self, planned_B: FloatArray, message: str) -> Routine[None]:
         """Lift as planned or, where the hand came to stand otherwise, in another way. Raises SkillFailure."""
@@ -239,11 +308,9 @@ class Grasp(ArmSkill[GraspInputs]):
             raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the gripper while it was lifted")
         return gripper.opening_rad
 
-    def _carry(self, view: CloseView, grasp: GraspCandidate, thing: str) -> Routine[None]:
+    def _carry(self, grasp: GraspCandidate, thing: str) -> Routine[None]:
         """Draw back from the surface, hold the object near the body, and check once more."""
         opening = self._check_held(thing, None)
-        X_HB = grasp.X_BH.inverse()
-        self.held = [_held_box(X_HB, view.target_box)]
         message = f"carrying the {thing}"
         ahead = grasp.X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
         yield from self.try_shift_hand(-self.options.pull_back_m * ahead + 0.02 * self._up_B(), message)
@@ -252,9 +319,10 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.pause(0.2, message)
         self._check_held(thing, opening)
 
-    def _let_go(self) -> Routine[None]:
-        """On failure: open the gripper, draw back, stow; what does not work is left out."""
-        for recovery in (self._open, self._draw_back, self.try_stow, self._stand_down):
+    def _let_go(self, draw_back: bool = True) -> Routine[None]:
+        """On failure: open the gripper, draw back from the object, stow; what does not work is left out."""
+        at_object = (self._open, self._draw_back) if draw_back else ()
+        for recovery in (*at_object, self.try_stow, self._stand_down):
             try:
                 yield from recovery()
             except SkillFailure:
@@ -276,6 +344,13 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _up_B(self) -> FloatArray:
         return np.asarray(self.X_WB().rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
+
+
+def _about(position_W: tuple[float, float, float], base_m: float, half_m: float) -> tuple[FloatArray, FloatArray]:
+    """The corners of the space on a surface about an object."""
+    x, y, _ = position_W
+    low = np.array([x - half_m, y - half_m, base_m - _SURFACE_BAND_M])
+    return low, np.array([x + half_m, y + half_m, base_m + _KNOWN_ABOVE_M])
 
 
 def _square(
@@ -358,9 +433,6 @@ def _target(cluster: Cluster, X_WB: RigidTransform) -> Target:
 
 def _held_box(X_HB: RigidTransform, box: Box) -> Box:
     """A box in B as the upright box about it in H, for the object once it is held."""
-    half = 0.5 * np.array(box.size_m)
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
-    X_HG = X_HB @ box.X_FG
-    corners = signs * half @ X_HG.rotation().matrix().T + X_HG.translation()
+    corners = box_corners(Box(X_HB @ box.X_FG, box.size_m))
     low, high = corners.min(axis=0), corners.max(axis=0)
     return Box(RigidTransform(0.5 * (low + high)), tuple(float(v) for v in np.maximum(high - low - 0.02, 0.01)))  # type: ignore[arg-type]

@@ -17,7 +17,8 @@ from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
-from skills.navigate.footprint import Footprint, footprint_clear
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.footprint import footprint_clear
 from skills.navigate.skill import NavigateInputs
 from skills.perception.people import SeenPerson, people_in_scan
 from skills.quantities import Height, Length
@@ -99,7 +100,7 @@ class HandOver(ArmSkill[HandOverInputs]):
     def _go_before(self, person: SeenPerson, name: str) -> Routine[None]:
         """Drive to the nearest free pose that faces the person."""
         poses = facing_poses(person.place_W, self.context.pose(), self.options.stand_off_m)
-        footprint = Footprint.of(self.context.robot.capabilities())
+        footprint = ArmFootprint(self.context).now()
         free = [pose for pose in poses if footprint_clear(self.context.costmap, footprint, pose)]
         if not free:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand before {name}")

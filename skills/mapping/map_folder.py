@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,12 +17,18 @@ from skills.mapping.keyframe import Keyframe
 from skills.mapping.mapper import Mapper, MapperOptions, Submap
 from skills.mapping.occupancy import BANDS_M, LayeredOccupancy
 from skills.mapping.pose_graph import Edge, PoseGraph
+from skills.navigate.footprint import pose_array
 from skills.robot import Pose2D
 
 RESOLUTION_M: Final = 0.025
+LAYER_M: Final = 0.025
+"""Sizes of the grid's cells, across and up."""
 GRAPH_FILE: Final = "pose_graph.json"
 KEYFRAMES_FILE: Final = "keyframes.npz"
 _FORM: Final = 1
+_FREE, _OCCUPIED = 0.45, 0.65
+_SLIM_M: Final = 0.2
+"""Less than half the body's width."""
 
 
 class MapFolderError(ValueError):
@@ -38,11 +45,17 @@ class Surveyed:
 
 
 def surveyed(mapper: Mapper, resolution_m: float = RESOLUTION_M) -> Surveyed:
-    """Both grids of all keyframes at their optimised poses, cut to what was observed."""
-    grid = LayeredOccupancy(resolution_m)
+    """Both grids of all keyframes at their optimised poses, cut to what was observed.
+
+    Keep-out ground that the body cannot reach counts as unknown.
+    """
+    grid = LayeredOccupancy(resolution_m, layer_m=LAYER_M)
     for index, (frame, pose) in enumerate(zip(mapper.keyframes, mapper.graph.poses, strict=True)):
         grid.insert(frame, pose, stride=2, first=index % 2)
     bands = {band: grid.probability(band) for band in BANDS_M}
+    probability, observed = bands["keepout"]
+    hollow = _hollow(observed & (probability < _FREE), grid.origin_m, resolution_m, mapper.graph.poses)
+    bands["keepout"] = np.where(hollow, np.float32(0.5), probability), observed & ~hollow
     seen = np.any([observed for _, observed in bands.values()], axis=0)
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     cut = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
@@ -56,6 +69,18 @@ def surveyed(mapper: Mapper, resolution_m: float = RESOLUTION_M) -> Surveyed:
     )
 
 
+def _hollow(
+    free: NDArray[np.bool_], origin_m: tuple[float, float], resolution_m: float, poses: Sequence[Pose2D]
+) -> NDArray[np.bool_]:
+    """The free cells that no body reaches from where the robot was: under tables, between specks of furniture."""
+    room = cv2.distanceTransform(free.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * resolution_m > _SLIM_M
+    _, parts = cv2.connectedComponents(room.astype(np.uint8))
+    columns, rows = ((pose_array(poses)[:, :2] - origin_m) / resolution_m).astype(int).T
+    reached = np.isin(parts, np.setdiff1d(parts[rows, columns], [0]))
+    away = cv2.distanceTransform((~reached).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * resolution_m
+    return np.asarray(free & (away > _SLIM_M + resolution_m))
+
+
 def save_grids(folder: Path, grids: Surveyed, resolution_m: float = RESOLUTION_M) -> Path:
     """Write `scan` and `keepout` as PGM and YAML; the path of the scan map's YAML. Raises OSError."""
     for band, probability in grids.probabilities.items():
@@ -66,7 +91,7 @@ def save_grids(folder: Path, grids: Surveyed, resolution_m: float = RESOLUTION_M
         text = (
             f"image: {band}.pgm\nmode: trinary\nresolution: {resolution_m}\n"
             f"origin: [{grids.origin_m[0]:.4f}, {grids.origin_m[1]:.4f}, 0.0]\nnegate: 0\n"
-            f"occupied_thresh: 0.65\nfree_thresh: 0.45\nheight_band_m: [{low}, {high}]\n"
+            f"occupied_thresh: {_OCCUPIED}\nfree_thresh: {_FREE}\nheight_band_m: [{low}, {high}]\n"
         )
         _write(folder / f"{band}.yaml", text.encode())
     return folder / "scan.yaml"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,25 +18,29 @@ from skills.mapping.keyframe import Keyframe
 from skills.robot import FloatArray, Pose2D
 
 LOWEST_M: Final = 0.05
-LAYER_M: Final = 0.05
-LAYERS: Final = 25
+HIGHEST_M: Final = 1.3
 BANDS_M: Final = {"scan": (0.7, 1.3), "keepout": (0.05, 1.0)}
 """The heights that each map speaks of."""
 UNIT: Final = 0.2
 """Log-odds of one step of a cell's value."""
 _HIT, _MISS, _MOST = 4, -2, 120
 _OCCUPIED = 4
+_SURE = 8
+_FRINGE_M: Final = 0.075
 _BLOCK_M: Final = 8.0
 Values = NDArray[np.int8]
 
 
 class LayeredOccupancy:
-    """A grid that grows with what is inserted. `values` is (layers, rows, columns) of log-odds in steps of UNIT."""
+    """A grid that grows with what is inserted. `values` is (layers, rows, columns) of log-odds in steps of UNIT.
 
-    def __init__(self, resolution_m: float, max_range_m: float = 8.0) -> None:
-        self.resolution_m, self._max_range_m = resolution_m, max_range_m
+    A table top fills no layer that is higher than it is thick: beams pass below it in the same layer.
+    """
+
+    def __init__(self, resolution_m: float, max_range_m: float = 8.0, *, layer_m: float = 0.05) -> None:
+        self.resolution_m, self._max_range_m, self._layer_m = resolution_m, max_range_m, layer_m
         self.origin_m = (0.0, 0.0)
-        self.values: Values = np.zeros((LAYERS, 0, 0), dtype=np.int8)
+        self.values: Values = np.zeros((round((HIGHEST_M - LOWEST_M) / layer_m), 0, 0), dtype=np.int8)
 
     def insert(self, frame: Keyframe, X_WF: Pose2D, *, stride: int = 1, first: int = 0) -> None:
         """Trace the beams of every `stride`-th column, from the `first` on, of a keyframe that was taken at a pose."""
@@ -43,7 +48,7 @@ class LayeredOccupancy:
         c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         sensor = turn @ frame.translation + np.array([X_WF.x_m, X_WF.y_m, 0.0])
-        place = (self.origin_m[0], self.origin_m[1], self.resolution_m, self._max_range_m)
+        place = (self.origin_m[0], self.origin_m[1], self.resolution_m, self._max_range_m, self._layer_m)
         _trace(
             self.values,
             place,
@@ -56,9 +61,9 @@ class LayeredOccupancy:
 
     def probability(self, band: str) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         """The probability that a cell is occupied anywhere in a band's heights, and whether it was observed at all."""
-        layers = self.values[_layers(BANDS_M[band])]
+        layers = self.values[self._layers(BANDS_M[band])]
         observed = (layers != 0).any(axis=0)
-        odds = _greatest(layers).astype(np.float32) * np.float32(UNIT)
+        odds = self._greatest(layers).astype(np.float32) * np.float32(UNIT)
         probability = 1.0 / (1.0 + np.exp(-odds))
         return np.where(observed, probability, 0.5).astype(np.float32), observed
 
@@ -68,10 +73,26 @@ class LayeredOccupancy:
         Occupied cells count as observed below.
         """
         values = self.values[:, window[0], window[1]]
-        layers = values[_layers(BANDS_M["keepout"])]
-        occupied = _greatest(layers) >= _OCCUPIED
-        low = (values[_layers((LOWEST_M, low_m))] != 0).any(axis=0)
+        layers = values[self._layers(BANDS_M["keepout"])]
+        occupied = self._greatest(layers) >= _OCCUPIED
+        low = (values[self._layers((LOWEST_M, low_m))] != 0).any(axis=0)
         return occupied, (layers != 0).any(axis=0), low | occupied
+
+    def _layers(self, band_m: tuple[float, float]) -> slice:
+        """The layers that lie in a band of heights by more than half."""
+        first, last = ((height - LOWEST_M) / self._layer_m for height in band_m)
+        return slice(math.floor(first + 0.5), math.ceil(last - 0.5))
+
+    def _greatest(self, layers: Values) -> Values:
+        """The greatest value of the layers that were observed; -128 where none was.
+
+        What is hardly occupied beside what surely is, is the noise of its ranges, and counts as free.
+        """
+        greatest = np.where(layers == 0, np.int8(-128), layers).max(axis=0)
+        sure = (greatest >= _SURE).astype(np.uint8)
+        reach = 2 * math.floor(_FRINGE_M / self.resolution_m + 1e-6) + 1
+        beside = cv2.dilate(sure, np.ones((reach, reach), np.uint8)) > sure
+        return np.asarray(np.where(beside, np.minimum(greatest, np.int8(_MISS)), greatest), dtype=np.int8)
 
     def _reach(self, X_WF: Pose2D) -> None:
         """Grow so that all within the range of a pose lies on the grid."""
@@ -100,21 +121,10 @@ class LayeredOccupancy:
             self.origin_m = (low[0], low[1])
 
 
-def _layers(band_m: tuple[float, float]) -> slice:
-    """The layers that lie in a band of heights by more than half."""
-    low, high = band_m
-    return slice(math.floor((low - LOWEST_M) / LAYER_M + 0.5), math.ceil((high - LOWEST_M) / LAYER_M - 0.5))
-
-
-def _greatest(layers: Values) -> Values:
-    """The greatest value of the layers that were observed; -128 where none was."""
-    return np.asarray(np.where(layers == 0, np.int8(-128), layers).max(axis=0), dtype=np.int8)
-
-
 @compiled
 def _trace(
     values: Values,
-    place: tuple[float, float, float, float],
+    place: tuple[float, float, float, float, float],
     ranges: NDArray[np.float32],
     elevations: FloatArray,
     azimuths: FloatArray,
@@ -140,8 +150,8 @@ def _trace(
             steps = math.floor(end * flat / place[2])
             before_row, before_column, before_layer = -1, -1, -1
             u, v = (sensor[0] - place[0]) / place[2], (sensor[1] - place[1]) / place[2]
-            w, du, dv = (sensor[2] - LOWEST_M) / LAYER_M, dx / flat, dy / flat
-            dw = dz / flat * place[2] / LAYER_M
+            w, du, dv = (sensor[2] - LOWEST_M) / place[4], dx / flat, dy / flat
+            dw = dz / flat * place[2] / place[4]
             for n in range(steps):
                 height = w + (n + 0.5) * dw
                 if height < 0.0 or height >= layers:
@@ -153,7 +163,7 @@ def _trace(
                     continue
                 before_row, before_column, before_layer = row, column, layer
                 values[layer, row, column] = max(values[layer, row, column] + _MISS, -_MOST)
-            layer = math.floor((sensor[2] + r * dz - LOWEST_M) / LAYER_M)
+            layer = math.floor((sensor[2] + r * dz - LOWEST_M) / place[4])
             if end == r and 0 <= layer < layers:
                 old = values[layer, last_row, last_column]
                 values[layer, last_row, last_column] = min(old + _HIT, _MOST)

@@ -6,12 +6,13 @@ import enum
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import cv2
 import numpy as np
 
 from skills.api import PlanningError
-from skills.estimate.costmap import LayeredCostmap
+from skills.estimate.costmap import CostmapOptions, LayeredCostmap
 from skills.estimate.grid_map import BoolGrid, GridMap
 from skills.geometry import relative
 from skills.mapping.frontiers import Frontier, Ground
@@ -34,14 +35,15 @@ class SurveyOptions:
     """Metres, m/s and seconds of the robot's clock.
 
     Ground counts as explored within `explored_m`. The robot goes back to a known place when the standard deviation of
-    its own place passes `unsure_m`, once `back_after_m` were driven since the last loop.
+    its own place passes `unsure_m`, once `back_after_m` were driven since the last loop. Before a loop is closed, a
+    known wall may be seen beside its place: that is nothing in the way.
     """
 
     resolution_m: float = 0.05
     explored_m: float = 5.0
     max_speed_m_s: float = 0.7
     margin_m: float = 0.05
-    clear_m: float = 0.33
+    clear_m: float = 0.3
     frontier_m: float = 0.5
     frontier_within_m: float = 1.5
     tried_m: float = 0.6
@@ -57,7 +59,8 @@ class SurveyOptions:
     stuck_s: float = 3.0
     blind_stop_s: float = 1.0
     blind_patience_s: float = 10.0
-    planner: LatticePlanner = field(default_factory=LatticePlanner)
+    costmap: CostmapOptions = field(default_factory=partial(CostmapOptions, explained_m=0.3))
+    planner: LatticePlanner = field(default_factory=partial(LatticePlanner, least_margin_m=0.02))
     controller: FollowerOptions = field(default_factory=FollowerOptions)
 
 
@@ -179,7 +182,7 @@ class Survey:
             self._grid.insert(mapper.keyframes[index], mapper.graph.poses[index], stride=2)
             self._inserted.append(mapper.graph.poses[index])
         self._refreshed = mapper.way_m, now_s
-        self._costmap = LayeredCostmap(self.known(options.around_m)[0])
+        self._costmap = LayeredCostmap(self.known(options.around_m)[0], options.costmap)
 
     def _moved(self) -> bool:
         """Whether keyframes have been corrected by more than the grid for driving stands."""
@@ -250,10 +253,15 @@ class Survey:
                 return
             self._refused.append(goal.about)
         home = _Goal(Purpose.HOME, self._home, (self._home.x_m, self._home.y_m))
-        if not self._at(home.pose) and self._begin(home, now_s):
-            return
+        if not self._at(home.pose):
+            if self._begin(home, now_s):
+                return
+            self._lost_way()
         self.stop()
         self.done = True
+
+    def _lost_way(self) -> None:
+        self.trouble = "there is no way on, nor back to the start, that the robot fits through"
 
     def _next_goal(self, ground: Ground) -> _Goal | None:
         return self._frontier_goal(ground) if self._route is None else self._route_goal(ground)
@@ -400,6 +408,7 @@ class Survey:
         self._tried.append(goal.about)
         self._refused.append(goal.about)
         if goal.purpose is Purpose.HOME:
+            self._lost_way()
             self.done = True
         self._goal = None
 

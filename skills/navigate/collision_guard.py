@@ -52,7 +52,7 @@ class CollisionGuard:
     """Tells from tick to tick whether the robot must stand, and because of what. Idle without unexplained returns."""
 
     def __init__(self, context: SkillContext, footprint: Footprint, options: GuardOptions | None = None) -> None:
-        self._context, self._footprint = context, footprint
+        self._context, self.footprint = context, footprint
         self._options = options or GuardOptions()
         self._watch = MovingWatch(self._options.moving)
         self._danger_s, self._place_W = -math.inf, (0.0, 0.0)
@@ -98,8 +98,8 @@ class CollisionGuard:
         for one in (one for one in moving if not self._follows(one, here, on_path)):
             places_W = one.places_W(times, now_s)
             for poses in (on_path, coasting):
-                centres = disc_centres(self._footprint, poses)
-                apart_m = np.linalg.norm(centres - places_W[:, None], axis=2) - self._footprint.discs[:, 2]
+                centres = disc_centres(self.footprint, poses)
+                apart_m = np.linalg.norm(centres - places_W[:, None], axis=2) - self.footprint.discs[:, 2]
                 if float(apart_m.min()) < options.margin_m + one.radius_m:
                     return one.place_W
         return None
@@ -110,7 +110,7 @@ class CollisionGuard:
         if float(np.linalg.norm(way)) < 0.05:
             return False
         towards = way / np.linalg.norm(way)
-        behind = float((np.array(one.place_W) - (here.x_m, here.y_m)) @ towards) < -0.5 * self._footprint.width_m
+        behind = float((np.array(one.place_W) - (here.x_m, here.y_m)) @ towards) < -0.5 * self.footprint.width_m
         aligned = float(np.array(one.velocity_W) @ towards) > math.cos(self._options.follows_rad) * math.hypot(
             *one.velocity_W
         )
@@ -128,9 +128,9 @@ class CollisionGuard:
 
     def _apart_m(self, poses: FloatArray, points_W: FloatArray) -> FloatArray:
         """Distances (N, points) from the outline at poses to points."""
-        centres = disc_centres(self._footprint, poses)
+        centres = disc_centres(self.footprint, poses)
         offsets = np.linalg.norm(centres[:, :, None] - points_W[None, None], axis=3)
-        return np.asarray(np.min(offsets - self._footprint.discs[None, :, 2:3], axis=1))
+        return np.asarray(np.min(offsets - self.footprint.discs[None, :, 2:3], axis=1))
 
     def _velocity_W(self, here: Pose2D) -> FloatArray:
         """The body's velocity (vx, vy, wz) in the world's axes."""

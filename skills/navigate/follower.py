@@ -1,4 +1,8 @@
-"""Following of a path by a base that moves and turns in any direction, with brakes for what comes into the way."""
+"""Following of a path, with brakes for what comes into the way.
+
+A base that cannot go sideways follows by the law of Kanayama, Kimura, Miyazaki and Noguchi, "A Stable Tracking Control
+Method for an Autonomous Mobile Robot", 1990, and turns on the spot where its path does.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,18 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skills.api import Costmap
 from skills.geometry import wrap
 from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m
 from skills.navigate.path import TURN_M_PER_RAD, Path
 from skills.quantities import Acceleration, Delay, Duration, Factor, Length, Margin, Speed, TurnAcceleration, TurnRate
-from skills.robot import FloatArray, Pose2D
+from skills.robot import BaseKind, FloatArray, Pose2D
+
+_CORNER_M_S = 0.12
+_ACROSS_GAIN = 4.0
+_FACING_RAD = 0.5
 
 
 @dataclass(frozen=True)
@@ -68,7 +77,9 @@ class PathFollower:
         self._path = path
         self._footprint = footprint
         self._progress = path.progress_m()
-        self._limits = speed_limits(path, self._progress, self._options)
+        self._sideways = footprint.base_kind is not BaseKind.DIFFERENTIAL
+        corners = np.empty(0, dtype=np.int64) if self._sideways else corners_of(path)
+        self._limits = speed_limits(path, self._progress, self._options, corners)
         self._index = 0
 
     @property
@@ -125,9 +136,11 @@ class PathFollower:
         forward = (after - target) / lead * speed
         error = target - here
         error[2] = wrap(error[2])
-        world = forward + options.gain * error
         if self.length_m - along < 0.02:
-            world = options.gain * error
+            forward = np.zeros(3)
+        if not self._sideways:
+            return tracking_velocity(here, float(target[2]), forward, error, options.gain)
+        world = forward + options.gain * error
         midway = here[2] + 0.5 * world[2] * options.period_s
         c, s = math.cos(midway), math.sin(midway)
         return np.array([c * world[0] + s * world[1], -s * world[0] + c * world[1], world[2]])
@@ -201,8 +214,42 @@ def speed_by_clearance(clearance_m: FloatArray | float, options: FollowerOptions
     return np.asarray(slow + share * (options.max_speed_m_s - slow))
 
 
-def speed_limits(path: Path, progress_m: FloatArray, options: FollowerOptions) -> FloatArray:
-    """Speed along the path (m/s of progress) at each pose: by direction, by clearance, and in time for what comes."""
+def tracking_velocity(
+    here: FloatArray, yaw_rad: float, forward: FloatArray, error: FloatArray, gain: float
+) -> FloatArray:
+    """Body-frame velocity of a base that cannot go sideways.
+
+    The path's pose there heads to yaw_rad and moves at `forward` (vx, vy, wz) in the world; `error` is from `here` to
+    it. Far off that heading the base turns on the spot.
+    """
+    c, s = math.cos(here[2]), math.sin(here[2])
+    ahead, left, turn = c * error[0] + s * error[1], -s * error[0] + c * error[1], float(error[2])
+    speed = math.cos(yaw_rad) * forward[0] + math.sin(yaw_rad) * forward[1]
+    if abs(turn) > _FACING_RAD:
+        return np.array([0.0, 0.0, forward[2] + gain * turn])
+    rate = forward[2] + _ACROSS_GAIN * speed * left + max(gain, 4.0 * abs(speed)) * math.sin(turn)
+    return np.array([speed * math.cos(turn) + gain * ahead, 0.0, rate])
+
+
+def corners_of(path: Path) -> NDArray[np.int64]:
+    """Where the path goes over from moving to turning on the spot or back, or from ahead to back: indices of poses."""
+    steps = np.diff(path.poses, axis=0)
+    yaw = path.poses[:-1, 2]
+    ahead = np.cos(yaw) * steps[:, 0] + np.sin(yaw) * steps[:, 1]
+    kinds = np.where(np.hypot(steps[:, 0], steps[:, 1]) < 1e-6, 0.0, np.sign(ahead))
+    return np.flatnonzero(np.diff(kinds) != 0.0) + 1
+
+
+def speed_limits(
+    path: Path,
+    progress_m: FloatArray,
+    options: FollowerOptions,
+    corners: NDArray[np.int64] | None = None,
+) -> FloatArray:
+    """Speed along the path (m/s of progress) at each pose: by direction, by clearance, and in time for what comes.
+
+    At `corners` (indices) the base all but stands.
+    """
     steps = np.diff(path.poses, axis=0)
     ways = np.maximum(np.diff(progress_m), 1e-9)
     yaw = path.poses[:-1, 2]
@@ -216,6 +263,8 @@ def speed_limits(path: Path, progress_m: FloatArray, options: FollowerOptions) -
     shift = np.maximum(np.hypot(ahead, aside), 1e-6)
     limits = np.minimum.reduce([lengthwise, sideways, turning, by_clearance / shift])
     limits = np.append(limits, options.creep_m_s)
+    if corners is not None:
+        limits[corners] = np.minimum(limits[corners], _CORNER_M_S)
     for n in range(len(limits) - 2, -1, -1):
         limits[n] = min(limits[n], math.sqrt(limits[n + 1] ** 2 + 2.0 * options.braking_m_s2 * ways[n]))
     return np.asarray(limits)

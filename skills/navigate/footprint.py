@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import Costmap
-from skills.estimate.compiled import bilinear, compiled
-from skills.robot import Capabilities, FloatArray, Pose2D
+from skills.estimate.compiled import compiled
+from skills.robot import BaseKind, Capabilities, FloatArray, Pose2D
 
 SAFE_MARGIN_M = 0.06
 """The clearance (m) that a standing or driven pose should keep: map and tracking errors fit into it."""
@@ -19,20 +19,36 @@ SAFE_MARGIN_M = 0.06
 
 @dataclass(frozen=True)
 class Footprint:
-    """An upright rectangle in the body frame, as discs: rows of x, y, radius (m).
+    """An upright rectangle in the body frame, as discs: rows of x, y, radius (m), and how the base under it moves.
 
     The discs lie inside of the outline, radius 0 at the corners, so the clearance of all of them is that of the
-    rectangle, within about a centimetre.
+    rectangle, within about a centimetre. More discs cover what sticks out of the rectangle, which `beyond` names.
     """
 
     discs: FloatArray
     length_m: float
     width_m: float
+    base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL
+    beyond: str = ""
 
     @staticmethod
     def of(capabilities: Capabilities) -> Footprint:
-        """The footprint that a robot says it has."""
-        return Footprint.rectangle(capabilities.footprint_m)
+        """The footprint that a robot says it has, the arm left out (see `skills.navigate.arm_footprint`)."""
+        outline = Footprint.round(capabilities.footprint_m) or Footprint.rectangle(capabilities.footprint_m)
+        return replace(outline, base_kind=capabilities.base_kind)
+
+    @staticmethod
+    def round(corners: Sequence[tuple[float, float]]) -> Footprint | None:
+        """One disc about the body's origin where the corners (x, y), eight at least, lie on a circle; else None."""
+        distances = np.hypot(*np.transpose(corners))
+        radius = float(distances.max())
+        if len(corners) < 8 or float(distances.min()) < 0.97 * radius:
+            return None
+        return Footprint(np.array([[0.0, 0.0, radius]]), 2.0 * radius, 2.0 * radius)
+
+    def extended(self, discs: FloatArray, beyond: str) -> Footprint:
+        """This footprint and more discs, of what `beyond` names."""
+        return replace(self, discs=np.vstack([self.discs, discs]), beyond=beyond)
 
     @staticmethod
     def rectangle(corners: Sequence[tuple[float, float]]) -> Footprint:
@@ -59,6 +75,13 @@ class Footprint:
     def circumscribed_m(self) -> float:
         """Distance (m) from the body's origin to the farthest corner."""
         return float(np.max(np.hypot(self.discs[:, 0], self.discs[:, 1]) + self.discs[:, 2]))
+
+    @property
+    def extent_m(self) -> tuple[float, float]:
+        """Length and width (m) with what sticks out."""
+        low = np.min(self.discs[:, :2] - self.discs[:, 2:], axis=0)
+        length, width = np.max(self.discs[:, :2] + self.discs[:, 2:], axis=0) - low
+        return float(length), float(width)
 
 
 def pose_array(poses: Sequence[Pose2D]) -> FloatArray:
@@ -98,13 +121,19 @@ def clearance_at(
 
     `frame` is the field's resolution and the x, y of the centre of field[0, 0]; off the field it is -1.
     """
-    c, s = math.cos(yaw), math.sin(yaw)
+    cells = 1.0 / frame[0]
+    c, s = math.cos(yaw) * cells, math.sin(yaw) * cells
+    u0, v0 = (x - frame[1]) * cells, (y - frame[2]) * cells
     rows, columns = field.shape
     least = 1e9
     for n in range(discs.shape[0]):
-        u = (x + c * discs[n, 0] - s * discs[n, 1] - frame[1]) / frame[0]
-        v = (y + s * discs[n, 0] + c * discs[n, 1] - frame[2]) / frame[0]
-        if not (0.0 <= u <= columns - 1.0 and 0.0 <= v <= rows - 1.0):
+        u = u0 + c * discs[n, 0] - s * discs[n, 1]
+        v = v0 + s * discs[n, 0] + c * discs[n, 1]
+        if not (0.0 <= u < columns - 1.0 and 0.0 <= v < rows - 1.0):
             return -1.0
-        least = min(least, bilinear(field, u, v) - discs[n, 2])
+        i, j = int(v), int(u)
+        a, b = u - j, v - i
+        low = field[i, j] + a * (field[i, j + 1] - field[i, j])
+        high = field[i + 1, j] + a * (field[i + 1, j + 1] - field[i + 1, j])
+        least = min(least, low + b * (high - low) - discs[n, 2])
     return least

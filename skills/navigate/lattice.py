@@ -19,12 +19,12 @@ Frame = tuple[float, float, float]
 
 
 class Lattice(NamedTuple):
-    """Places at (x0_m + column * cell_m, y0_m + row * cell_m), headings at yaw0_rad + k * 2 pi / headings."""
+    """Places at (x0_m + column * cell_m, y0_m + row * cell_m), headings at yaws_rad (headings,), increasing."""
 
     x0_m: float
     y0_m: float
     cell_m: float
-    yaw0_rad: float
+    yaws_rad: FloatArray
     rows: int
     columns: int
     headings: int
@@ -50,11 +50,14 @@ class Needs(NamedTuple):
 
 
 def lattice_moves(headings: int) -> IntArray:
-    """Moves (M, 3): columns, rows, headings. Sixteen directions, each also with a turn to either side, and turns."""
+    """Moves (headings, M, 3) from each heading: columns, rows, headings.
+
+    Sixteen directions, each also with a turn to either side, and turns.
+    """
     flat = [(1, 0), (1, 1), (2, 1), (1, 2)]
     steps = {(sx * a, sy * b) for dx, dy in flat for a, b in ((dx, dy), (dy, dx)) for sx in (1, -1) for sy in (1, -1)}
     moves = [(dx, dy, turn) for dx, dy in sorted(steps) for turn in (0, -1, 1)]
-    return np.array([*moves, (0, 0, -1), (0, 0, 1)], dtype=np.int64)
+    return np.array([[*moves, (0, 0, -1), (0, 0, 1)]] * headings, dtype=np.int64)
 
 
 @compiled
@@ -94,17 +97,15 @@ def search(
     moves: IntArray,
     to_go: FloatArray,
     seeds: FloatArray,
-    final: FloatArray,
-    goal_row: int,
-    goal_column: int,
+    ends: FloatArray,
     needs: Needs,
     greed: float,
     expansions: IntArray,
 ) -> IntArray:
-    """State indices from a seed to the goal's place, empty when there is no way; adds to `expansions` (1,).
+    """State indices from a seed to an end, empty when there is no way; adds to `expansions` (1,).
 
-    A state's index is (row * columns + column) * headings + heading. `seeds` are rows of state index and cost so far;
-    `final` is the cost of the last turn at the goal from each heading, infinite where it cannot be.
+    A state's index is (row * columns + column) * headings + heading. `seeds` are rows of state index and cost so far,
+    `ends` rows of state index, increasing, and cost from there to the goal.
     """
     states = lattice.rows * lattice.columns * lattice.headings
     cost = np.full(states + 1, np.inf)
@@ -116,8 +117,8 @@ def search(
         index = np.int64(seeds[n, 0])
         cost[index] = seeds[n, 1]
         heapq.heappush(heap, (seeds[n, 1] + greed * _ahead(to_go, lattice, index), index))
-    goal_cell = goal_row * lattice.columns + goal_column
-    reached_totals, reached_states = np.empty(len(moves)), np.empty(len(moves), dtype=np.int64)
+    seconds = _seconds(lattice, moves, space.weights)
+    reached_totals, reached_states = np.empty(moves.shape[1]), np.empty(moves.shape[1], dtype=np.int64)
     while len(heap) > 0:
         _, index = heapq.heappop(heap)
         if index == states:
@@ -126,12 +127,23 @@ def search(
             continue
         closed[index] = True
         expansions[0] += 1
-        cell, k = index // lattice.headings, index % lattice.headings
-        if cell == goal_cell and cost[index] + final[k] < cost[states]:
-            cost[states], parent[states] = cost[index] + final[k], index
+        end = np.searchsorted(ends[:, 0], index)
+        if end < len(ends) and ends[end, 0] == index and cost[index] + ends[end, 1] < cost[states]:
+            cost[states], parent[states] = cost[index] + ends[end, 1], index
             heapq.heappush(heap, (cost[states], np.int64(states)))
         count = _expand(
-            space, lattice, moves, to_go, needs, int(index), cost, closed, clear, reached_states, reached_totals
+            space,
+            lattice,
+            moves,
+            seconds,
+            to_go,
+            needs,
+            int(index),
+            cost,
+            closed,
+            clear,
+            reached_states,
+            reached_totals,
         )
         for n in range(count):
             new, total = reached_states[n], reached_totals[n]
@@ -142,10 +154,33 @@ def search(
 
 
 @compiled
+def _seconds(lattice: Lattice, moves: IntArray, weights: Weights) -> FloatArray:
+    """Seconds of each move from each heading, (headings, moves)."""
+    seconds = np.empty((lattice.headings, moves.shape[1]))
+    for k in range(lattice.headings):
+        for n in range(moves.shape[1]):
+            dx, dy, dyaw = (
+                moves[k, n, 0] * lattice.cell_m,
+                moves[k, n, 1] * lattice.cell_m,
+                _turn(lattice, k, moves[k, n, 2]),
+            )
+            seconds[k, n] = motion_seconds(dx, dy, dyaw, lattice.yaws_rad[k] + 0.5 * dyaw, weights)
+    return seconds
+
+
+@compiled
+def _turn(lattice: Lattice, k: int, change: int | np.int64) -> float:
+    """Radians from a heading to the one `change` farther, by at most half a turn."""
+    off = lattice.yaws_rad[(k + change) % lattice.headings] - lattice.yaws_rad[k]
+    return float((off + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+@compiled
 def _expand(
     space: Space,
     lattice: Lattice,
     moves: IntArray,
+    seconds: FloatArray,
     to_go: FloatArray,
     needs: Needs,
     index: int,
@@ -159,27 +194,25 @@ def _expand(
     headings, columns = lattice.headings, lattice.columns
     cell, k = index // headings, index % headings
     i, j = cell // columns, cell % columns
-    turn = 2.0 * math.pi / headings
     here, there, count = np.empty(3), np.empty(3), 0
     here[0], here[1] = lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m
-    here[2] = lattice.yaw0_rad + k * turn
+    here[2] = lattice.yaws_rad[k]
+    if math.isnan(clear[index]):
+        clear[index] = clearance_at(space.field, space.frame, space.discs, here[0], here[1], here[2])
     near = math.hypot(here[0] - needs.x_m, here[1] - needs.y_m) < needs.escape_m
     need = needs.escape_margin_m if near else needs.margin_m
-    for n in range(moves.shape[0]):
-        a, b = i + moves[n, 1], j + moves[n, 0]
+    for n in range(moves.shape[1]):
+        a, b = i + moves[k, n, 1], j + moves[k, n, 0]
         if not (0 <= a < lattice.rows and 0 <= b < columns) or not to_go[a, b] < np.inf:
             continue
-        new = (a * columns + b) * headings + (k + moves[n, 2]) % headings
+        new = (a * columns + b) * headings + (k + moves[k, n, 2]) % headings
         if closed[new]:
             continue
         there[0], there[1] = lattice.x0_m + b * lattice.cell_m, lattice.y0_m + a * lattice.cell_m
-        there[2] = here[2] + moves[n, 2] * turn
-        least = motion_seconds(
-            there[0] - here[0], there[1] - here[1], there[2] - here[2], 0.5 * (here[2] + there[2]), space.weights
-        )
-        if cost[index] + least >= cost[new]:
+        there[2] = here[2] + _turn(lattice, k, moves[k, n, 2])
+        if cost[index] + seconds[k, n] >= cost[new]:
             continue
-        total = cost[index] + _move_cost(space, clear, here, there, new, need, least)
+        total = cost[index] + _move_cost(space, clear, here, there, clear[index], new, need, seconds[k, n])
         if total < cost[new]:
             reached_states[count], reached_totals[count] = new, total
             count += 1
@@ -192,18 +225,19 @@ def _move_cost(
     clear: NDArray[np.float32],
     here: FloatArray,
     there: FloatArray,
+    clear_here: float,
     new: int,
     need: float,
     seconds: float,
 ) -> float:
-    """Cost of one move, checked at its end (kept in `clear`) and in between."""
+    """Cost of one move, checked at its end (kept in `clear`), and in between unless both ends have enough to spare."""
     if math.isnan(clear[new]):
         clear[new] = clearance_at(space.field, space.frame, space.discs, there[0], there[1], there[2])
     if clear[new] < need:
         return math.inf
-    way = math.hypot(there[0] - here[0], there[1] - here[1]) + 0.6 * abs(there[2] - here[2])
+    way = math.hypot(there[0] - here[0], there[1] - here[1]) + space.weights[6] * abs(there[2] - here[2])
     steps = math.ceil(way / 0.12)
-    if clear[new] < need + way:
+    if clear_here + clear[new] - way < 2.0 * need:
         for n in range(1, steps):
             t = n / steps
             pose = here + t * (there - here)

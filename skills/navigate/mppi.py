@@ -21,6 +21,8 @@ from skills.quantities import Count, Duration, Factor, Margin, Speed, TurnRate
 from skills.robot import FloatArray, Pose2D
 
 _CELL_M, _NOISES = 0.08, 8
+_CORNER_M_S = 0.15
+"""Slower than this a base that cannot go sideways is at a corner of its path."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +31,8 @@ class MppiOptions(FollowerOptions):
 
     Of `samples` rollouts, `steps` times `step_s` long, those of little cost weigh more, the more so the lower the
     `temperature`. Cost is the distance from where the path leads by then (m squared, a radian counting `yaw_m`),
-    clearance below `near_m` with `clearance_weight`, and change of velocity with `change_weight`. Near the goal, and
-    while something blocks the path, it is the path follower.
+    clearance below `near_m` with `clearance_weight`, and change of velocity with `change_weight`. Near the goal, while
+    something blocks the path, and at the corners of a base that cannot go sideways, it is the path follower.
     """
 
     samples: Count = 200
@@ -72,11 +74,15 @@ class MppiController(PathFollower):
             return plain
         here = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
         reference, feed = self._reference(here, most_m_s)
+        if not self._sideways and float(np.min(np.abs(feed[:3, 0]))) < _CORNER_M_S:
+            self._plan = None
+            return plain
         nominal = feed if self._plan is None else self._shifted(self._plan)
         self._tick += 1
         field, frame = _sampled(costmap, pose)
         options = self._mppi
-        limits = np.array([options.max_speed_m_s, options.backward_m_s, options.lateral_m_s, options.turn_rad_s])
+        lateral_m_s = options.lateral_m_s if self._sideways else 0.0
+        limits = np.array([options.max_speed_m_s, options.backward_m_s, lateral_m_s, options.turn_rad_s])
         rates = np.array([options.acceleration_m_s2, options.acceleration_m_s2, options.turn_acceleration_rad_s2])
         weights = np.array([options.yaw_m, options.clearance_weight, options.change_weight, options.near_m])
         self._plan = _improved(

@@ -105,7 +105,7 @@ class PaceManager:
     """Tells the pace from tick to tick; remembers how long it was waited."""
 
     def __init__(self, footprint: Footprint, options: SpaceOptions | None = None) -> None:
-        self._footprint = footprint
+        self.footprint = footprint
         self._options = options or SpaceOptions()
         self._waiting_since_s: float | None = None
         self._passing = False
@@ -120,8 +120,8 @@ class PaceManager:
         """
         if not people:
             return self._nobody(now_s)
-        now_m = outline_distance_m(self._footprint, pose_array([here]), people)[0]
-        on_the_way_m = outline_distance_m(self._footprint, ahead, people)
+        now_m = outline_distance_m(self.footprint, pose_array([here]), people)[0]
+        on_the_way_m = outline_distance_m(self.footprint, ahead, people)
         then_m = np.min(on_the_way_m, axis=0)
         leads_away = on_the_way_m[-1] > now_m + self._options.away_m
         least_m = np.where(leads_away, on_the_way_m[-1], np.minimum(now_m, then_m))
@@ -129,7 +129,7 @@ class PaceManager:
         if least_m[nearest] >= self._options.far_m:
             return self._nobody(now_s)
         self._near_s = now_s
-        at_goal_m = outline_distance_m(self._footprint, pose_array([goal]), people)[0]
+        at_goal_m = outline_distance_m(self.footprint, pose_array([goal]), people)[0]
         leads_nearer = then_m < np.minimum(self._options.stop_m, np.minimum(now_m, at_goal_m) - self._options.slack_m)
         if np.any(leads_nearer):
             return self._close(now_s, people[int(np.argmin(np.where(leads_nearer, then_m, np.inf)))])

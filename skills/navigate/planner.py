@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from skills.api import NO_WORK_COUNTER, Costmap, PlanningError, WorkCounter
 from skills.geometry import wrap
+from skills.navigate.differential import CELL_SHARE, Links, courses, drives, links
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, clearance_at
 from skills.navigate.lattice import Lattice, Needs, Space, cost_to_go, lattice_moves, search
-from skills.navigate.motion_cost import Weights, segment_cost
+from skills.navigate.motion_cost import TURNING_RADIUS_M, Weights, segment_cost
 from skills.navigate.path import Path
 from skills.navigate.smoothing import clearances, densify, relax, shortcut
 from skills.quantities import Count, Factor, Length, Margin, Speed, TurnRate
-from skills.robot import FloatArray, Pose2D
+from skills.robot import BaseKind, FloatArray, Pose2D
 
 FIELD_CELL_M = 0.05
 STEP_M = 0.06
@@ -36,6 +37,8 @@ class LatticePlanner:
     way with more; nearer than `soft_m` to an obstacle the cost grows up to (1 + soft_weight) fold. A start that is
     blocked by noise may be left through poses that are no worse, within `escape_m`. The search covers the box about
     start and goal, `around_m` wider to all sides.
+    A base that cannot go sideways gets a path of straights, arcs and turns on the spot, whatever `lateral_m_s` and
+    `headings` say, on places half of `cell_m` apart.
     """
 
     forward_m_s: Speed = 0.8
@@ -53,7 +56,7 @@ class LatticePlanner:
     greed: Factor = 2.0
     around_m: Margin = 8.0
 
-    def weights(self) -> Weights:
+    def weights(self, footprint: Footprint) -> Weights:
         """The numbers that a motion's cost depends on, for the compiled loops."""
         return (
             self.forward_m_s,
@@ -62,6 +65,7 @@ class LatticePlanner:
             self.turn_rad_s,
             self.soft_m,
             self.soft_weight,
+            max(TURNING_RADIUS_M, footprint.circumscribed_m),
         )
 
     def problem(
@@ -89,6 +93,11 @@ class Problem:
     goal: Pose2D
     options: LatticePlanner
     work: WorkCounter = NO_WORK_COUNTER
+
+    @property
+    def sideways(self) -> bool:
+        """Whether the base can go sideways."""
+        return self.footprint.base_kind is not BaseKind.DIFFERENTIAL
 
 
 def plan_path(
@@ -123,7 +132,7 @@ def problem_of(
     rows, columns = _used(field.max(axis=1)), _used(field.max(axis=0))
     field = field[rows, columns]
     frame = (FIELD_CELL_M, float(xs[columns.start]), float(ys[rows.start]))
-    space = Space(np.ascontiguousarray(field), frame, footprint.discs, options.weights())
+    space = Space(np.ascontiguousarray(field), frame, footprint.discs, options.weights(footprint))
     return Problem(space, footprint, start, goal, options, work)
 
 
@@ -148,13 +157,18 @@ def _solve(problem: Problem) -> Path:
     """The cheapest way with the margin that is wanted."""
     needs = _needs(problem)
     _check_goal(problem)
-    for yaw0_rad in (0.0, problem.goal.yaw_rad):
+    for yaw0_rad in (0.0, problem.goal.yaw_rad) if problem.sideways else (0.0,):
         rough = _search(problem, needs, yaw0_rad)
         if rough is not None:
             return _smooth(problem, rough, needs)
-    raise NoWayError(
-        f"There is no way from {_place(problem.start)} to {_place(problem.goal)} that the robot fits through."
-    )
+    places = f"from {_place(problem.start)} to {_place(problem.goal)}"
+    raise NoWayError(f"There is no way {places} that the robot fits through{_because(problem.footprint)}.")
+
+
+def _because(footprint: Footprint) -> str:
+    """What makes the robot larger than its body; empty when nothing does."""
+    length, width = footprint.extent_m
+    return f": {footprint.beyond} makes it {length:.2f} m long and {width:.2f} m wide" if footprint.beyond else ""
 
 
 def _place(pose: Pose2D) -> str:
@@ -181,19 +195,21 @@ def _check_goal(problem: Problem) -> None:
         return
     needed = f"would have {clearance:.2f} m to the nearest thing there and needs {problem.options.margin_m:.2f} m"
     why = "would stand in something there, or off the map" if clearance < 0.0 else needed
-    raise PlanningError(f"The goal {_place(problem.goal)} is blocked: the robot {why}.")
+    raise PlanningError(f"The goal {_place(problem.goal)} is blocked: the robot {why}{_because(problem.footprint)}.")
 
 
 def _lattice(problem: Problem, yaw0_rad: float) -> tuple[Lattice, int, int]:
     """The lattice with the goal on one of its places, over the whole field; the goal's row and column."""
     cell, (resolution, x0, y0) = problem.options.cell_m, problem.space.frame
+    cell *= 1.0 if problem.sideways else CELL_SHARE
     rows, columns = problem.space.field.shape
     row, column = int((problem.goal.y_m - y0) / cell), int((problem.goal.x_m - x0) / cell)
     above = int((y0 + (rows - 1) * resolution - problem.goal.y_m) / cell)
     beside = int((x0 + (columns - 1) * resolution - problem.goal.x_m) / cell)
     corner = (problem.goal.x_m - column * cell, problem.goal.y_m - row * cell)
     shape = (row + above + 1, column + beside + 1)
-    return Lattice(*corner, cell, yaw0_rad, *shape, problem.options.headings), row, column
+    yaws, _ = _courses(problem.options.headings if problem.sideways else None)
+    return Lattice(*corner, cell, yaw0_rad + yaws, *shape, len(yaws)), row, column
 
 
 def _segment(problem: Problem, a: FloatArray, b: FloatArray, need: float) -> float:
@@ -201,58 +217,73 @@ def _segment(problem: Problem, a: FloatArray, b: FloatArray, need: float) -> flo
     return segment_cost(space.field, space.frame, space.discs, a, b, need, space.weights)
 
 
-def _seeds(problem: Problem, lattice: Lattice, needs: Needs) -> FloatArray:
-    """Lattice states next to the start that it can be left to: rows of state index and cost."""
-    start = np.array([problem.start.x_m, problem.start.y_m, problem.start.yaw_rad])
-    turn = 2.0 * math.pi / lattice.headings
+def _poses(problem: Problem) -> tuple[FloatArray, FloatArray]:
+    """Start and goal as rows x, y, yaw."""
+    start, goal = (np.array([p.x_m, p.y_m, p.yaw_rad]) for p in (problem.start, problem.goal))
+    return start, goal
+
+
+def _seeds(problem: Problem, lattice: Lattice, needs: Needs) -> Links:
+    """Lattice states next to the start that it can be left to."""
+    start, turn = _poses(problem)[0], 2.0 * math.pi / lattice.headings
     column, row = (start[0] - lattice.x0_m) / lattice.cell_m, (start[1] - lattice.y0_m) / lattice.cell_m
-    k = math.floor((start[2] - lattice.yaw0_rad) / turn)
-    seeds = []
+    k = math.floor((start[2] - lattice.yaws_rad[0]) / turn)
+    seeds: Links = {}
     for i in (math.floor(row), math.floor(row) + 1):
         for j in (math.floor(column), math.floor(column) + 1):
             for heading in (k, k + 1):
-                yaw = lattice.yaw0_rad + heading * turn
+                yaw = lattice.yaws_rad[0] + heading * turn
                 pose = np.array([lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m, yaw])
                 cost = _segment(problem, start, pose, needs.escape_margin_m)
                 if math.isfinite(cost):
-                    seeds.append(
-                        (float((i * lattice.columns + j) * lattice.headings + heading % lattice.headings), cost)
-                    )
-    return np.array(seeds, dtype=np.float64).reshape(-1, 2)
+                    seeds[(i * lattice.columns + j) * lattice.headings + heading % lattice.headings] = (cost, ())
+    return seeds
 
 
-def _final_turns(problem: Problem, lattice: Lattice) -> FloatArray:
-    """Cost of turning at the goal from each heading to the goal's; infinite beyond one heading's width."""
-    goal = np.array([problem.goal.x_m, problem.goal.y_m, problem.goal.yaw_rad])
-    turn = 2.0 * math.pi / lattice.headings
-    costs = np.full(lattice.headings, np.inf)
+def _final_turns(problem: Problem, lattice: Lattice, goal_cell: int) -> Links:
+    """Turns at the goal from each heading to the goal's, by one heading's width at most."""
+    goal, turn = _poses(problem)[1], 2.0 * math.pi / lattice.headings
+    turns: Links = {}
     for k in range(lattice.headings):
-        off = wrap(lattice.yaw0_rad + k * turn - problem.goal.yaw_rad)
+        off = wrap(float(lattice.yaws_rad[k]) - problem.goal.yaw_rad)
         if abs(off) < turn:
-            costs[k] = _segment(problem, goal + np.array([0.0, 0.0, off]), goal, problem.options.margin_m)
-    return costs
+            cost = _segment(problem, goal + np.array([0.0, 0.0, off]), goal, problem.options.margin_m)
+            turns[goal_cell * lattice.headings + k] = (cost, ())
+    return turns
 
 
 @lru_cache(maxsize=4)
-def _moves(headings: int) -> NDArray[np.int64]:
-    return lattice_moves(headings)
+def _courses(headings: int | None) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Yaws and moves of a lattice with so many headings, or of one for a base that cannot go sideways (None)."""
+    if headings is None:
+        return courses()
+    return np.asarray(np.arange(headings) * (2.0 * math.pi / headings)), lattice_moves(headings)
+
+
+def _rows(found: Links) -> FloatArray:
+    """State index and cost, by index."""
+    return np.array(sorted((float(state), cost) for state, (cost, _) in found.items()), dtype=np.float64).reshape(-1, 2)
 
 
 def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | None:
     """Lattice poses from start to goal with continuous yaw, None when there is no way."""
     lattice, row, column = _lattice(problem, yaw0_rad)
-    seeds, final = _seeds(problem, lattice, needs), _final_turns(problem, lattice)
+    start, goal = _poses(problem)
+    if problem.sideways:
+        seeds, ends = _seeds(problem, lattice, needs), _final_turns(problem, lattice, row * lattice.columns + column)
+    else:
+        seeds = links(problem.space, lattice, start, needs, to_pose=False)
+        ends = links(problem.space, lattice, goal, needs, to_pose=True)
     to_go = cost_to_go(problem.space, lattice, row, column, problem.footprint.inscribed_m)
     expansions = np.zeros(1, dtype=np.int64)
+    _, moves = _courses(problem.options.headings if problem.sideways else None)
     states = search(
         problem.space,
         lattice,
-        _moves(lattice.headings),
+        moves,
         to_go,
-        seeds,
-        final,
-        row,
-        column,
+        _rows(seeds),
+        _rows(ends),
         needs,
         problem.options.greed,
         expansions,
@@ -263,16 +294,19 @@ def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | Non
     cells, k = np.divmod(states, lattice.headings)
     i, j = np.divmod(cells, lattice.columns)
     x, y = lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m
-    yaw = lattice.yaw0_rad + k * (2.0 * math.pi / lattice.headings)
-    ends = [(p.x_m, p.y_m, p.yaw_rad) for p in (problem.start, problem.goal)]
-    poses = np.vstack([ends[0], np.column_stack([x, y, yaw]), ends[1]])
+    between = np.column_stack([x, y, lattice.yaws_rad[k]])
+    first, last = seeds[int(states[0])][1], ends[int(states[-1])][1]
+    poses = np.vstack([start, *first, between, *last, goal])
     poses[:, 2] = np.unwrap(poses[:, 2])
     return np.ascontiguousarray(poses)
 
 
 def _smooth(problem: Problem, rough: FloatArray, needs: Needs) -> Path:
     """Shortcut, fill in and relax."""
-    knots = shortcut(problem.space, rough, needs, 25)
+    knots = shortcut(problem.space, rough, needs, 25, problem.sideways)
+    if not problem.sideways:
+        poses = densify(drives(problem.space, knots, needs), STEP_M)
+        return Path(poses, clearances(problem.space, poses))
     band = relax(problem.space, densify(knots, STEP_M), 60, problem.options.margin_m, 0.25)
     poses = densify(band, STEP_M)
     return Path(poses, clearances(problem.space, poses))

@@ -11,9 +11,10 @@ import numpy as np
 
 from skills.api import Cause, Costmap, Failed, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import relative
+from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
-from skills.navigate.footprint import Footprint, footprint_clearance_m
+from skills.navigate.footprint import footprint_clearance_m
 from skills.navigate.low_obstacles import LowObstacleWatch, WatchOptions
 from skills.navigate.path import Path
 from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
@@ -25,6 +26,7 @@ from skills.stack import LocalController
 
 _STILL_THERE_M = 1.0
 _REVIEWED_M = 0.02
+_OUTLINE_PERIOD_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,9 @@ class Navigate(Skill[NavigateInputs]):
         self._base.stop()
         self._base = Base(self.context)
         self._inputs = inputs
-        self._footprint = Footprint.of(self.context.robot.capabilities())
+        self._outline = ArmFootprint(self.context)
+        self._footprint = self._outline.now()
+        self._outline_due_s = -math.inf
         self._watch = LowObstacleWatch(self.context, self.options.low_obstacles)
         self._people = PeopleWatch(self.context, self.options.people)
         self._pace = PaceManager(self._footprint, self.options.space)
@@ -176,6 +180,8 @@ class Navigate(Skill[NavigateInputs]):
         """Sample the costmap now and plan in the Worker, from a pose or from here."""
         if not self._people.people():
             self._room_m = self.options.space.room_m
+        self._footprint = self._pace.footprint = self._guard.footprint = self._outline.now()
+        self._outline_due_s = self._now() + _OUTLINE_PERIOD_S
         speed = max(0.1, self._inputs.max_speed_m_s)
         begin, goal = start or self.context.pose(), self._inputs.goal
         plan = self.context.stack.planner.problem(
@@ -277,6 +283,7 @@ class Navigate(Skill[NavigateInputs]):
         if trouble is not None and self._job is None:
             return self._replan(trouble)
         self._review(self._follower, costmap)
+        self._review_outline()
         return self._progress(answer.remaining_m)
 
     def _stand_at_once(self, place_W: tuple[float, float]) -> Step:
@@ -332,6 +339,14 @@ class Navigate(Skill[NavigateInputs]):
         blocked = np.flatnonzero(clearance < min(_REVIEWED_M, float(clearance[0]) - 0.01))
         if len(blocked):
             self._obstacle = (float(ahead[blocked[0], 0]), float(ahead[blocked[0], 1]))
+            self._ask_for_plan(self._pose_then())
+
+    def _review_outline(self) -> None:
+        """Plan anew, while the robot drives on, once its arm or what it carries reaches farther than planned for."""
+        if self._job is not None or self._now() < self._outline_due_s:
+            return
+        self._outline_due_s = self._now() + _OUTLINE_PERIOD_S
+        if self._outline.outgrows(self._footprint):
             self._ask_for_plan(self._pose_then())
 
     def _replan(self, why: str) -> Step:

@@ -9,15 +9,15 @@ import numpy as np
 from skills.estimate.compiled import compiled
 from skills.navigate.footprint import clearance_at
 from skills.navigate.lattice import Needs, Space
-from skills.navigate.motion_cost import segment_cost
+from skills.navigate.motion_cost import drive_cost, segment_cost
 from skills.robot import FloatArray
 
 
 @compiled
-def shortcut(space: Space, poses: FloatArray, needs: Needs, window: int) -> FloatArray:
+def shortcut(space: Space, poses: FloatArray, needs: Needs, window: int, sideways: bool) -> FloatArray:
     """The cheapest choice of (N, 3) poses to go through in straight lines, skipping at most `window` at a time.
 
-    The first and the last are kept; yaws must be continuous.
+    The first and the last are kept; yaws must be continuous. A base that cannot go sideways turns to each line first.
     """
     count = poses.shape[0]
     best = np.full(count, np.inf)
@@ -27,7 +27,10 @@ def shortcut(space: Space, poses: FloatArray, needs: Needs, window: int) -> Floa
         for i in range(max(0, j - window), j):
             near = math.hypot(poses[i, 0] - needs.x_m, poses[i, 1] - needs.y_m) < needs.escape_m
             need = needs.escape_margin_m if near else needs.margin_m
-            cost = segment_cost(space.field, space.frame, space.discs, poses[i], poses[j], need, space.weights)
+            if sideways:
+                cost = segment_cost(space.field, space.frame, space.discs, poses[i], poses[j], need, space.weights)
+            else:
+                cost = drive_cost(space.field, space.frame, space.discs, poses[i], poses[j], need, space.weights)[0]
             if j - i == 1:
                 cost = min(cost, 1e6)
             if best[i] + cost < best[j]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,27 +13,34 @@ from pydrake.math import RigidTransform, RotationMatrix
 from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import COMFORTABLE_M, free_places
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
-from skills.arm.collision import ArmScene
+from skills.arm.collision import ArmScene, Box
 from skills.arm.poses import look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.geometry import wrap
 from skills.grasp.candidates import hand_rotation
+from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
 from skills.place.free_spot import free_spots, spots
-from skills.quantities import Length
-from skills.robot import FloatArray, GripperCapabilities, Pose2D
+from skills.quantities import Length, TurnRate
+from skills.robot import ArmTrajectory, FloatArray, Pose2D
 from skills.stack import ArmPlanner
 
-ABOVE_M = 0.22
-_SURELY_FREE_M = 0.135
-_LOWEST_M = 0.02
+ABOVE_M = 0.10
+"""So high over the surface the object's lowest point is brought, before it goes down."""
+_SURELY_FREE_M = 0.03
+_PRESS_M = 0.03
+_SIDE_DROP_M, _LIFT_AGAIN_M = 0.12, 0.135
+_LEAST_BACK_M = 0.08
+_LEVEL = 0.5
 _RELAX_M = 0.003
 _FEEL_S = 0.4
 _OVER_SPOT_M = 0.45
-_TIPS_BEYOND_M = 0.03
-"""The fingertips reach so far below the middle of what is held from above."""
+_RELEASE_RAD = 0.4
+"""The finger opens so far to let go, and no farther: wide open it would reach what stands beside."""
+_ASIDE_M = 0.018
+"""Fixed finger and palm leave the object by so much before the hand is drawn back, or it would drag it along."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +54,11 @@ class PlaceInputs:
 class PlaceOptions:
     """How an object is put down.
 
-    It is lowered in steps of `step_m` until the arm lags by `contact_m`. It must be seen again within `seen_again_m`.
+    No joint is faster than `lower_rad_s` while it is lowered until it stands. It must be seen again within
+    `seen_again_m`.
     """
 
-    step_m: Length = 0.008
-    contact_m: Length = 0.005
+    lower_rad_s: TurnRate = 0.2
     seen_again_m: Length = 0.12
 
 
@@ -86,8 +93,9 @@ class Place(ArmSkill[PlaceInputs]):
         carried = self._carried()
         yield from self._go_near(surface)
         view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
-        q_above_rad = yield from self._go_above(surface, view, carried)
-        spot_W = self._below_hand_W()
+        held = self._held(carried)
+        q_above_rad = yield from self._go_above(surface, view, held)
+        spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
         yield from self._lower(surface, q_above_rad)
         yield from self._let_go()
@@ -104,7 +112,7 @@ class Place(ArmSkill[PlaceInputs]):
         over_spot = spot_W is not None and self.hand_near(spot_W, _OVER_SPOT_M)
         if self.context.robot.gripper().holding:
             if over_spot:
-                yield from self.try_shift_hand(np.array([0.0, 0.0, _SURELY_FREE_M]), "lifting the object again")
+                yield from self.try_shift_hand(np.array([0.0, 0.0, _LIFT_AGAIN_M]), "lifting the object again")
             return (yield from self.run(inputs))
         if spot_W is None:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper, and it was not yet over its place")
@@ -130,7 +138,7 @@ class Place(ArmSkill[PlaceInputs]):
         if np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6:
             return
         context = self.context
-        places = free_places((spot[0], spot[1]), pose, context.costmap, context.robot.capabilities())
+        places = free_places((spot[0], spot[1]), pose, context.costmap, ArmFootprint(context).now())
         if not places:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
         yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))
@@ -158,20 +166,22 @@ class Place(ArmSkill[PlaceInputs]):
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         return view
 
-    def _go_above(self, surface: Surface, view: SurfaceView, carried: RotationMatrix) -> Routine[FloatArray]:
+    def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
         """Bring the object above the best free spot; gives the joint angles that the arm is to have there."""
         X_WB = self.X_WB()
         free = free_spots(view, spots(surface))
         if len(free) == 0:
             raise SkillFailure(Cause.PLANNING, f"no free spot is seen on the {surface.name}")
         X_BW = X_WB.inverse()
-        tops = [X_BW @ np.array([x, y, view.plane.height_m + ABOVE_M]) for x, y in _by_distance(free, X_WB)]
-        self.boxes = [*surface_boxes([surface], X_WB), *cluster_boxes(view.clusters, X_WB)]
-        goal = above_goal(tops, carried, self.gripper, self.context.stack.arm_planner)
+        on_top = [X_BW @ np.array([x, y, view.plane.height_m]) for x, y in _by_distance(free, X_WB)]
+        beside = cluster_boxes(view.clusters, X_WB)
+        self.boxes = [*surface_boxes([surface], X_WB), *beside]
+        letting_go = Release(beside, self._release_rad())
+        goal = above_goal(on_top, held, self.context.stack.arm_planner, letting_go)
         return (yield from self.move_to(goal, f"bringing the object over the {surface.name}", speed_rad_s=0.8))
 
     def _lower(self, surface: Surface, q_above_rad: FloatArray) -> Routine[None]:
-        """Go down in small steps until the arm is held up, by contact, or the height is that of the surface.
+        """Go down slowly until the hand is held up, by contact, or the height is that of the surface.
 
         The path down begins at the angles for which it was found to be possible, and not at those of the arm: they
         differ a little, and near a singular posture that may make the difference between a path and none.
@@ -180,30 +190,40 @@ class Place(ArmSkill[PlaceInputs]):
         message = f"putting the object down on the {surface.name}"
         p_BH = self.model.X_BH(q_above_rad).translation() - [0.0, 0.0, ABOVE_M - _SURELY_FREE_M]
         yield from self.move_straight(p_BH, message, q_from_rad=q_above_rad)
-        q_wanted = self.q_rad()
-        X_BH = self.model.X_BH(q_wanted)
-        rest_m = float(X_BH.translation()[2]) - self._hand_z()
-        lowest_m = surface.height_m + _LOWEST_M - float(self.X_WB().translation()[2])
-        planner = self.context.stack.arm_planner
-        while self._below_hand_m() > lowest_m:
-            X_BH = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, self.options.step_m])
+        down = self._way_down()
+        stopped = yield from self.follow(down, message, self.held_up(np.array([0.0, 0.0, -1.0])))
+        if stopped:
+            yield from self.try_shift_hand(np.array([0.0, 0.0, _RELAX_M]), message)
+
+    def _way_down(self) -> ArmTrajectory:
+        """Straight down as far as the arm can go, at most into the surface. Raises SkillFailure with cause PLANNING."""
+        planner, X_BH = self.context.stack.arm_planner, self.model.X_BH(self.q_rad())
+        depth_m = _SURELY_FREE_M + _PRESS_M
+        why = PlanningError("the arm cannot go down")
+        for part in (1.0, 0.85, 0.7, 0.5):
+            lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, part * depth_m])
             try:
-                path = planner.line(self.model, q_wanted, X_BH)
+                path = planner.line(self.model, self.q_rad(), lowered)
             except PlanningError as error:
-                raise SkillFailure(Cause.PLANNING, str(error)) from error
-            q_wanted = path[-1]
-            yield from self.follow(planner.timed(path, speed_rad_s=0.3), message)
-            if self._hand_z() - float(X_BH.translation()[2]) + rest_m > self.options.contact_m:
-                yield from self.try_shift_hand(np.array([0.0, 0.0, _RELAX_M]), message)
-                return
+                why = error
+                continue
+            return planner.timed(path, speed_rad_s=self.options.lower_rad_s)
+        raise SkillFailure(Cause.PLANNING, str(why)) from why
 
     def _let_go(self) -> Routine[None]:
-        """Open, and draw the hand back along its fingers."""
-        yield from self.move_gripper(0.75 * self.open_rad, GRIPPER_FORCE_N, "letting go")
+        """Open, take fixed finger and palm off the object, and draw the hand back along its fingers."""
+        yield from self.move_gripper(self._release_rad(), GRIPPER_FORCE_N, "letting go")
         yield from self.pause(0.3, "letting go")
-        fingers = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
+        fingers, _, closing = self.model.X_BH(self.q_rad()).rotation().matrix().T
+        if abs(closing[2]) < _LEVEL:
+            aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
+            yield from self.try_shift_hand(aside, "letting go")
         if not (yield from self.try_shift_hand(-0.16 * fingers, "drawing the hand back")):
-            yield from self.shift_hand(-0.08 * fingers, "drawing the hand back")
+            yield from self.shift_hand(-_LEAST_BACK_M * fingers, "drawing the hand back")
+
+    def _release_rad(self) -> float:
+        """How far the gripper opens to let go of what it holds."""
+        return min(self.context.robot.gripper().opening_rad + _RELEASE_RAD, 0.75 * self.open_rad)
 
     def _check(self, surface: Surface, spot_W: FloatArray) -> Routine[None]:
         """Raise SkillFailure with cause POSTCONDITION unless something stands where the object was put."""
@@ -218,63 +238,89 @@ class Place(ArmSkill[PlaceInputs]):
                 Cause.POSTCONDITION, f"the object is not seen on the {surface.name} where it was put down"
             )
 
-    def _hand_z(self) -> float:
-        return float(self.model.X_BH(self.q_rad()).translation()[2])
+    def _held(self, carried: RotationMatrix) -> HeldObject:
+        """What is held, as the skill noted that took it, or else as may be guessed from how it was brought."""
+        payload, gripper = self.context.payload, self.gripper
+        if payload.corners_H is not None and payload.R_BH is not None:
+            return HeldObject(payload.R_BH, payload.corners_H)
+        if abs(carried.matrix()[2, 2]) < _LEVEL:
+            low_H = carried.matrix().T @ np.array([0.0, 0.0, -_SIDE_DROP_M])
+            return HeldObject(carried, np.array([gripper.grip_x_m, 0.0, 0.0]) + np.array([low_H, -low_H]))
+        tip_H = np.array([gripper.tip_x_m, 0.0, 0.0])
+        return HeldObject(hand_rotation(0.5 * math.pi, 0.0, 1.0), np.array([tip_H, tip_H - [0.06, 0.0, 0.0]]))
 
-    def _below_hand_m(self) -> float:
-        """Height in B of the object's middle as it is held."""
-        return float((self.model.X_BH(self.q_rad()) @ self.p_HT)[2])
 
-    def _below_hand_W(self) -> FloatArray:
-        p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
-        return np.asarray((self.X_WB() @ p_BT)[:2])
+@dataclass(frozen=True)
+class HeldObject:
+    """What the hand holds: how the hand was turned when the object stood, and its corners (N, 3) in the hand frame."""
+
+    R_BH: RotationMatrix
+    corners_H: FloatArray
+
+    @property
+    def p_HO(self) -> FloatArray:
+        """The object's middle in the hand frame (3,), m."""
+        return np.asarray(0.5 * (self.corners_H.min(axis=0) + self.corners_H.max(axis=0)))
+
+    def drop_m(self, rotation: RotationMatrix) -> float:
+        """How far below the hand's origin the object reaches, with the hand turned so."""
+        return -float(np.min(self.corners_H @ rotation.matrix()[2]))
+
+    def rotations(self, azimuth_rad: float) -> list[RotationMatrix]:
+        """How the hand may be turned for the object to stand as it stood.
+
+        Fingers that do not point down point towards an azimuth, or somewhat aside.
+        """
+        x_axis = self.R_BH.matrix()[:, 0]
+        level = math.hypot(x_axis[0], x_axis[1]) > _LEVEL
+        ahead = azimuth_rad - math.atan2(x_axis[1], x_axis[0]) if level else azimuth_rad
+        turns = (0.0, 0.4, -0.4) if level else tuple(k * math.pi / 4 for k in range(8))
+        return [RotationMatrix.MakeZRotation(ahead + turn) @ self.R_BH for turn in turns]
+
+
+@dataclass(frozen=True)
+class Release:
+    """How the hand lets go: what stands beside, as boxes (B), and how far the gripper is open then (rad)."""
+
+    beside: Sequence[Box]
+    opening_rad: float
 
 
 def above_goal(
-    tops_B: list[FloatArray], carried: RotationMatrix, gripper: GripperCapabilities, planner: ArmPlanner
+    on_top_B: list[FloatArray], held: HeldObject, planner: ArmPlanner, release: Release
 ) -> Callable[[ArmScene, FloatArray], FloatArray]:
-    """A goal with the object above the first of some points that the arm can reach, tilted as fits how it is held.
+    """A goal with the object over the first of some points of a surface that the arm can reach, as it stood before.
 
-    An object taken from the side (fingers closing level) keeps its tilt; one taken from above hangs below the hand.
+    The open hand must find its way out again without touching what stands beside.
     """
-    side = abs(carried.matrix()[2, 2]) < 0.5
-    ahead_m = gripper.grip_x_m if side else gripper.tip_x_m - _TIPS_BEYOND_M
 
     def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
         """Arm angles above the first spot that can be reached and gone down to. Raises PlanningError."""
-        for p_BT in tops_B:
+        for p_BT in on_top_B:
             azimuth = math.atan2(p_BT[1] - scene.model.p_BS[1], p_BT[0] - scene.model.p_BS[0])
-            for rotation in _side(carried, azimuth) if side else _from_above(azimuth):
-                offset = rotation.matrix() @ np.array([ahead_m, 0.0, 0.0])
-                for q_above in scene.model.inverse(RigidTransform(rotation, p_BT - offset), margin_rad=0.05):
-                    if scene.free(q_above) and _can_lower(scene, q_above, planner):
+            for rotation in held.rotations(azimuth):
+                middle = rotation @ held.p_HO
+                p_BH = np.array([*(p_BT - middle)[:2], p_BT[2] + ABOVE_M + held.drop_m(rotation)])
+                for q_above in scene.model.inverse(RigidTransform(rotation, p_BH), margin_rad=0.05):
+                    if scene.free(q_above) and _can_put_down(scene, q_above, planner, release):
                         return q_above
         raise PlanningError("no free spot is within the arm's reach")
 
     return goal
 
 
-def _can_lower(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner) -> bool:
+def _can_put_down(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner, release: Release) -> bool:
+    """Whether the hand can go down from there and, with its finger open, back again."""
     X_BH = scene.model.X_BH(q_rad)
-    lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M - 0.03])
+    lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M])
+    back = lowered @ RigidTransform([-_LEAST_BACK_M, 0.0, 0.0])
     try:
-        planner.line(scene.model, q_rad, lowered)
+        down = planner.line(scene.model, q_rad, lowered)
+        with scene.with_only(release.beside, release.opening_rad):
+            planner.line(scene.model, down[-1], back, scene)
     except PlanningError:
         return False
     return True
-
-
-def _side(carried: RotationMatrix, azimuth: float) -> list[RotationMatrix]:
-    """The tilt as carried, turned about the vertical towards the spot and a little aside."""
-    x_axis = carried.matrix()[:, 0]
-    ahead = azimuth - math.atan2(x_axis[1], x_axis[0])
-    return [RotationMatrix.MakeZRotation(ahead + turn) @ carried for turn in (0.0, 0.4, -0.4)]
-
-
-def _from_above(azimuth: float) -> list[RotationMatrix]:
-    """Fingers down, or as far down as may be; the gripper closes level."""
-    tilts = np.radians([90.0, 75.0, 60.0, 45.0])
-    return [hand_rotation(tilt, azimuth, side) for tilt in tilts for side in (1.0, -1.0)]
 
 
 def _nearest_spot(surface: Surface, X_WB: RigidTransform) -> FloatArray:

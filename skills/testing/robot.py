@@ -13,6 +13,7 @@ from skills.arm.kinematics import ArmModel, arm_model
 from skills.geometry import compose
 from skills.robot import (
     ArmTrajectory,
+    BaseKind,
     Battery,
     Capabilities,
     CommandId,
@@ -205,6 +206,8 @@ class ScriptedRobot:
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Walk at a body-frame velocity until the clock reads until_s."""
         fault = "" if all(map(math.isfinite, (vx, vy, wz))) else f"velocity ({vx}, {vy}, {wz}) is not finite"
+        if vy != 0.0 and self._capabilities.base_kind is BaseKind.DIFFERENTIAL:
+            fault = fault or "this base cannot go sideways"
         return self._begin("drive", np.array([vx, vy, wz]), until_s, lease, fault)
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:

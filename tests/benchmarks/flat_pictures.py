@@ -233,7 +233,7 @@ def taken(rng: np.random.Generator, stage: Stage, view: View) -> tuple[Picture, 
 def shots(out: Path, seed: int, scenes: int, supply: Supply) -> Iterator[dict[str, Any]]:
     """Pictures written to a folder, with their entries; the same for the same seed."""
     world = open_world("flat")
-    free = load_grid_map(world.keepout_map_path)
+    free = load_grid_map(world.surveyed.keepout_map_path)
     for index in range(scenes):
         rng = np.random.default_rng([seed, index, 17])
         bare = index % ONLY_DISTRACTORS_EVERY == ONLY_DISTRACTORS_EVERY - 1

@@ -192,7 +192,7 @@ class Wanderer:
         inspector = engine.world.scene_graph.model_inspector()
         self._lidar = Lidar(self._plant, inspector, self._model.body, X_BL, self.rng, unseen=self._model.instances())
         self._odometry = OdometryModel(self.rng)
-        self._keepout = load_grid_map(world.keepout_map_path).with_unknown_blocked()
+        self._keepout = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
         self.now_s, self.way_m, self._turning = 0.0, 0.0, 0.0
         self._shift = Pose2D(0.0, 0.0, 0.0)
         self.robot = Replay()

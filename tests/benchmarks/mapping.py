@@ -177,7 +177,7 @@ def false_closures(mapper: Mapper, true: list[Pose2D]) -> int:
 
 def walls_within(world, grids, mapper: Mapper, true: list[Pose2D], band: str) -> dict[str, float]:
     """Shares of the map's occupied cells near the truth's."""
-    path = world.scan_map_path if band == "scan" else world.keepout_map_path
+    path = world.surveyed.scan_map_path if band == "scan" else world.surveyed.keepout_map_path
     surveyed_grid = load_grid_map(path)
     cells = np.argwhere(grids.probabilities[band] > 0.65)
     points = (cells[:, ::-1] + 0.5) * 0.025 + np.array(grids.origin_m)
@@ -187,7 +187,7 @@ def walls_within(world, grids, mapper: Mapper, true: list[Pose2D], band: str) ->
 
 def free_seen(world, grids, mapper: Mapper, true: list[Pose2D]) -> float:
     """The share of the truth's ground with room for the body that is free in the map."""
-    surveyed_grid = load_grid_map(world.keepout_map_path)
+    surveyed_grid = load_grid_map(world.surveyed.keepout_map_path)
     x0, y0 = grids.origin_m
     cells = np.argwhere(grids.observed["keepout"] & (grids.probabilities["keepout"] < 0.45))
     points = aligned((cells[:, ::-1] + 0.5) * 0.025 + np.array([x0, y0]), mapper.graph.poses, true)
@@ -201,7 +201,7 @@ def free_seen(world, grids, mapper: Mapper, true: list[Pose2D]) -> float:
 
 def obstacles_found(world, grids, mapper: Mapper, true: list[Pose2D]) -> float:
     """The share of the keep-out's surface by the ground where the body fits that the map has within 10 cm."""
-    truth = load_grid_map(world.keepout_map_path)
+    truth = load_grid_map(world.surveyed.keepout_map_path)
     cells = np.argwhere(grids.probabilities["keepout"] > 0.65)
     points = aligned((cells[:, ::-1] + 0.5) * 0.025 + np.array(grids.origin_m), mapper.graph.poses, true)
     rows, columns = truth.cells(points).T

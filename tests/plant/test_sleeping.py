@@ -126,5 +126,5 @@ def test_the_same_run_twice_sleeps_and_moves_alike(stage):
     for _ in range(2):
         engine = stage(one=(0, 0, 0.4), two=(0.05, 0.02, 0.9), three=(1, 0, 0.051))
         ends.append((engine.asleep, place(engine, "one"), place(engine, "two")))
-    assert ends[0][0] == ends[1][0] == {"three"}
+    assert ends[0][0] == ends[1][0] == {"one", "three"}
     np.testing.assert_array_equal(ends[0][1:], ends[1][1:])

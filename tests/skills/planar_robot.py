@@ -15,6 +15,7 @@ from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.localiser import LocaliserOptions
 from skills.geometry import compose, inverse
 from skills.robot import (
+    BaseKind,
     CameraCapabilities,
     Capabilities,
     CommandId,
@@ -93,8 +94,9 @@ class PlanarRobot:
         seed: int = 0,
         azimuths: int = 900,
         cameras: bool = True,
+        base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL,
     ) -> None:
-        self.clock = clock
+        self.clock, self.base_kind = clock, base_kind
         self.boxes = list(boxes)
         self.pose = pose
         self.velocity = np.zeros(3)
@@ -116,7 +118,8 @@ class PlanarRobot:
     # ---- know and sense
 
     def capabilities(self) -> Capabilities:
-        return Capabilities(OUTLINE, 1.6, 2.0, BODY_HEIGHT_M, (0.4, 0.6), (-0.3, 0.3), None, None, self._cameras, "")
+        ranges = (BODY_HEIGHT_M, (0.4, 0.6), (-0.3, 0.3))
+        return Capabilities(OUTLINE, 1.6, 2.0, *ranges, None, None, self._cameras, "", self.base_kind)
 
     def gripper(self) -> Gripper:
         return Gripper(self.clock.now(), 0.0, 0.0, False)
@@ -160,6 +163,9 @@ class PlanarRobot:
         if lease.number != self._lease.number or self.refuse_because:
             reason = self.refuse_because or "the lease was taken away"
             self._commands[command] = CommandStatus(CommandState.REFUSED, reason)
+            return command
+        if vy != 0.0 and self.base_kind is BaseKind.DIFFERENTIAL:
+            self._commands[command] = CommandStatus(CommandState.REFUSED, "this base cannot go sideways")
             return command
         self._finish(CommandState.STOPPED, "replaced")
         self._commands[command] = CommandStatus(CommandState.RUNNING)
@@ -282,9 +288,11 @@ class Bench:
         cameras: bool = True,
         component: LocaliserComponent | None = None,
         told: bool = True,
+        base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL,
     ) -> None:
         self.clock = PlanarClock()
-        self.robot = PlanarRobot(self.clock, [*surveyed, *unmapped], start, seed=seed, cameras=cameras)
+        world = [*surveyed, *unmapped]
+        self.robot = PlanarRobot(self.clock, world, start, seed=seed, cameras=cameras, base_kind=base_kind)
         believed = (believed_start or start) if told else None
         self.localiser = (component or LocaliserOptions()).build(grid_of(surveyed, (0.7, 1.3)), believed, surely=told)
         self.costmap = LayeredCostmap(grid_of(surveyed, (0.05, 1.0)))

@@ -1,6 +1,7 @@
 """Every skill runs on a robot that is no Spot, with its suite."""
 
 import functools
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,11 @@ from executive.testing.skill_test import load_skill_tests
 from executive.testing.suite import PARTS, SuiteCase
 from executive.testing.trial import carry_out, scripted, scripted_maker
 from executive.tree.registry import built_in_skills
+from skills.robot import BaseKind
 from skills.testing.fault_kinds import STANDARD_FAULTS
 
 SKILLS = built_in_skills()
+DRIVING = ("navigate", "approach", "back_off", "place", "hand_over", "relocalise", "find_people")
 
 
 def well(name):
@@ -24,10 +27,21 @@ def well(name):
 
 @pytest.mark.parametrize("name", sorted(SKILLS))
 def test_what_goes_well_with_spot_goes_well_with_the_toy(name):
+    assert differences(name, TOY) == []
+
+
+@pytest.mark.parametrize("name", DRIVING)
+def test_and_with_one_that_cannot_go_sideways(name):
+    """The scripted robot refuses to go sideways then."""
+    assert differences(name, replace(TOY, base_kind=BaseKind.DIFFERENTIAL)) == []
+
+
+def differences(name, capabilities):
+    """What differs from the expected in the tests of a skill in which all goes well."""
     file, indices = well(name)
     assert indices
-    trials = [carry_out(file, n, SKILLS[name], {"scripted": scripted_maker(TOY)}) for n in indices]
-    assert [trial.report() for trial in trials if trial.differences] == []
+    trials = [carry_out(file, n, SKILLS[name], {"scripted": scripted_maker(capabilities)}) for n in indices]
+    return [trial.report() for trial in trials if trial.differences]
 
 
 @functools.cache

@@ -26,7 +26,8 @@ class Answer(ExplainedDecorator):
     answer False. Child FAILURE with a surface that could not be looked at: FAILURE with what kept the robot from it.
     `looks` names for each surface the leaves that look at it, one for each viewpoint: all of them must have looked,
     which means that they succeeded, or failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; one
-    that `tells` repeats what was seen where. `question` is what a yes says, `denied` what a no says.
+    that `tells` repeats what was seen where. `question` is what a yes says, `denied` what a no says; without
+    `yes_or_no` they stand alone, since "is it empty" and "is there anything on it" are one question.
 
     With `tallies` the child looks at all surfaces, and what its leaves saw, each under a blackboard key, is counted,
     each object once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
@@ -42,6 +43,7 @@ class Answer(ExplainedDecorator):
     tells: bool = False
     tallies: Mapping[str, str] = field(default_factory=dict)
     needed: int = 1
+    yes_or_no: bool = True
     answer: bool | None = field(default=None, init=False)
 
     def initialise(self) -> None:
@@ -77,7 +79,9 @@ class Answer(ExplainedDecorator):
 
     def _answered(self, answer: bool, found: str) -> Status:
         self.answer, self.cause = answer, None
-        told = f"yes: {self.question}" if answer else f"no: {self.denied}"
+        told = self.question if answer else self.denied
+        if self.yes_or_no:
+            told = f"{'yes' if answer else 'no'}: {told}"
         self.message = told + (f"; {found}" if found else "")
         self.board.put(self.key, answer)
         note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}

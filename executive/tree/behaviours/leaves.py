@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from py_trees.common import Status
 
-from executive.mission.geometry import distance_m
+from executive.mission.geometry import Point, distance_m, inside
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.explained import ExplainedLeaf
 from executive.tree.node import NodeKind
@@ -73,6 +73,8 @@ class Pause(ExplainedLeaf):
 class SurfacesNear(ExplainedLeaf):
     """Writes those of some surfaces to the blackboard that lie within `within_m` of the robot, the nearest first.
 
+    `rooms` has the outline of each surface's room by the surface's name. Where surfaces of the robot's own room are
+    near, others do not count: a wall hides them.
     SUCCESS when there are some. FAILURE with POSTCONDITION when there are none: `otherwise` says what that means.
     """
 
@@ -81,13 +83,15 @@ class SurfacesNear(ExplainedLeaf):
     key: str
     otherwise: str
     context: RunContext
+    rooms: Mapping[str, Sequence[Point]] = field(default_factory=dict)
 
     def update(self) -> Status:
         """Look which surfaces are near."""
         pose = self.context.pose()
         here = (pose.x_m, pose.y_m)
         near = sorted((distance_m(surface.polygon_W, here), k) for k, surface in enumerate(self.surfaces))
-        found = tuple(self.surfaces[k] for distance, k in near if distance <= self.within_m)
+        close = tuple(self.surfaces[k] for distance, k in near if distance <= self.within_m)
+        found = tuple(surface for surface in close if inside(self.rooms.get(surface.name, ()), here)) or close
         if found:
             self.context.board.put(self.key, found)
             self.cause, self.message = None, f"near here: {', '.join(surface.name for surface in found)}"

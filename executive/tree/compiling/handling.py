@@ -122,13 +122,15 @@ def unless_dropped(builder: PlanBuilder, item: Thing, carry: NodeSpec, guards: t
 
 def _pick_up_again_plan(builder: PlanBuilder, item: Thing) -> NodeSpec:
     below = builder.at("again")
+    facts = builder.knowledge
     near, key = f"{below.path_id}/surfaces", f"{below.path_id}/detection"
     floor = f"the {item} lies on the floor by now, probably, where it cannot be looked for"
     nearby = below.node(
         "surfaces near",
         "which surfaces are near?",
         part="surfaces-near",
-        surfaces=tuple(map(builder.surface, builder.knowledge.surfaces)),
+        surfaces=tuple(map(builder.surface, facts.surfaces)),
+        rooms={name: facts.places[surface.place].polygon for name, surface in facts.surfaces.items()},
         within_m=LOST_WITHIN_M,
         key=near,
         otherwise=floor,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Final
@@ -10,7 +11,7 @@ from executive.mission.command import Thing
 from executive.mission.errors import listing
 from executive.mission.geometry import inside
 from executive.mission.goal import surfaces_to_search
-from executive.mission.knowledge import Knowledge
+from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import FromBoard, SurfaceOfDetection, beside
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
 from executive.tree.node import NodeSpec
@@ -28,14 +29,21 @@ def surfaces_elsewhere(
     knowledge: Knowledge, thing: str, place: str | None, avoided: frozenset[str] = frozenset()
 ) -> tuple[str, ...]:
     """The surfaces to look at when the object is not in its place: where it usually is, then others of the same room,
-    then any others; `MOST_ELSEWHERE` at most, and none that are `avoided`."""
+    then any others, the nearest first; `MOST_ELSEWHERE` at most, and none that are `avoided`."""
     if place is None:
         return ()
     usual = (name for spot in knowledge.usual_surfaces(thing) for name in knowledge.surfaces_in(spot))
     near = knowledge.surfaces_in(knowledge.room(place))
     inside = knowledge.surfaces_in(place)
-    others = dict.fromkeys(name for name in (*usual, *near, *knowledge.surfaces) if name not in {*inside, *avoided})
+    here = knowledge.place_pose(place)
+    far = sorted(knowledge.surfaces, key=lambda name: _apart_m(here, knowledge.place_pose(name)))
+    others = dict.fromkeys(name for name in (*usual, *near, *far) if name not in {*inside, *avoided})
     return tuple(others)[:MOST_ELSEWHERE]
+
+
+def _apart_m(one: Pose, other: Pose) -> float:
+    """As the crow flies (m)."""
+    return math.hypot(one.x - other.x, one.y - other.y)
 
 
 def look_plans(

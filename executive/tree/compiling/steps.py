@@ -107,6 +107,7 @@ def find_plan(builder: PlanBuilder) -> NodeSpec:
         tells=place is None,
         tallies=MappingProxyType({leaf: tally_key(leaf) for own in leaves.values() for leaf in own if counting}),
         needed=max(1, command.object_count),
+        yes_or_no=what != ANYTHING,
     )
     return tidied(builder.at("tidy"), answer)
 

@@ -1,7 +1,7 @@
 "use strict";
 // Puts the page together: messages come from the server while a run is under way, or stand in the page itself.
 (() => {
-  const { Store, TreePanel, MapPanel, Header, StatePanel, StepsPanel, decisive, CameraPanel, ScenePanel, QuestionPanel, EventPanel, Timeline, ControlPanel, drawsSlowly, byId } = window.errand;
+  const { Store, TreePanel, MapPanel, Header, StatePanel, StepsPanel, decisive, CameraPanel, ScenePanel, QuestionPanel, EventPanel, Timeline, ControlPanel, TeleopPanel, drawsSlowly, byId } = window.errand;
   const recorded = byId("recorded") ? JSON.parse(byId("recorded").textContent) : null;
   const token = new URLSearchParams(location.search).get("token") || "";
   const store = new Store();
@@ -12,6 +12,7 @@
   }
 
   const control = new ControlPanel(token);
+  const teleop = new TeleopPanel(control);
   const header = new Header();
   const tree = new TreePanel(byId("tree"), {
     follow: byId("follow"),
@@ -57,6 +58,7 @@
     state.draw(view);
     header.draw(store, view, replaying);
     tree.draw(view); // it scrolls, so all else has its place before
+    teleop.draw(store.live.teleop, store.live.teleop_keys);
     control.draw(told, store.now.outcomes.length > 0);
     questions.draw(told ? [...told.questions, ...askedBack(told)] : [], store.end);
     measure();

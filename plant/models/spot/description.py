@@ -96,8 +96,8 @@ def _add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any], *,
     moments = {key: str(value) for key, value in part["inertia"].items()}
     ElementTree.SubElement(inertial, "inertia", {**moments, "ixy": "0", "ixz": "0", "iyz": "0"})
     shapes = list(_shapes(part))
-    for index, (shape, friction) in enumerate(shapes):
-        _add_collision(link, f"{name}_{index}", shape, friction)
+    for index, (shape, contact) in enumerate(shapes):
+        _add_collision(link, f"{name}_{index}", shape, contact)
     if visuals:
         for index, mesh in enumerate(part.get("visuals", ())):
             _add_mesh(link, f"{name}_visual_{index}", mesh)
@@ -107,17 +107,23 @@ def _add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any], *,
             ElementTree.SubElement(visual, "material", name="grey")
 
 
-def _shapes(part: Mapping[str, Any]) -> Iterable[tuple[Mapping[str, Any], float | None]]:
+def _shapes(part: Mapping[str, Any]) -> Iterable[tuple[Mapping[str, Any], Mapping[str, float]]]:
+    """Each collision shape of a link with its proximity properties."""
     for shape in part.get("collision", ()):
-        yield shape, None
+        yield shape, {}
     if "foot" in part:
         foot = part["foot"]
-        yield {"sphere": foot["radius"], "xyz": foot["xyz"]}, foot["friction"]
+        yield {"sphere": foot["radius"], "xyz": foot["xyz"]}, _friction(foot["friction"])
     if "pads" in part:
-        pads = part["pads"]
+        pads, facts = part["pads"], spot_facts()
+        contact = {**_friction(facts["pad_friction"]), "point_contact_stiffness": facts["pad_stiffness_n_m"]}
         for x, z in pads["xz"]:
             for y in pads["y"]:
-                yield {"sphere": pads["radius"], "xyz": [x, y, z]}, spot_facts()["pad_friction"]
+                yield {"sphere": pads["radius"], "xyz": [x, y, z]}, contact
+
+
+def _friction(coefficient: float) -> Mapping[str, float]:
+    return {"mu_dynamic": coefficient, "mu_static": coefficient}
 
 
 def _add_shape(element: ElementTree.Element, shape: Mapping[str, Any]) -> ElementTree.Element:
@@ -133,12 +139,14 @@ def _add_shape(element: ElementTree.Element, shape: Mapping[str, Any]) -> Elemen
     return element
 
 
-def _add_collision(link: ElementTree.Element, name: str, shape: Mapping[str, Any], friction: float | None) -> None:
+def _add_collision(
+    link: ElementTree.Element, name: str, shape: Mapping[str, Any], contact: Mapping[str, float]
+) -> None:
     collision = _add_shape(ElementTree.SubElement(link, "collision", name=name), shape)
-    if friction is not None:
+    if contact:
         properties = ElementTree.SubElement(collision, "drake:proximity_properties")
-        ElementTree.SubElement(properties, "drake:mu_dynamic", value=str(friction))
-        ElementTree.SubElement(properties, "drake:mu_static", value=str(friction))
+        for key, value in contact.items():
+            ElementTree.SubElement(properties, f"drake:{key}", value=str(value))
 
 
 def _add_mesh(link: ElementTree.Element, name: str, mesh: Mapping[str, str]) -> None:

@@ -13,14 +13,17 @@ from plant.pictures import save_png
 from plant.worlds.builder.furniture import Piece
 from plant.worlds.builder.maps import BANDS_M, Placement, pgm_bytes, rasterise, yaml_text
 from plant.worlds.builder.materials import materials, pictures
-from plant.worlds.builder.plan import PLANS, Placed, load_plan
+from plant.worlds.builder.plan import PLANS, Placed, Plan, load_plan
 from plant.worlds.builder.shell import shell_collisions, shell_mesh
-from plant.worlds.world import WORLDS_FOLDER
+from plant.worlds.world import PACKAGE_NAME, TRUTH, WORLDS_FOLDER
 
 
-def build(name: str, folder: Path) -> None:
-    """Write meshes, models, directives and maps into a world's folder. The same source gives the same bytes."""
-    palette, plan = materials(), load_plan(name)
+def build(plan: Plan, folder: Path, package: str, maps: str = TRUTH) -> None:
+    """Write meshes, models, directives and surveyed maps of a world. The same source gives the same bytes.
+
+    `package` is what its files call the folder, as in `errand/worlds/flat`; `maps` is the folder's of the grids.
+    """
+    palette = materials()
     shell = shell_mesh(plan, palette)
     _write_model(folder, Model("shell", "shell.obj", shell_collisions(plan), comment="floor and walls"), shell)
     shapes, meshes = [Placement(shape, 0.0, 0.0, 0.0) for shape in shell_collisions(plan)], [shell]
@@ -30,12 +33,12 @@ def build(name: str, folder: Path) -> None:
         shapes += [Placement(shape, *placed.at, placed.yaw_rad) for shape in piece.collisions]
         meshes.append(piece.mesh)
     _write_pictures(folder / "furniture", meshes)
-    write_text(folder / "world.dmd.yaml", _directives(name, plan.furniture))
-    (folder / "map").mkdir(parents=True, exist_ok=True)
+    write_text(folder / "world.dmd.yaml", _directives(package, plan.furniture))
+    (folder / maps).mkdir(parents=True, exist_ok=True)
     for kind, band in BANDS_M.items():
         grid = rasterise(shapes, band, plan.outline_m)
-        (folder / "map" / f"{kind}.pgm").write_bytes(pgm_bytes(grid))
-        write_text(folder / "map" / f"{kind}.yaml", yaml_text(grid, f"{kind}.pgm", band))
+        (folder / maps / f"{kind}.pgm").write_bytes(pgm_bytes(grid))
+        write_text(folder / maps / f"{kind}.yaml", yaml_text(grid, f"{kind}.pgm", band))
 
 
 def _write_pictures(folder: Path, meshes: Iterable[Mesh]) -> None:
@@ -54,8 +57,8 @@ def _write_model(folder: Path, model: Model, mesh: Mesh) -> None:
     write_text(base.with_suffix(".mtl"), mtl_text(mesh, "palette.png"))
 
 
-def _directives(world: str, pieces: Mapping[str, Placed]) -> str:
-    folder = f"package://errand/worlds/{world}/furniture"
+def _directives(package: str, pieces: Mapping[str, Placed]) -> str:
+    folder = f"package://{package}/furniture"
     welds = [_weld(folder, "shell", 0.0, 0.0, 0.0), *(_weld(folder, k, *p.at, p.yaw_rad) for k, p in pieces.items())]
     return "# Made by `python -m plant.worlds.builder`, don't edit.\ndirectives:\n" + "".join(welds)
 
@@ -75,4 +78,4 @@ def _weld(folder: str, name: str, x: float, y: float, yaw_rad: float) -> str:
 
 if __name__ == "__main__":
     for world in sys.argv[1:] or PLANS:
-        build(world, WORLDS_FOLDER / world)
+        build(load_plan(world), WORLDS_FOLDER / world, f"{PACKAGE_NAME}/worlds/{world}")

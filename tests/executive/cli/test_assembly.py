@@ -42,7 +42,7 @@ def test_a_model_that_cannot_be_used_is_named_before_anything_moves(tmp_path, co
 
 def test_an_unknown_start_is_free_ground_that_the_seed_chooses():
     world = load_world("flat")
-    keepout = load_grid_map(world.keepout_map_path).with_unknown_blocked()
+    keepout = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     poses = [stand_at(world, Start(), seed) for seed in range(20)]
     assert poses[3] == stand_at(world, Start(), 3)
     assert len(set(poses)) == 20

@@ -133,3 +133,17 @@ def test_the_only_person_of_a_world_is_looked_for(parser, knowledge, sentence, p
     alone = knowledge.model_copy(update={"people": {"Robin": knowledge.people["Robin"]}})
     answer = understand(sentence, parser=parser, knowledge=alone, require_wake=False)
     assert [str(command) for command in answer.commands] == [f"Take [Nothing] to [{place}] and do [find] to [Robin]"]
+
+
+def test_what_is_needed_where_nothing_lies_is_brought_there(told):
+    answer = told("I need the hammer in the hall")
+    assert [str(command) for command in answer.commands] == [
+        "Take [Nothing] to [workshop] and do [grasp] to [hammer]",
+        "Take [hammer] to [hall] and do [Nothing] to [Nothing]",
+    ]
+    assert answer.notes == ("I bring it to the hall: nothing can be taken from there",)
+
+
+@pytest.mark.parametrize("sentence", ["bring me the hammer from the hall", "I need the hammer in the kitchen"])
+def test_what_is_to_come_from_a_room_is_looked_for_there(told, sentence):
+    assert str(told(sentence).commands[1].goal) == "start"

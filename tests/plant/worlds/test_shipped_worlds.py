@@ -18,7 +18,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from plant.worlds.builder.__main__ import build
 from plant.worlds.builder.plan import PLANS, load_plan
 from plant.worlds.placement import place_objects, place_people
-from plant.worlds.world import World, add_package, known_worlds, load_world
+from plant.worlds.world import PACKAGE_NAME, World, add_package, known_worlds, load_world
 
 FOOTPRINT_M = (1.1, 0.6)  # the standing outline of 1.0 by 0.5 with 5 cm around
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
@@ -50,7 +50,7 @@ def knowledge(world: World) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def keepout(world: World) -> Map:
-    return Map(world.keepout_map_path)
+    return Map(world.surveyed.keepout_map_path)
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +125,7 @@ def test_every_room_has_a_free_circle_to_turn_in(knowledge: dict[str, Any], keep
     ],
 )
 def test_every_door_is_as_wide_as_planned_and_free_on_both_sides(name: str, door: Any) -> None:
-    keepout, width = Map(load_world(name).keepout_map_path), load_plan(name).width_m(door)
+    keepout, width = Map(load_world(name).surveyed.keepout_map_path), load_plan(name).width_m(door)
     across = np.array([0.0, 1.0]) if door.along_x else np.array([1.0, 0.0])
     along = across[::-1]
     middle = np.array([door.x, door.y])
@@ -191,7 +191,7 @@ def test_surfaces_are_solid_and_flat_at_their_heights(
 
 @pytest.mark.parametrize("name", ["scan", "keepout"])
 def test_maps_agree_with_the_collision_shapes(name: str, world: World, furnished: tuple[Diagram, Context]) -> None:
-    grid, query_object = Map(world.folder / "map" / f"{name}.yaml"), query(*furnished)
+    grid, query_object = Map(world.folder / "truth" / f"{name}.yaml"), query(*furnished)
     moving = [p.X_WO.translation()[:2] for p in (*place_objects(world, 1), *place_people(world, 1))]
     rng, (z0, z1) = np.random.default_rng(5), grid.header["height_band_m"]
     occupied = 0
@@ -221,7 +221,7 @@ def test_outside_of_the_walls_is_unknown(world: World, keepout: Map) -> None:
 def test_the_coffee_table_is_for_the_body_and_not_for_the_lidar(world: World, keepout: Map) -> None:
     middle = np.mean(world.surfaces["coffee table"].polygon_W, axis=0)
     assert keepout.at(middle) == OCCUPIED
-    assert Map(world.scan_map_path).at(middle) == FREE
+    assert Map(world.surveyed.scan_map_path).at(middle) == FREE
 
 
 def test_people_and_things_are_not_surveyed(world: World, keepout: Map) -> None:
@@ -251,7 +251,7 @@ def test_things_stay_where_the_seed_put_them(world: World, furnished: tuple[Diag
 
 
 def test_committed_world_is_what_the_builder_writes(world: World, tmp_path: Path) -> None:
-    build(world.name, tmp_path)
+    build(load_plan(world.name), tmp_path, f"{PACKAGE_NAME}/worlds/{world.name}")
     written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl", ".yaml", ".pgm")]
     assert len(written) > 3 * len(load_plan(world.name).furniture)
     for path in written:

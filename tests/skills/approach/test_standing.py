@@ -11,6 +11,7 @@ from skills.api import ObjectObservation, Thing
 from skills.approach.skill import grasp_cost, observed_target
 from skills.approach.standing import free_places, is_comfortable, reachable
 from skills.grasp.planning import GeometricGraspPlanner
+from skills.navigate.footprint import Footprint
 from skills.robot import Pose2D
 
 CAN = ObjectObservation(0.0, Thing("coke"), (2.15, 0.0, 0.807), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
@@ -28,7 +29,7 @@ class _Table:
 
 
 def _poses(reach_cost=lambda pose: 0.0):
-    return reachable(free_places((2.15, 0.0), Pose2D(0.5, 0.3, 0.0), _Table(), CAPABILITIES), reach_cost)
+    return reachable(free_places((2.15, 0.0), Pose2D(0.5, 0.3, 0.0), _Table(), Footprint.of(CAPABILITIES)), reach_cost)
 
 
 def test_the_body_keeps_off_the_table_and_faces_the_thing():

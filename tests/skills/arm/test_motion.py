@@ -34,6 +34,15 @@ def _wall_ahead():
     return Box(RigidTransform([0.85, 0.0, 0.35]), (0.7, 0.1, 0.9))
 
 
+def test_other_boxes_stand_around_for_a_while_only(scene):
+    scene.set_boxes([_wall_ahead()])
+    ahead = np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0])
+    blocked = scene.free(ahead)
+    with scene.with_only((), 0.5):
+        assert scene.free(ahead)
+    assert (blocked, scene.free(ahead)) == (False, False)
+
+
 def test_the_stowed_arm_is_free(scene):
     assert scene.free(MODEL.stowed_rad)
 
@@ -122,3 +131,14 @@ def test_timing_takes_about_as_long_as_the_acceleration_needs(way_rad):
     trajectory = PLANNER.timed(np.array([LEFT, LEFT + way_rad * np.eye(6)[1]]), speed_rad_s=10.0)
     shortest_s = 2.0 * np.sqrt(way_rad / 3.0)
     assert 0.8 * shortest_s < trajectory.times_s[-1] < 2.5 * shortest_s + 0.1
+
+
+def test_a_start_in_contact_is_left_without_touching_anything_else(scene):
+    # A box reaches 1 cm into the hand; the way leads out of it and on to the other side.
+    hand = MODEL.X_BH(LEFT).translation()
+    scene.set_boxes([Box(RigidTransform(hand + [0.0, 0.0, -0.13]), (0.1, 0.1, 0.2))])
+    assert not scene.free(LEFT)
+    path = PLANNER.path(scene, LEFT, RIGHT, np.random.default_rng(3))
+    touched = {pair for q in np.linspace(path[0], path[1], 8) for pair in scene.contacts(q)}
+    assert scene.free(path[1])
+    assert touched <= set(scene.contacts(LEFT))

@@ -7,7 +7,7 @@ from planar_robot import TWO_ROOMS, Bench, Box
 
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.back_off.skill import BackOff, BackOffInputs
-from skills.robot import Pose2D
+from skills.robot import BaseKind, Pose2D
 
 IN_THE_OPEN = Pose2D(3.0, 5.5, 0.0)
 
@@ -43,6 +43,13 @@ def test_with_a_wall_behind_it_goes_another_way():
     assert isinstance(outcome(bench), Succeeded)
     assert gone(bench, start) > 0.3
     assert bench.robot.least_clearance_m > 0.02
+
+
+def test_a_base_that_cannot_go_sideways_goes_ahead_then():
+    start = Pose2D(0.75, 5.5, 0.0)
+    bench = Bench(start, base_kind=BaseKind.DIFFERENTIAL)
+    assert isinstance(outcome(bench), Succeeded)
+    assert bench.robot.pose.x_m == pytest.approx(start.x_m + 0.4, abs=0.05)
 
 
 def test_what_is_seen_behind_counts_too():

@@ -47,6 +47,34 @@ def test_after_a_failure_the_body_stands_at_its_usual_height():
     assert robot.height_m == 0.52
 
 
+class Heavy(Grasp):
+    """Has lifted something of a mass."""
+
+    def __init__(self, context, mass_kg):
+        super().__init__(context)
+        self._mass_kg = mass_kg
+
+    def run(self, inputs):
+        yield from self._refuse_heavy(self._mass_kg, np.array([0.0, 0.0, 0.1]), str(inputs.observation.thing))
+        return Succeeded("lifted")
+
+
+def test_what_weighs_more_than_the_arm_carries_is_set_down_and_refused_with_its_mass():
+    robot = ScriptedRobot(q=np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0]), holding=True, opening_rad=0.3)
+    before = MODEL.X_BH(robot.q).translation()
+    why = "the coke weighs 5.6 kg, and the arm carries 5.0 kg at most"
+    failed(Heavy(context_of(robot), 5.6), SEEN, Cause.PRECONDITION, why)
+    assert (MODEL.X_BH(robot.q).translation() - before)[2] < -0.09
+
+
+def test_what_the_arm_carries_is_not_set_down():
+    robot = ScriptedRobot(holding=True, opening_rad=0.3)
+    skill = Heavy(context_of(robot), 4.9)
+    skill.begin(SEEN)
+    assert isinstance(skill.step(), Succeeded)
+    assert robot.arm_commands == []
+
+
 def resumed(skill, inputs):
     """Go on to the end of a skill that a restart broke off."""
     skill.resume(inputs)

@@ -1,6 +1,7 @@
 import math
 
 import numpy as np
+import pytest
 
 from skills.mapping.keyframe import Keyframe
 from skills.mapping.occupancy import LayeredOccupancy
@@ -65,8 +66,45 @@ def test_a_beam_over_a_low_box_leaves_it_occupied():
     passing[above] = over[above]
     for _ in range(20):
         grid.insert(frame(passing), Pose2D(0.0, 0.0, 0.0))
-    assert at(grid, "keepout", 2.025, 0.0)[0] > 0.6
+    assert most(grid, "keepout", 2.025, 0.0) > 0.6
     assert at(grid, "scan", 2.025, 0.0)[0] < 0.1
+
+
+def under_table(away_m: float, *, top_m: float = 0.85, thick_m: float = 0.03) -> np.ndarray:
+    """Ranges past a table 0.8 m deep, so far away all around, to the wall and floor behind it; it has no legs."""
+    ranges = round_wall(6.0)
+    for ring, elevation in enumerate(ELEVATIONS):
+        slope = math.tan(elevation)
+        if top_m - thick_m < HEIGHT_M + away_m * slope < top_m:
+            ranges[ring] = away_m / math.cos(elevation)
+        elif slope < 0.0 and away_m < (top_m - HEIGHT_M) / slope < away_m + 0.8:
+            ranges[ring] = (top_m - HEIGHT_M) / math.sin(elevation)
+    return ranges
+
+
+@pytest.mark.parametrize(("layer_m", "found"), [(0.05, False), (0.025, True)])
+def test_a_thin_table_top_is_found_in_layers_no_higher_than_it_is_thick(layer_m, found):
+    grid = LayeredOccupancy(0.025, layer_m=layer_m)
+    for away_m in np.arange(2.2, 5.0, 0.05):
+        grid.insert(frame(under_table(away_m)), Pose2D(5.0 - away_m, 0.0, 0.0))
+    middle = [at(grid, "keepout", x, 0.0)[0] for x in np.arange(5.15, 5.65, 0.025)]
+    assert (max(middle) > 0.65) == found
+
+
+def test_the_noise_of_ranges_does_not_thicken_a_wall():
+    grid, noise = LayeredOccupancy(0.025), np.random.default_rng(1)
+    for turn in range(60):
+        ranges = round_wall() + noise.normal(0.0, 0.03, (len(ELEVATIONS), len(AZIMUTHS)))
+        grid.insert(frame(ranges), Pose2D(0.0, 0.0, 0.003 * turn))
+    raw = (grid.values >= 4).any(axis=0)
+    assert before_the_wall(grid, grid.probability("keepout")[0] > 0.65) < 0.5 * before_the_wall(grid, raw)
+
+
+def before_the_wall(grid: LayeredOccupancy, cells: np.ndarray) -> int:
+    """How many of the cells lie more than 3 cm before the round wall."""
+    rows, columns = np.nonzero(cells)
+    away = np.hypot((columns + 0.5) * 0.025 + grid.origin_m[0], (rows + 0.5) * 0.025 + grid.origin_m[1])
+    return int(np.sum(away < 2.97))
 
 
 def test_no_return_tells_nothing():

@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planar_robot import TWO_ROOMS, PlanarClock, PlanarRobot
+from planar_robot import TWO_ROOMS, Box, PlanarClock, PlanarRobot
 
 from skills.estimate.grid_map import load_grid_map
 from skills.geometry import relative
@@ -16,17 +16,34 @@ from skills.testing.blocks import grid_of
 pytest.importorskip("gtsam")
 
 START = Pose2D(1.5, 5.4, 0.0)
+SIDE_ROOM = (
+    Box(-0.1, -0.1, 6.1, 0.0),
+    Box(-0.1, 3.0, 6.1, 3.1),
+    Box(-0.1, 0.0, 0.0, 3.0),
+    Box(6.0, 0.0, 6.1, 3.0),
+    Box(3.3, 0.0, 3.4, 1.9),
+    Box(3.3, 2.8, 3.4, 3.0),
+)
+"""A room and another beside it, through a door of 0.9 m in a corner."""
 
 
 class Trip:
     """A robot among boxes that makes a map."""
 
-    def __init__(self, *, mapper: Mapper | None = None, route=None, pose: Pose2D = START) -> None:
+    def __init__(
+        self,
+        *,
+        mapper: Mapper | None = None,
+        route=None,
+        pose: Pose2D = START,
+        home: Pose2D | None = None,
+        boxes=TWO_ROOMS,
+    ) -> None:
         self.clock = PlanarClock()
-        self.robot = PlanarRobot(self.clock, TWO_ROOMS, pose, azimuths=450, cameras=False)
-        self.mapper = mapper or Mapper(START)
+        self.robot = PlanarRobot(self.clock, boxes, pose, azimuths=450, cameras=False)
+        self.mapper = mapper or Mapper(pose)
         lease = self.robot.acquire_lease("test")
-        self.survey = Survey(self.robot, lease, self.mapper, home=START, route=route)
+        self.survey = Survey(self.robot, lease, self.mapper, home=home or pose, route=route)
 
     def go_on(self, most_s: float) -> None:
         end_s = self.clock.now() + most_s
@@ -42,7 +59,7 @@ class Trip:
 @pytest.fixture(scope="module")
 def explored(tmp_path_factory) -> tuple[Trip, object]:
     trip = Trip()
-    trip.go_on(240.0)
+    trip.go_on(300.0)
     folder = tmp_path_factory.mktemp("map")
     save_graph(folder, trip.mapper)
     save_grids(folder, surveyed(trip.mapper))
@@ -100,6 +117,43 @@ def test_a_route_is_driven_and_what_cannot_be_reached_is_told():
     assert trip.survey.done
     assert [note for note in trip.survey.notes if "(4.2, 3.0)" in note]
     assert trip.mapper.way_m > 4.0
+
+
+def test_frontiers_that_were_given_up_are_tried_once_more_from_home():
+    trip, drive, first = Trip(pose=Pose2D(1.0, 1.0, 0.0), boxes=SIDE_ROOM), PlanarRobot.drive, True
+
+    def held(vx, vy, wz, *, until_s, lease):
+        """Something keeps the robot from the side room until it has been home."""
+        nonlocal first
+        purpose, pose = trip.survey.goal
+        first = first and purpose != "the start"
+        speed = 0.0 if first and pose.x_m > 2.5 else 1.0
+        return drive(trip.robot, speed * vx, speed * vy, speed * wz, until_s=until_s, lease=lease)
+
+    trip.robot.drive = held
+    while first and trip.clock.now() < 200.0:
+        trip.go_on(1.0)
+    assert not first and not trip.survey.done
+    assert side_room_seen(trip) < 0.9
+    trip.go_on(200.0)
+    assert trip.survey.done and trip.survey.trouble is None
+    assert side_room_seen(trip) > 0.97
+
+
+def side_room_seen(trip: Trip) -> float:
+    """The share of the side room's free ground that is free on the map."""
+    true, (made, _) = grid_of(SIDE_ROOM, (0.05, 1.0)), trip.survey.known()
+    free = true.centres(np.argwhere(true.distance > 0.3))
+    free = free[(free > [3.4, 0.0]).all(axis=1) & (free < [6.0, 3.0]).all(axis=1)]
+    rows, columns = made.cells(free).T
+    return float(np.mean(~(made.occupied | made.unknown)[rows, columns]))
+
+
+def test_a_survey_that_does_not_get_home_says_so():
+    trip = Trip(route=[(2.0, 5.4)], home=Pose2D(30.0, 5.4, 0.0))
+    trip.go_on(30.0)
+    assert trip.survey.done
+    assert "nor back to the start" in trip.survey.trouble
 
 
 @pytest.mark.parametrize("fault", ["blank", "frozen", "gone"])

@@ -9,7 +9,7 @@ from skills.api import Cause, Failed, Running, Step, Succeeded
 from skills.estimate.dead_reckoning import DeadReckoning
 from skills.estimate.rolling_costmap import RollingCostmap
 from skills.navigate.skill import Navigate, NavigateInputs, NavigateOptions
-from skills.robot import Pose2D
+from skills.robot import BaseKind, Pose2D
 
 PILLAR = Box(6.2, 5.3, 6.4, 5.6, 0.0, 1.7)
 START, CORRIDOR, OTHER_ROOM = Pose2D(1.5, 2.0, 0.0), Pose2D(1.2, 5.5, math.pi), Pose2D(8.5, 2.0, -1.57)
@@ -53,6 +53,15 @@ def test_goes_through_two_doors_without_touching_and_stands_at_the_goal():
     assert np.abs(bench.robot.velocity).max() < 0.05
     assert bench.robot.least_clearance_m > 0.06
     assert not bench.robot.driving
+
+
+def test_a_base_that_cannot_go_sideways_gets_there_by_the_same_skill():
+    bench = Bench(START, base_kind=BaseKind.DIFFERENTIAL)
+    step, _ = go(bench, OTHER_ROOM)
+    assert isinstance(step, Succeeded), step.message
+    distance_m, yaw_rad = off_goal(bench, OTHER_ROOM)
+    assert distance_m < 0.10 and yaw_rad < 0.10
+    assert bench.robot.least_clearance_m > 0.04
 
 
 def test_takes_about_the_time_that_the_way_needs():

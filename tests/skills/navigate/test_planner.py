@@ -119,7 +119,7 @@ def test_all_pairs_of_places_of_the_flat_can_be_planned():
     flat = Path(plant.__file__).parent / "worlds" / "flat"
     knowledge = yaml.safe_load((flat / "knowledge.yaml").read_text())
     poses = [Pose2D(*(place["pose"][key] for key in ("x", "y", "yaw"))) for place in knowledge["places"].values()]
-    costmap = LayeredCostmap(load_grid_map(flat / "map" / "keepout.yaml"))
+    costmap = LayeredCostmap(load_grid_map(flat / "truth" / "keepout.yaml"))
     assert (footprint_clearance_m(costmap, FOOTPRINT, pose_array(poses)) > 0.1).all()
     for start, goal in zip(poses, poses[1:] + poses[:1], strict=True):
         path = plan_path(costmap, FOOTPRINT, start, goal)

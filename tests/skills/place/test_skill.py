@@ -1,11 +1,20 @@
 """What the place skill does when it cannot put the thing down."""
 
 import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RotationMatrix
 from scripted_robot import ScriptedRobot, context_of, failed
 
+from plant.spot.capabilities import spot_capabilities
 from skills.api import Cause, Failed, Running, Surface
-from skills.place.skill import Place, PlaceInputs
+from skills.arm.collision import ArmScene, Box
+from skills.arm.kinematics import arm_model
+from skills.arm.motion import RrtConnect
+from skills.place.skill import HeldObject, Place, PlaceInputs, Release, above_goal
 
+MODEL = arm_model(spot_capabilities())
+LEVEL_FORWARD = RotationMatrix.MakeXRotation(np.pi / 2)
+"""A hand that points ahead and closes level, as after a grasp from the side."""
 TABLE = Surface("kitchen table", ((0.75, -0.5), (1.3, -0.5), (1.3, 0.5), (0.75, 0.5)), 0.7)
 CARRYING = np.array([0.0, -3.0, 2.85, 0.0, 0.1, 1.57])
 
@@ -56,3 +65,30 @@ def test_a_thing_still_held_after_a_restart_is_put_down_as_it_was_brought():
 def test_what_is_still_in_the_gripper_is_not_put_down():
     robot = ScriptedRobot(holding=True)
     assert Place(context_of(robot)).undone(PlaceInputs(TABLE)) is not None
+
+
+def test_a_held_object_reaches_below_the_hand_as_far_as_its_lowest_corner():
+    bottle_H = np.array([[0.15, -0.14, -0.03], [0.22, 0.08, 0.03]])
+    held = HeldObject(LEVEL_FORWARD, bottle_H)  # the hand's y axis points up
+    assert held.drop_m(LEVEL_FORWARD) == pytest.approx(0.14)
+    assert [held.drop_m(each) for each in held.rotations(0.7)] == pytest.approx([0.14] * 3)
+    assert held.p_HO == pytest.approx([0.185, -0.03, 0.0])
+
+
+def test_what_was_taken_from_above_is_put_down_with_the_fingers_down_whatever_way_they_are_turned():
+    down = RotationMatrix.MakeYRotation(np.pi / 2)
+    turned = HeldObject(down, np.zeros((2, 3))).rotations(0.3)
+    assert len(turned) == 8
+    assert [each.matrix()[2, 0] for each in turned] == pytest.approx([-1.0] * 8)
+
+
+# What stands beside the first of two spots (m to its side) -> the spot that is taken
+@pytest.mark.parametrize(("beside_m", "taken"), [(None, 0), (0.35, 0), (0.12, 1), (-0.12, 1)])
+def test_a_spot_is_left_out_where_the_open_hand_would_touch_a_tall_thing_beside_it(beside_m, taken):
+    spots_B = [np.array([0.85, y, 0.02]) for y in (0.0, -0.5)]
+    beside = [] if beside_m is None else [Box(RigidTransform([0.8, beside_m, 0.2]), (0.1, 0.1, 0.3))]
+    scene = ArmScene(spot_capabilities(), MODEL, {})
+    can_H = np.array([[0.15, -0.05, -0.03], [0.22, 0.06, 0.03]])
+    goal = above_goal(spots_B, HeldObject(LEVEL_FORWARD, can_H), RrtConnect(), Release(beside, 0.7))
+    above = MODEL.X_BH(goal(scene, CARRYING)).translation()
+    assert int(np.argmin([abs(above[1] - spot[1]) for spot in spots_B])) == taken

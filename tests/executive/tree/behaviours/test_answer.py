@@ -21,7 +21,7 @@ class Look(Explained, py_trees.behaviour.Behaviour):
         return Status.SUCCESS if self.fails_with is None else Status.FAILURE
 
 
-def answer_of(context, *causes: Cause | None, tells: bool = False) -> Answer:
+def answer_of(context, *causes: Cause | None, tells: bool = False, yes_or_no: bool = True) -> Answer:
     looks = [Look(f"alice/q/{n}", cause) for n, cause in enumerate(causes)]
     root = Answer(
         path_id="alice/q",
@@ -34,6 +34,7 @@ def answer_of(context, *causes: Cause | None, tells: bool = False) -> Answer:
         board=context.board,
         publish=context.publish,
         tells=tells,
+        yes_or_no=yes_or_no,
     )
     root.tick_once()
     return root
@@ -50,6 +51,11 @@ def test_an_answer_may_tell_what_was_seen(context):
     assert root.message == "yes: hammer in the workshop; None"
     unseen = answer_of(context, *[Cause.POSTCONDITION] * 3, tells=True)
     assert unseen.message == "no: hammer in the workshop"
+
+
+def test_an_answer_may_do_without_yes_and_no(context):
+    assert answer_of(context, None, yes_or_no=False).message == "hammer in the workshop"
+    assert answer_of(context, *[Cause.POSTCONDITION] * 3, yes_or_no=False).message == "hammer in the workshop"
 
 
 def test_an_answer_is_published_and_a_missed_view_is_none(context, published):

@@ -1,6 +1,7 @@
 """The small leaves and the blackboard."""
 
 import math
+from types import MappingProxyType
 
 import pytest
 from py_trees.common import Status
@@ -40,14 +41,14 @@ def test_a_pause_lasts_on_the_robots_clock(context, clock):
     assert said == [Status.RUNNING, Status.RUNNING, Status.SUCCESS]
 
 
-def near_plan(context, within_m):
+def near_plan(context, within_m, rooms=MappingProxyType({})):
     tops = [
         Surface("far", ((3.0, 0.0), (4.0, 0.0), (4.0, 1.0)), 0.9),
         Surface("near", ((1.0, -1.0), (2.0, 0.0), (1.0, 1.0)), 0.9),
     ]
     return SurfacesNear(
         path_id="alice/n", name="n", surfaces=tops, within_m=within_m, key="alice/near", otherwise="so what",
-        context=context,
+        context=context, rooms=rooms,
     )  # fmt: skip
 
 
@@ -56,6 +57,14 @@ def test_surfaces_near_are_written_the_nearest_first(context, within_m, names):
     leaf = near_plan(context, within_m)
     leaf.tick_once()
     assert leaf.status == Status.SUCCESS
+    assert [surface.name for surface in context.board.get("alice/near")] == names
+
+
+@pytest.mark.parametrize(("here", "names"), [("far", ["far"]), ("neither", ["near", "far"])])
+def test_of_a_room_with_the_robot_only_its_surfaces_are_near(context, here, names):
+    around, away = ((-1.0, -1.0), (1.0, -1.0), (0.0, 1.0)), ((8.0, 8.0), (9.0, 8.0), (9.0, 9.0))
+    leaf = near_plan(context, 5.0, {name: around if name == here else away for name in ("near", "far")})
+    leaf.tick_once()
     assert [surface.name for surface in context.board.get("alice/near")] == names
 
 

@@ -1,7 +1,10 @@
 """Recovery in compiled trees, with scripted skills that fail as told: chosen by cause, bounded, nothing leaks."""
 
+from pathlib import Path
+
 import pytest
 
+from executive.mission.knowledge import load_knowledge
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings
 from executive.tree.compiling.search import surfaces_elsewhere
@@ -98,6 +101,11 @@ def test_places_elsewhere_are_few_and_the_usual_ones_first(knowledge):
     assert surfaces_elsewhere(knowledge, "coke", "bedroom") == ("counter", "shelf")
     assert surfaces_elsewhere(knowledge, "coke", "shelf") == ("counter", "bedside table")
     assert surfaces_elsewhere(knowledge, "coke", None) == ()
+
+
+def test_places_elsewhere_are_the_nearest_ones_where_none_is_usual():
+    knowledge = load_knowledge(Path(__file__).parents[4] / "plant" / "worlds" / "lab" / "knowledge.yaml")
+    assert surfaces_elsewhere(knowledge, "cube", "workshop") == ("kitchen table", "lab bench", "kitchen counter")
 
 
 def test_in_a_good_run_no_node_fails(compiled, run_tree, make, published):

@@ -1,0 +1,172 @@
+"""`errand teleop`: body and arm driven by hand, from the terminal's keys and from the live page."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+from executive.cli.assembly import simulate, stand_at
+from executive.cli.backend import Scene
+from executive.cli.keys import keys_pressed
+from executive.cli.output import console_for, refusals
+from executive.cli.page_view import scene_actions
+from executive.cli.replay_command import served
+from executive.cli.run_options import START
+from executive.cli.saved_pose import save_pose
+from executive.cli.worlds import open_world, refuse_blocked
+from executive.mission.errors import InputError
+from executive.mission.request import Start
+from executive.run.worker import LockStepWorker
+from executive.view.actions import Action, RefusedError
+from executive.view.feed import Feed
+from executive.view.server import PageContent
+from plant.worlds.world import World
+from skills.api import SkillContext
+from skills.estimate.grid_map import MapError, load_grid_map
+from skills.robot import Clock, LeaseError, Pose2D, Robot
+from skills.stack import default_stack
+from skills.teleop.driver import Teleop, TeleopOptions
+from skills.teleop.keys import KEYS, asked_by, read_asked
+
+HOLDER: Final = "teleop"
+SAVE_KEY: Final = "p"
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")
+_HELP: Final = """w s a d q e  drive, turn, sideways       i k j l u o  hand ahead, left, up (body frame)
+r f t g y h  hand about its axes         1-6 / Q W E R T Y  arm joints
+v c  open, close    + - < >  height, tilt    p  save the pose    space  stop    Ctrl-C  end"""
+
+
+def teleop(
+    world: Annotated[str, typer.Option("--world", help="A world by name or folder.")] = "flat",
+    robot: Annotated[str, typer.Option("--robot", help="The robot's name.")] = "Alice",
+    start: START = None,
+    seed: Annotated[int, typer.Option(min=0, help="Sets the objects and the sensors' noise.")] = 1,
+    poses: Annotated[Path, typer.Option("--poses", help="Folder of the poses that are saved.")] = Path("poses"),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Serve the page here; 0 takes a free port.")] = 0,
+    limit: Annotated[
+        float | None, typer.Option("--for", min=0.0, help="End after so many seconds on the robot's clock.")
+    ] = None,
+) -> None:
+    """Drive a robot's body and arm by hand. It stops when keys stop coming, and keeps the skills' limits."""
+    with refusals(), ExitStack() as stack:
+        if not _NAME.fullmatch(robot):
+            raise InputError(f"'{robot[:60]}' is no name for a robot", hint="use letters and digits, as in Alice")
+        opened = open_world(world)
+        pose = None if start is None else stand_at(opened, Start.of(start), seed)
+        if pose is not None:
+            refuse_blocked(opened, pose)
+        simulation = simulate(opened, seed=seed, robot_name=robot, record=False, start=pose)
+        driven, clock = simulation.robots[robot], simulation.clock
+        context = context_for(opened, driven, clock, simulation.start)
+        stack.callback(driven.return_lease, context.lease)
+        hands = Teleop(context)
+        saving = _saving(hands, poses, opened.name)
+        feed, scene = Feed(), simulation.show_live()
+        server = stack.enter_context(served(PageContent(feed, page_actions(hands, saving, scene), scene.url), port))
+        console = console_for(False)
+        stack.enter_context(keys_pressed(TerminalKeys(hands, saving, console.print)))
+        console.print(f"The page: {server.url}\n{_HELP}", markup=False)
+        feed.tell("teleop_keys", {key: axis for key, (axis, _) in KEYS.items()})
+        try:
+            drive(hands, context, limit, lambda: feed.tell("teleop", _told(hands)))
+        except KeyboardInterrupt:
+            return
+
+
+def context_for(world: World, robot: Robot, clock: Clock, start: Pose2D) -> SkillContext:
+    """The robot with a localiser, a costmap and the lease. Raises InputError: another has the lease, or no map."""
+    components = default_stack()
+    try:
+        scan_map, keepout_map = load_grid_map(world.scan_map_path), load_grid_map(world.keepout_map_path)
+        localiser = components.localiser.build(scan_map, start, surely=True)
+        lease = robot.acquire_lease(HOLDER)
+    except (MapError, OSError, LeaseError) as error:
+        raise InputError(str(error)) from error
+    return SkillContext(
+        robot=robot,
+        lease=lease,
+        clock=clock,
+        worker=LockStepWorker(clock),
+        localiser=localiser,
+        costmap=components.costmap.build(keepout_map),
+        publish=lambda topic, message: None,
+        seed=0,
+        stack=components,
+    )
+
+
+def drive(hands: Teleop, context: SkillContext, limit_s: float | None, told: Callable[[], None]) -> None:
+    """Do what is asked until the limit (s, on the robot's clock), never faster than the wall's clock."""
+    begun_s = context.clock.now()
+    due_s = time.monotonic()
+    while limit_s is None or context.clock.now() - begun_s < limit_s:
+        period(hands, context)
+        told()
+        due_s = max(due_s + TeleopOptions().period_s, time.monotonic())
+        threading.Event().wait(due_s - time.monotonic())
+
+
+def period(hands: Teleop, context: SkillContext) -> None:
+    """Estimate where the robot is, send the commands of one period, and let it pass."""
+    context.localiser.update(context.robot)
+    context.costmap.update(context.robot, context.localiser.estimate())
+    hands.tick()
+    context.clock.advance(TeleopOptions().period_s)
+
+
+class TerminalKeys:
+    """A terminal tells of keys that are pressed, and again and again of one that is held; not of those let go."""
+
+    def __init__(self, hands: Teleop, save: Callable[[str | None], str], say: Callable[[str], None]) -> None:
+        self._hands, self._save, self._say = hands, save, say
+
+    def press(self, key: str) -> None:
+        """Ask for what the key means; save with its key; any other stops the robot."""
+        self._hands.ask(asked_by([key]))
+        if key == SAVE_KEY:
+            try:
+                self._say(self._save(None))
+            except InputError as error:
+                self._say(str(error))
+
+
+def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene | None) -> Mapping[str, Action]:
+    """What the page asks for: `teleop` with held keys and sticks, `save_pose` with a name."""
+
+    def ask(values: Mapping[str, Any]) -> str:
+        try:
+            hands.ask(read_asked(values))
+        except ValueError as error:
+            raise RefusedError(str(error)) from error
+        return ""
+
+    def save_as(values: Mapping[str, Any]) -> str:
+        name = values.get("name")
+        try:
+            return save(name if isinstance(name, str) and name else None)
+        except InputError as error:
+            raise RefusedError(str(error)) from error
+
+    return {"teleop": ask, "save_pose": save_as, **({} if scene is None else scene_actions(scene))}
+
+
+def _saving(hands: Teleop, folder: Path, world: str) -> Callable[[str | None], str]:
+    return lambda name: f"saved as {save_pose(folder, name, hands.pose(), world=world)}"
+
+
+def _told(hands: Teleop) -> dict[str, Any]:
+    """What the page shows."""
+    pose = hands.pose()
+    return {
+        "note": hands.note,
+        "base": [pose.base.x_m, pose.base.y_m, pose.base.yaw_rad],
+        "joints_rad": list(pose.joints_rad),
+        "opening_rad": pose.opening_rad,
+    }

@@ -1,0 +1,134 @@
+"""The footprint of a robot as its arm stands now, with what the gripper holds, projected onto the floor."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import SkillContext
+from skills.arm.kinematics import ArmModel, arm_model
+from skills.navigate.footprint import Footprint
+from skills.robot import FloatArray
+
+LINK_RADIUS_M = 0.06
+_APART_M = 0.06
+_TOLERANCE_M = 0.02
+_CHANGED_M = 0.05
+
+
+class ArmFootprint:
+    """The body's footprint, extended by discs where the arm or the held object sticks out of it.
+
+    The stowed arm counts as part of the body. Heights are left out: what is above an obstacle counts as in its way,
+    except where the robot stands already: there, what sticks out ends before what the costmap shows.
+    """
+
+    def __init__(self, context: SkillContext) -> None:
+        capabilities = context.robot.capabilities()
+        self._context, self._body = context, Footprint.of(capabilities)
+        self._model = arm_model(capabilities) if _has_arm(context) else None
+        self._gripper = capabilities.gripper
+        self._box = np.array([np.min(capabilities.footprint_m, axis=0), np.max(capabilities.footprint_m, axis=0)])
+        if self._model is not None:
+            stowed = _link_discs(self._model, self._model.stowed_rad, self._tip_m)
+            self._box[0] = np.minimum(self._box[0], np.min(stowed[:, :2] - stowed[:, 2:], axis=0))
+            self._box[1] = np.maximum(self._box[1], np.max(stowed[:, :2] + stowed[:, 2:], axis=0))
+
+    @property
+    def _tip_m(self) -> float:
+        """Where the last disc of the hand has its middle, along the fingers."""
+        return 0.0 if self._gripper is None else max(0.0, self._gripper.tip_x_m - LINK_RADIUS_M)
+
+    def now(self) -> Footprint:
+        """The footprint for a drive that begins now."""
+        arm, held = self._outside(self._arm_discs()), self._outside(self._held_discs())
+        discs = self._clipped(np.vstack([arm, held]))
+        if len(discs) == 0:
+            return self._body
+        return self._body.extended(discs, "the object that it carries" if len(held) else "its arm")
+
+    def outgrows(self, planned: Footprint) -> bool:
+        """Whether the robot by now reaches noticeably farther than the footprint that a path was planned for."""
+        now = self.now()
+        if now is self._body:
+            return False
+        new, old = now.discs[len(self._body.discs) :], planned.discs
+        apart = np.linalg.norm(new[:, None, :2] - old[None, :, :2], axis=2) + new[:, None, 2] - old[None, :, 2]
+        return bool(np.any(np.min(apart, axis=1) > _CHANGED_M))
+
+    def _arm_discs(self) -> FloatArray:
+        """The arm's links from above, rows of x, y, radius; none while the robot does not know its arm's angles."""
+        q_rad = self._q_rad()
+        if self._model is None or q_rad is None:
+            return np.empty((0, 3))
+        return _link_discs(self._model, q_rad, self._tip_m)
+
+    def _held_discs(self) -> FloatArray:
+        """The held object from above; where its size is not known, all that the gripper may hold."""
+        q_rad = self._q_rad()
+        if self._model is None or self._gripper is None or q_rad is None or not self._context.robot.gripper().holding:
+            return np.empty((0, 3))
+        X_BH, corners_H = self._model.X_BH(q_rad), self._context.payload.corners_H
+        if corners_H is not None:
+            return _box_discs(X_BH, corners_H)
+        middle = X_BH @ np.array([self._gripper.grip_x_m, 0.0, 0.0])
+        return np.array([[middle[0], middle[1], self._gripper.length_m - self._gripper.grip_x_m]])
+
+    def _q_rad(self) -> FloatArray | None:
+        if self._model is None:
+            return None
+        positions = self._context.robot.joints().position_rad
+        q_rad = np.array([positions[name] for name in self._model.names])
+        return q_rad if np.all(np.isfinite(q_rad)) else None
+
+    def _outside(self, discs: FloatArray) -> FloatArray:
+        """Those that stick out of the body with its stowed arm."""
+        low, high = discs[:, :2] - discs[:, 2:], discs[:, :2] + discs[:, 2:]
+        out = np.any((low < self._box[0] - _TOLERANCE_M) | (high > self._box[1] + _TOLERANCE_M), axis=1)
+        return np.asarray(discs[out])
+
+    def _clipped(self, discs: FloatArray) -> FloatArray:
+        """No farther than to what is under them, or beside them, where the robot stands."""
+        if len(discs) == 0:
+            return discs
+        pose = self._context.pose()
+        c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+        centres_W = discs[:, :2] @ np.array([[c, s], [-s, c]]) + (pose.x_m, pose.y_m)
+        radii = np.minimum(discs[:, 2], self._context.costmap.clearance_m(centres_W) - 0.01)
+        return np.column_stack([discs[:, :2], radii])[radii > 0.01]
+
+
+def _has_arm(context: SkillContext) -> bool:
+    capabilities = context.robot.capabilities()
+    return capabilities.arm is not None and capabilities.gripper is not None and bool(capabilities.description)
+
+
+def _link_discs(model: ArmModel, q_rad: FloatArray, tip_m: float) -> FloatArray:
+    """Discs along the arm from the shoulder to the fingers."""
+    points = np.vstack([model.points_B(q_rad), model.X_BH(q_rad) @ np.array([tip_m, 0.0, 0.0])])
+    lines = [_between(a[:2], b[:2]) for a, b in pairwise(points)]
+    centres = np.vstack(lines)
+    return np.column_stack([centres, np.full(len(centres), LINK_RADIUS_M)])
+
+
+def _between(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Points (N, 2) on a line, both ends included."""
+    count = 2 + int(np.linalg.norm(end - start) / _APART_M)
+    return np.asarray(np.linspace(start, end, count))
+
+
+def _box_discs(X_BH: RigidTransform, corners_H: FloatArray) -> FloatArray:
+    """Discs over the box about some corners, cut into parts of about the same length to all sides."""
+    low, high = corners_H.min(axis=0), corners_H.max(axis=0)
+    counts = np.maximum(1, np.ceil((high - low) / max(float(np.sort(high - low)[1]), 2.0 * _APART_M))).astype(int)
+    half = 0.5 * (high - low) / counts
+    axes = [low[k] + half[k] * (2.0 * np.arange(counts[k]) + 1.0) for k in range(3)]
+    middles = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    rotation = X_BH.rotation().matrix()
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    radius = float(np.max(np.linalg.norm((signs * half @ rotation.T)[:, :2], axis=1)))
+    centres = (middles @ rotation.T + X_BH.translation())[:, :2]
+    return np.column_stack([centres, np.full(len(centres), radius)])

@@ -1,0 +1,161 @@
+"""Paths of a base with two driven wheels: straights ahead or back, turns on the spot, and arcs that round corners."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.geometry import wrap
+from skills.navigate.lattice import Lattice, Needs, Space
+from skills.navigate.motion_cost import drive_cost, segment_cost
+from skills.navigate.smoothing import clearances
+from skills.robot import FloatArray
+
+CELL_SHARE = 0.5
+"""The lattice of such a base is so much finer: it cannot shift to the middle of a door."""
+_LONG_STEPS = 4
+_LEGS_M = np.arange(0.2, 2.1, 0.2)
+_RADII_M = (0.8, 0.6, 0.4, 0.25)
+_SHARPEST_RAD = 2.0
+_ARC_STEP_M = 0.05
+
+
+def courses() -> tuple[FloatArray, NDArray[np.int64]]:
+    """Yaws (headings,) along which straights lead from place to place of a lattice, and moves (headings, M, 3).
+
+    The moves are short and long steps ahead and back, and turns to the next heading (see `lattice_moves`).
+    """
+    quarter = [(1, 0), (2, 1), (1, 1), (1, 2)]
+    steps = quarter + [(-dy, dx) for dx, dy in quarter]
+    steps += [(-dx, -dy) for dx, dy in steps]
+    yaws = np.array([math.atan2(dy, dx) % math.tau for dx, dy in steps])
+    moves = [
+        [(sign * n * dx, sign * n * dy, 0) for n in (1, _LONG_STEPS) for sign in (1, -1)] + [(0, 0, -1), (0, 0, 1)]
+        for dx, dy in steps
+    ]
+    return yaws, np.array(moves, dtype=np.int64)
+
+
+Links = dict[int, tuple[float, tuple[FloatArray, ...]]]
+"""By the index of a lattice state: the cost between it and a pose off the lattice, and poses on the way."""
+
+
+def links(space: Space, lattice: Lattice, pose: FloatArray, needs: Needs, *, to_pose: bool) -> Links:
+    """How states of the lattice are reached from a pose, or the pose from them.
+
+    From the pose the robot goes straight as far as it likes, since it may have no clearance to turn where it stands.
+    """
+    found: Links = {}
+    for cost, via in _straights(space, pose, needs):
+        for state, place in _around(lattice, via):
+            pair = (place, via) if to_pose else (via, place)
+            total = (
+                cost + drive_cost(space.field, space.frame, space.discs, *pair, need_at(needs, place), space.weights)[0]
+            )
+            if total < found.get(state, (math.inf,))[0]:
+                found[state] = (total, () if via is pose else (via,))
+    return found
+
+
+def need_at(needs: Needs, pose: FloatArray) -> float:
+    """The clearance that a pose needs."""
+    near = math.hypot(pose[0] - needs.x_m, pose[1] - needs.y_m) < needs.escape_m
+    return needs.escape_margin_m if near else needs.margin_m
+
+
+def _straights(space: Space, pose: FloatArray, needs: Needs) -> Iterator[tuple[float, FloatArray]]:
+    """Poses straight ahead and behind as far as it is free, and what going there costs; the pose itself first."""
+    yield 0.0, pose
+    ahead = np.array([math.cos(pose[2]), math.sin(pose[2]), 0.0])
+    for sign in (1.0, -1.0):
+        cost, before = 0.0, pose
+        for way_m in sign * _LEGS_M:
+            via = pose + way_m * ahead
+            cost += segment_cost(space.field, space.frame, space.discs, before, via, need_at(needs, via), space.weights)
+            if not math.isfinite(cost):
+                break
+            yield cost, via
+            before = via
+
+
+def _around(lattice: Lattice, pose: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+    """The states next to a pose: four places, two headings each."""
+    row, column = (pose[1] - lattice.y0_m) / lattice.cell_m, (pose[0] - lattice.x0_m) / lattice.cell_m
+    k = int(np.searchsorted(lattice.yaws_rad, pose[2] % math.tau, side="right")) - 1
+    for i in {math.floor(row + 1e-6), math.ceil(row - 1e-6)}:
+        for j in {math.floor(column + 1e-6), math.ceil(column - 1e-6)}:
+            if not (0 <= i < lattice.rows and 0 <= j < lattice.columns):
+                continue
+            for heading in (k, (k + 1) % lattice.headings):
+                yaw = pose[2] + wrap(float(lattice.yaws_rad[heading]) - pose[2])
+                place = np.array([lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m, yaw])
+                yield (i * lattice.columns + j) * lattice.headings + heading, place
+
+
+def drives(space: Space, knots: FloatArray, needs: Needs) -> FloatArray:
+    """Poses (N, 3) of the path through some knots: turn, straight, turn; corners are rounded where that is free."""
+    legs = _legs(space, knots, needs)
+    places = [legs[0][0], *(end for _, end, _ in legs)]
+    poses = [knots[0]]
+    trimmed_m = 0.0
+    for n, (begin, end, yaw) in enumerate(legs):
+        if trimmed_m == 0.0:
+            poses.append(np.array([*(poses[-1][:2]), yaw]))
+        arc = None
+        if n + 1 < len(legs):
+            room_m = min(
+                float(np.linalg.norm(end - begin)) - trimmed_m, 0.5 * float(np.linalg.norm(places[n + 2] - end))
+            )
+            arc = _rounded(space, legs[n], legs[n + 1], room_m, needs)
+        trimmed_m = 0.0
+        if arc is None:
+            poses.append(np.array([*end, yaw]))
+        else:
+            poses.extend(arc)
+            trimmed_m = float(np.linalg.norm(arc[-1][:2] - end))
+    last = knots[-1].copy()
+    last[2] = poses[-1][2] + wrap(last[2] - poses[-1][2])
+    return np.array([*poses, last])
+
+
+_Leg = tuple[FloatArray, FloatArray, float]
+
+
+def _legs(space: Space, knots: FloatArray, needs: Needs) -> list[_Leg]:
+    """The straights between knots, each from a place to a place with the yaw on it, the yaws continuous."""
+    legs: list[_Leg] = []
+    yaw = float(knots[0, 2])
+    for a, b in pairwise(knots):
+        if np.hypot(*(b - a)[:2]) < 1e-6:
+            continue
+        begin = np.array([a[0], a[1], yaw + wrap(a[2] - yaw)])
+        _, on_it = drive_cost(space.field, space.frame, space.discs, begin, b, need_at(needs, a), space.weights)
+        yaw += wrap(on_it - yaw)
+        legs.append((a[:2], b[:2], yaw))
+    return legs or [(knots[0, :2], knots[0, :2], yaw)]
+
+
+def _rounded(space: Space, first: _Leg, second: _Leg, room_m: float, needs: Needs) -> list[FloatArray] | None:
+    """The widest arc from one straight to the next, None where they turn back or no arc is free."""
+    (_, corner, yaw), (_, _, yaw_after) = first, second
+    turn = yaw_after - yaw
+    towards = [np.subtract(leg[1], leg[0]) @ (math.cos(leg[2]), math.sin(leg[2])) for leg in (first, second)]
+    if towards[0] * towards[1] <= 0.0 or not 1e-3 < abs(turn) < _SHARPEST_RAD:
+        return None
+    course = yaw if towards[0] > 0.0 else yaw + math.pi
+    widest = room_m / math.tan(0.5 * abs(turn))
+    for radius in (radius for radius in (min(_RADII_M[0], widest), *_RADII_M) if 0.1 <= radius <= widest):
+        count = 1 + math.ceil(radius * abs(turn) / _ARC_STEP_M)
+        yaws = yaw + np.linspace(0.0, turn, count + 1)
+        angles, side = course + np.linspace(0.0, turn, count + 1), math.copysign(radius, turn)
+        begin = corner - radius * math.tan(0.5 * abs(turn)) * np.array([math.cos(course), math.sin(course)])
+        x = begin[0] + side * (np.sin(angles) - math.sin(course))
+        y = begin[1] - side * (np.cos(angles) - math.cos(course))
+        arc = np.column_stack([x, y, yaws])
+        if float(np.min(clearances(space, arc))) >= max(need_at(needs, arc[0]), needs.margin_m):
+            return list(arc)
+    return None

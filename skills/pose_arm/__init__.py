@@ -1,0 +1,1 @@
+"""Taking an arm pose that is given as joint angles."""

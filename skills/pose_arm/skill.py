@@ -1,0 +1,54 @@
+"""The pose_arm skill: takes an arm pose given as joint angles, as `errand teleop` saves it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from skills.api import Cause, Succeeded
+from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
+from skills.arm.routine import Routine, SkillFailure
+from skills.quantities import Angle, Turn
+
+_THERE_RAD = 0.05
+
+
+@dataclass(frozen=True)
+class PoseArmInputs:
+    """Joint angles from the shoulder on; the opening (0 closed): None, or something held, leaves it as it is."""
+
+    joints_rad: tuple[Angle, ...]
+    opening_rad: Turn | None = None
+
+
+class PoseArm(ArmSkill[PoseArmInputs]):
+    """Moves the arm on a free path to joint angles, then the gripper to an opening."""
+
+    name = "pose_arm"
+    Inputs = PoseArmInputs
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "the pose is not one of this robot's arm",
+        Cause.PLANNING: "the arm finds no free path",
+        Cause.EXECUTION: "the arm did not reach its goal",
+    }
+    default_timeout_s = 30.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5}
+
+    def run(self, inputs: PoseArmInputs) -> Routine[Succeeded]:
+        """Move there."""
+        goal = np.array(inputs.joints_rad)
+        if len(goal) != len(self.model.names):
+            text = f"the pose has {len(goal)} joint angles, the arm has {len(self.model.names)} joints"
+            raise SkillFailure(Cause.PRECONDITION, text)
+        if not self.model.within_limits(goal, -1e-3):
+            raise SkillFailure(Cause.PRECONDITION, "the pose is beyond the limits of the arm's joints")
+        opens = inputs.opening_rad is not None and not self.context.robot.gripper().holding
+        if np.max(np.abs(self.q_rad() - goal)) > _THERE_RAD:
+            yield from self.move_to(lambda scene, q: goal, "moving the arm to the pose")
+        if opens and inputs.opening_rad is not None:
+            opening_rad = min(inputs.opening_rad, self.open_rad)
+            yield from self.move_gripper(opening_rad, GRIPPER_FORCE_N, "moving the gripper")
+        return Succeeded("the arm is in the pose")

@@ -1,0 +1,1 @@
+"""Driving body and arm by hand."""

@@ -1,0 +1,184 @@
+"""Body, arm and gripper by hand, through the Robot protocol, within the limits that the skills keep.
+
+Dead-man's switch: what is asked for counts `life_s` on the robot's clock. All commands expire by then, or end at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from skills.api import SkillContext
+from skills.arm.collision import ArmScene
+from skills.arm.kinematics import arm_model
+from skills.navigate.base import Base
+from skills.navigate.follower import FollowerOptions
+from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m
+from skills.quantities import Acceleration, Delay, Duration, Force, Margin, Speed, TurnRate
+from skills.robot import CommandId, CommandState, FloatArray, Pose2D
+from skills.teleop.arm import ArmOptions, HandControl
+from skills.teleop.keys import BASE, GRIPPER, HAND, JOINTS, POSTURE
+
+_ARM: frozenset[str] = frozenset((*HAND, *JOINTS))
+
+
+@dataclass(frozen=True)
+class TeleopOptions:
+    """What driving by hand keeps to; speeds and accelerations of the base are those of the path follower.
+
+    The base keeps `margin_m` to what the costmap knows on the ground that it covers in `reaction_s` and while it brakes
+    at `stop_m_s2`.
+    """
+
+    life_s: Delay = 0.3
+    period_s: Duration = 0.1
+    base: FollowerOptions = field(default_factory=FollowerOptions)
+    margin_m: Margin = SAFE_MARGIN_M
+    reaction_s: Delay = 0.4
+    stop_m_s2: Acceleration = 2.0
+    arm: ArmOptions = field(default_factory=ArmOptions)
+    gripper_rad_s: TurnRate = 1.0
+    gripper_n: Force = 20.0
+    height_m_s: Speed = 0.1
+    tilt_rad_s: TurnRate = 0.2
+
+
+@dataclass(frozen=True)
+class SavedPose:
+    """Where the robot was: the body in the world, the arm's joints and the gripper's opening (rad)."""
+
+    base: Pose2D
+    joints_rad: tuple[float, ...]
+    opening_rad: float
+
+
+class Teleop:
+    """Call `ask` whenever keys arrive, from any thread, and `tick` once each `period_s` of the robot's clock."""
+
+    def __init__(self, context: SkillContext, options: TeleopOptions | None = None) -> None:
+        """The context's lease is the right to move. Raises ValueError: the robot has an arm that cannot be moved."""
+        self._context, self._options = context, options or TeleopOptions()
+        capabilities = context.robot.capabilities()
+        self._base, self._footprint = Base(context), Footprint.of(capabilities)
+        self._model = None if capabilities.arm is None else arm_model(capabilities)
+        self._hand = None if self._model is None else HandControl(self._model, self._options.arm)
+        self._scene: ArmScene | None = None
+        self._asked: tuple[Mapping[str, float], float] = ({}, -math.inf)
+        self._opening_rad: float | None = None
+        self._opening_sign = 0.0
+        self._posture = (capabilities.standing_height_m, 0.0)
+        self._commands: list[CommandId] = []
+        self.note = ""
+
+    def ask(self, asked: Mapping[str, float]) -> None:
+        """What hands ask for now, by axis, each from -1 to 1; nothing stops the robot."""
+        self._asked = (dict(asked), self._context.clock.now())
+
+    def pose(self) -> SavedPose:
+        """Where the robot is now, to be saved."""
+        return SavedPose(
+            self._context.pose(), tuple(self._q_rad().tolist()), max(0.0, self._context.robot.gripper().opening_rad)
+        )
+
+    def tick(self) -> None:
+        """Send the commands for the next period; `note` says what stands in the way of what is asked."""
+        asked, at_s = self._asked
+        now_s, until_s = self._context.clock.now(), at_s + self._options.life_s
+        alive = now_s + self._options.period_s <= until_s + 1e-9
+        asked = asked if alive else {}
+        self.note, self._commands = "", []
+        self._drive(asked, now_s)
+        self._move_arm(asked, now_s)
+        if alive:
+            self._move_gripper(asked, until_s)
+            self._stand(asked, until_s)
+        self.note = self._refusal() or self.note
+
+    # -- inside ---------------------------------------------------------------------------------------------------
+
+    def _drive(self, asked: Mapping[str, float], now_s: float) -> None:
+        direction = np.array([asked.get(axis, 0.0) for axis in BASE])
+        if not np.any(direction):
+            self._base.stop()
+            return
+        base, capabilities = self._options.base, self._context.robot.capabilities()
+        ahead = base.max_speed_m_s if direction[0] > 0 else base.backward_m_s
+        wanted = direction * (ahead, base.lateral_m_s, base.turn_rad_s)
+        wanted *= min(1.0, capabilities.max_speed_m_s / max(float(np.hypot(*wanted[:2])), 1e-9))
+        most = self._options.period_s * np.array([base.acceleration_m_s2] * 2 + [base.turn_acceleration_rad_s2])
+        velocity = self._base.last_velocity + np.clip(wanted - self._base.last_velocity, -most, most)
+        for share in (1.0, 0.5, 0.25):
+            if self._clear(share * velocity):
+                vx, vy, wz = (share * velocity).tolist()
+                self._base.drive((vx, vy, wz))
+                return
+        self.note = "something stands in the way of the body"
+        self._base.stop()
+
+    def _clear(self, velocity: FloatArray) -> bool:
+        """Whether the ground is free that the body covers until it stands, or the body moves away from what is near."""
+        options, here = self._options, self._context.pose()
+        until_s = options.reaction_s + float(np.hypot(*velocity[:2])) / (2.0 * options.stop_m_s2)
+        times = np.linspace(0.0, until_s, 6)
+        yaws = here.yaw_rad + velocity[2] * times
+        c, s = np.cos(here.yaw_rad + 0.5 * velocity[2] * times), np.sin(here.yaw_rad + 0.5 * velocity[2] * times)
+        x = here.x_m + times * (c * velocity[0] - s * velocity[1])
+        y = here.y_m + times * (s * velocity[0] + c * velocity[1])
+        clearance = footprint_clearance_m(self._context.costmap, self._footprint, np.stack([x, y, yaws], axis=1))
+        return bool(np.min(clearance[1:]) >= min(options.margin_m, float(clearance[0]) + 0.002))
+
+    def _move_arm(self, asked: Mapping[str, float], now_s: float) -> None:
+        if self._hand is None or self._model is None or (self._scene is None and not _ARM & asked.keys()):
+            return
+        robot = self._context.robot
+        if self._scene is None:
+            self._scene = ArmScene(robot.capabilities(), self._model, robot.joints().position_rad)
+        self._scene.set_opening(max(0.0, robot.gripper().opening_rad))
+        trajectory = self._hand.next({a: v for a, v in asked.items() if a in _ARM}, now_s, self._q_rad(), self._scene)
+        self.note = self._hand.note or self.note
+        if trajectory is not None:
+            until_s = now_s + float(trajectory.times_s[-1]) + 0.5
+            self._commands.append(robot.move_arm(trajectory, until_s=until_s, lease=self._context.lease))
+
+    def _move_gripper(self, asked: Mapping[str, float], until_s: float) -> None:
+        sign, gripper = asked.get(GRIPPER, 0.0), self._context.robot.capabilities().gripper
+        if gripper is None or not sign:
+            self._opening_rad, self._opening_sign = None, 0.0
+            return
+        if self._opening_rad is None or sign * self._opening_sign < 0.0:
+            self._opening_rad = self._context.robot.gripper().opening_rad
+        self._opening_sign = sign
+        step = sign * self._options.gripper_rad_s * self._options.period_s
+        self._opening_rad = min(gripper.open_rad, max(0.0, self._opening_rad + step))
+        force_n = min(self._options.gripper_n, gripper.max_force_n)
+        lease = self._context.lease
+        self._commands.append(self._context.robot.set_gripper(self._opening_rad, force_n, until_s=until_s, lease=lease))
+
+    def _stand(self, asked: Mapping[str, float], until_s: float) -> None:
+        rates = (self._options.height_m_s, self._options.tilt_rad_s)
+        steps = [
+            asked.get(axis, 0.0) * rate * self._options.period_s for axis, rate in zip(POSTURE, rates, strict=True)
+        ]
+        if not any(steps):
+            return
+        capabilities = self._context.robot.capabilities()
+        (low, high), (least, most) = capabilities.height_range_m, capabilities.pitch_range_rad
+        height, pitch = (before + step for before, step in zip(self._posture, steps, strict=True))
+        self._posture = (min(high, max(low, height)), min(most, max(least, pitch)))
+        lease = self._context.lease
+        self._commands.append(self._context.robot.stand(*self._posture, until_s=until_s, lease=lease))
+
+    def _refusal(self) -> str:
+        """Why the robot refused one of the commands, empty when it took them all."""
+        statuses = [self._context.robot.command_status(command) for command in self._commands]
+        refused = next((one.reason for one in statuses if one.state is CommandState.REFUSED), "")
+        return self._base.refusal() or refused
+
+    def _q_rad(self) -> FloatArray:
+        if self._model is None:
+            return np.zeros(0)
+        positions = self._context.robot.joints().position_rad
+        return np.array([positions[name] for name in self._model.names])

@@ -1,0 +1,87 @@
+"""The rooms of the manipulation benchmark: one place to take things from, one to put them on, set by a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import yaml
+
+from plant.scenery import OWN_PACKAGE
+from plant.worlds.builder.__main__ import build
+from plant.worlds.builder.plan import Plan
+from plant.worlds.world import World, load_world
+
+SURFACES: Final = ("table", "shelf", "floor")
+TAKEN, SECOND = "bench", "side table"
+_BACK_Y, _SECOND_X = 4.35, 0.13
+_WIDTH_M, _BOARD_M, _BOARDS, _SHELF_DEPTH_M, _SHELF_M = 1.2, 0.025, 3, 0.36, 1.285
+_SECOND_M: Final = (1.0, 0.7, 0.72)  # width, depth, height
+_THINGS: Final = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
+
+
+def room(folder: Path, class_name: str, others: Sequence[str], surface: str, seed: int) -> World:
+    """A room with an object called `target` of a class, and others, on a surface; its heights come from the seed."""
+    rng = np.random.default_rng([seed, SURFACES.index(surface)])
+    middle_x, furniture = 2.5, dict[str, Any]()
+    if surface == "table":
+        height, depth = float(rng.uniform(0.40, 0.92)), float(rng.uniform(0.6, 0.8))
+        furniture["bench"] = {
+            "piece": "table", "at": [middle_x, _BACK_Y], "facing": "south", "width": _WIDTH_M, "depth": depth,
+            "height": round(height, 3), "top": "wood_light", "leg": "dark_steel",
+        }  # fmt: skip
+        from_edge = (0.08, 0.25)
+    elif surface == "shelf":
+        board, depth = int(rng.integers(1, _BOARDS)), _SHELF_DEPTH_M
+        height = board * (_SHELF_M - _BOARD_M) / _BOARDS + _BOARD_M
+        furniture["bench"] = {
+            "piece": "open_shelf", "at": [middle_x, _BACK_Y], "facing": "south", "width": _WIDTH_M, "depth": depth,
+            "height": _SHELF_M, "boards": _BOARDS,
+        }  # fmt: skip
+        from_edge = (0.08, 0.20)
+    else:
+        height, depth, from_edge = 0.01, 0.9, (0.2, 0.7)
+    width, second_depth, second_height = _SECOND_M
+    furniture["second_table"] = {
+        "piece": "table", "at": [_SECOND_X, 1.6], "facing": "east", "width": width, "depth": second_depth,
+        "height": second_height, "top": "white", "leg": "charcoal",
+    }  # fmt: skip
+    front = _BACK_Y - depth
+    plan = Plan.model_validate({
+        "outline_m": [5.0, 4.5], "wall_height_m": 2.5, "door_width_m": 0.9, "door_height_m": 2.05,
+        "rooms": [["room", [0.12, 0.12, 4.88, 4.38], "concrete", "wall_workshop"]],
+        "walls": [[0, 0, 5.0, 0.12], [0, 4.38, 5.0, 4.5], [0, 0.12, 0.12, 4.38], [4.88, 0.12, 5.0, 4.38]],
+        "doors": [], "hangings": [], "furniture": furniture,
+    })  # fmt: skip
+    build(plan, folder, OWN_PACKAGE, "map")
+    left, right = middle_x - _WIDTH_M / 2 + 0.03, middle_x + _WIDTH_M / 2 - 0.03
+    second = [_SECOND_X + second_depth, 1.6 - width / 2, 1.6 + width / 2]
+    knowledge = {
+        "robot": {"name": "Alice"},
+        "start": {"x": 2.5, "y": 1.6, "yaw": 1.5708},
+        "places": {"room": {"aliases": [], "pose": {"x": 2.5, "y": 1.6, "yaw": 1.5708},
+                            "polygon": [[0.12, 0.12], [4.88, 0.12], [4.88, 4.38], [0.12, 4.38]]}},
+        "surfaces": {
+            TAKEN: {"place": "room", "aliases": [], "height": round(height, 3),
+                    "polygon": [[left, front], [right, front], [right, _BACK_Y], [left, _BACK_Y]],
+                    "viewpoints": [{"x": middle_x, "y": round(front - 0.92, 3), "yaw": 1.5708}]},
+            SECOND: {"place": "room", "aliases": [], "height": second_height,
+                     "polygon": [[_SECOND_X, second[1]], [second[0], second[1]], [second[0], second[2]],
+                                 [_SECOND_X, second[2]]],
+                     "viewpoints": [{"x": second[0] + 0.92, "y": 1.6, "yaw": 3.1416}]},
+        },
+        "things": {name: {"aliases": [], "categories": [], "usual": [TAKEN]} for name in _THINGS},
+    }  # fmt: skip
+    rules = {
+        "rules": {"from_edge_m": list(from_edge), "clear_m": 0.03, "rim_m": 0.0, "drop_m": 0.001},
+        "fronts": {TAKEN: [[[middle_x - 0.35, front], [middle_x + 0.35, front]]]},
+        "objects": [
+            {"name": name, "model": model, "surfaces": [TAKEN]}
+            for name, model in [("target", class_name), *((f"other_{n}", each) for n, each in enumerate(others))]
+        ],
+    }
+    (folder / "knowledge.yaml").write_text(yaml.safe_dump(knowledge, sort_keys=False), encoding="utf-8")
+    (folder / "objects.yaml").write_text(yaml.safe_dump(rules, sort_keys=False), encoding="utf-8")
+    return load_world(str(folder))

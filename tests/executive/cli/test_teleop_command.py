@@ -1,0 +1,156 @@
+"""`errand teleop`: the plant's robot driven by hand, the page's actions, saved poses, a lease that another holds."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.math import RollPitchYaw
+from typer.testing import CliRunner
+
+from executive.cli.assembly import simulate
+from executive.cli.entry import app
+from executive.cli.saved_pose import save_pose
+from executive.cli.teleop_command import TerminalKeys, context_for, page_actions, period
+from executive.cli.worlds import open_world
+from executive.mission.errors import InputError
+from executive.mission.file.resolve import load_mission
+from executive.view.actions import RefusedError
+from skills.arm.kinematics import arm_model
+from skills.robot import Pose2D
+from skills.teleop.driver import SavedPose, Teleop, TeleopOptions
+
+POSE = SavedPose(Pose2D(5.2, 4.5, math.pi / 2), (0.1, -1.6, 1.8, 0.0, 0.4, 0.0), 0.5)
+OPTIONS = TeleopOptions()
+
+
+class Asked:
+    """Notes what is asked."""
+
+    def __init__(self):
+        self.last = None
+
+    def ask(self, asked):
+        self.last = asked
+
+
+def test_a_key_at_the_terminal_asks_for_its_axis_and_any_other_stops():
+    hands = Asked()
+    keys = TerminalKeys(hands, lambda name: "saved", lambda text: None)
+    keys.press("w")
+    assert hands.last == {"forward": 1.0}
+    keys.press(" ")
+    assert hands.last == {}
+
+
+def test_the_save_key_saves_and_says_so():
+    said = []
+    TerminalKeys(Asked(), lambda name: f"saved {name}", said.append).press("p")
+    assert said == ["saved None"]
+
+
+def test_the_page_asks_and_nonsense_is_refused():
+    hands = Asked()
+    actions = page_actions(hands, lambda name: f"saved {name}", None)
+    actions["teleop"]({"keys": ["w"], "axes": {"turn": 0.5}})
+    assert hands.last == {"forward": 1.0, "turn": 0.5}
+    with pytest.raises(RefusedError, match="axis 'warp'"):
+        actions["teleop"]({"axes": {"warp": 1.0}})
+    assert actions["save_pose"]({"name": "look"}) == "saved look"
+
+
+def test_a_saved_pose_is_a_mission_file(tmp_path):
+    path = save_pose(tmp_path / "poses", "by_the_table", POSE, world="flat")
+    navigate, pose_arm = load_mission(path).steps
+    assert (navigate.skill, pose_arm.skill) == ("navigate", "pose_arm")
+    assert pose_arm.with_["joints"] == list(POSE.joints_rad)
+
+
+def test_poses_without_a_name_are_numbered(tmp_path):
+    assert [save_pose(tmp_path, None, POSE, world="flat").name for _ in range(2)] == ["pose_1.yaml", "pose_2.yaml"]
+
+
+def test_a_pose_is_never_overwritten(tmp_path):
+    path = save_pose(tmp_path, "look", POSE, world="flat")
+    before = path.read_text()
+    with pytest.raises(InputError, match="there is a pose of this name"):
+        save_pose(tmp_path, "look", replace(POSE, opening_rad=0.0), world="flat")
+    assert path.read_text() == before
+
+
+@pytest.mark.parametrize("name", ["../out", "a/b", ".hidden", "x" * 100, "a b"])
+def test_a_name_that_is_no_file_name_is_refused(tmp_path, name):
+    with pytest.raises(InputError, match="is no name for a pose"):
+        save_pose(tmp_path, name, POSE, world="flat")
+
+
+def test_a_folder_that_cannot_be_made_is_one_clear_line(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot write it"):
+        save_pose(tmp_path / "file", "look", POSE, world="flat")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--world", "nowhere"], "unknown world 'nowhere'"),
+        (["--robot", ""], "is no name for a robot"),
+        (["--start", "500", "500", "0"], "stands in something or outside"),
+    ],
+)
+def test_bad_arguments_are_one_clear_line(arguments, said):
+    result = CliRunner().invoke(app, ["teleop", *arguments])
+    assert result.exit_code == 2
+    assert said in result.output
+    assert len(result.output.strip().splitlines()) == 1
+
+
+@pytest.mark.mission
+def test_the_plants_robot_is_driven_by_hand():
+    """Half a metre ahead, the hand 10 cm up, the gripper closed; at rest half a second after the keys end."""
+    world = open_world("flat")
+    simulation = simulate(world, seed=1, robot_name="Alice", record=False, start=Pose2D(5.2, 4.5, math.pi))
+    robot = simulation.robots["Alice"]
+    context = context_for(world, robot, simulation.clock, simulation.start)
+    hands, model = Teleop(context), arm_model(robot.capabilities())
+    speeds, rates = [], []
+
+    def hold(asked, done, limit_s=10.0):
+        until_s = context.clock.now() + limit_s
+        while not done():
+            assert context.clock.now() < until_s, f"{asked}: {hands.note}"
+            hands.ask(asked)
+            one_period()
+        for _ in range(5):
+            one_period()
+
+    def one_period():
+        period(hands, context)
+        speeds.append(np.abs(robot.odometry().velocity))
+        rates.append(max(abs(robot.joints().velocity_rad_s[name]) for name in model.names))
+
+    def hand():
+        return model.X_BH(np.array([robot.joints().position_rad[name] for name in model.names]))
+
+    def at_rest():
+        speed = float(np.hypot(*robot.odometry().velocity[:2]))
+        assert speed < 0.05, speed
+        assert rates[-1] < 0.05, rates[-1]
+        return True
+
+    start = context.pose()
+    hold({"forward": 1.0}, lambda: math.hypot(context.pose().x_m - start.x_m, context.pose().y_m - start.y_m) > 0.5)
+    assert at_rest()
+    before = hand()
+    hold({"hand_z": 1.0}, lambda: hand().translation()[2] > before.translation()[2] + 0.1)
+    assert at_rest()
+    turned = (before.rotation().inverse() @ hand().rotation()).matrix()
+    assert np.abs(RollPitchYaw(turned).vector()).max() < 0.1
+    hold({"open": 1.0}, lambda: robot.gripper().opening_rad > 0.5)
+    hold({"open": -1.0}, lambda: robot.gripper().opening_rad < 0.05)
+    most = np.max(speeds, axis=0)
+    assert most[0] < OPTIONS.base.max_speed_m_s * 1.1
+    assert max(rates) < OPTIONS.arm.joint_rad_s * 1.25
+
+    with pytest.raises(InputError, match="the lease is held by 'teleop'"):
+        context_for(world, robot, simulation.clock, simulation.start)

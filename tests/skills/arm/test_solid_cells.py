@@ -1,0 +1,66 @@
+"""Solid cells from depth pictures: what is seen is solid, what is seen past is not, boxes cover exactly the cells."""
+
+import numpy as np
+from pydrake.math import RigidTransform
+from table_scene import TABLE, Can, scene
+
+from skills.arm.solid_cells import CELL_M, merged, solid_boxes, with_picture
+
+NOTHING = np.empty((0, 3), dtype=np.int64)
+BODY = RigidTransform([0.0, 0.0, 0.5])
+
+
+def nothing_of(points):
+    return np.zeros(len(points), dtype=bool)
+
+
+def picture(*things):
+    return scene(things)
+
+
+def inside(boxes, p_W):
+    p_B = BODY.inverse() @ np.array(p_W)
+    local = [box.X_FG.inverse() @ p_B for box in boxes]
+    return any(np.all(np.abs(p) <= np.array(box.size_m) / 2 + 1e-9) for p, box in zip(local, boxes, strict=True))
+
+
+def test_what_is_seen_is_solid_and_what_is_behind_it_too():
+    can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
+    boxes = solid_boxes(with_picture(NOTHING, picture(can), RigidTransform(), nothing_of), BODY, 2.0, nothing_of)
+    assert inside(boxes, (0.97, 0.0, 0.9))
+    assert inside(boxes, (1.15, 0.0, 0.9))
+    assert not inside(boxes, (0.8, 0.0, 0.95))
+
+
+def test_what_was_taken_away_is_forgotten_once_it_is_seen_past():
+    can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
+    cells = with_picture(NOTHING, picture(can), RigidTransform(), nothing_of)
+    cells = with_picture(cells, picture(), RigidTransform(), nothing_of)
+    assert not inside(solid_boxes(cells, BODY, 2.0, nothing_of), (0.97, 0.0, 0.95))
+    assert inside(solid_boxes(cells, BODY, 2.0, nothing_of), (1.2, 0.2, TABLE.height_m - 0.005))
+
+
+def test_what_is_left_out_is_not_solid():
+    boxes = solid_boxes(
+        with_picture(NOTHING, picture(), RigidTransform(), nothing_of), BODY, 2.0, lambda p: p[:, 2] < 0.8
+    )
+    assert boxes == []
+
+
+def test_merged_boxes_cover_exactly_the_cells():
+    rng = np.random.default_rng(3)
+    cells = np.unique(rng.integers(-3, 4, (90, 3)), axis=0)
+    covered = [
+        (x, y, z)
+        for low, high in merged(cells)
+        for x in range(low[0], high[0])
+        for y in range(low[1], high[1])
+        for z in range(low[2], high[2])
+    ]
+    assert sorted(covered) == sorted(map(tuple, cells.tolist()))
+
+
+def test_a_wall_is_one_box():
+    wall = np.stack(np.meshgrid([4], np.arange(30), np.arange(20), indexing="ij"), axis=-1).reshape(-1, 3)
+    assert len(merged(wall)) == 1
+    assert CELL_M < 0.05

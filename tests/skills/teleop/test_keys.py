@@ -1,0 +1,46 @@
+"""What keys and sticks ask for."""
+
+import math
+
+import pytest
+
+from skills.teleop.keys import AXES, KEYS, asked_by, read_asked
+
+
+def test_keys_add_up_and_opposite_ones_cancel():
+    assert asked_by(["w", "a"]) == {"forward": 1.0, "turn": 1.0}
+    assert asked_by(["w", "s"]) == {}
+
+
+def test_a_stick_and_a_key_together_stay_within_one():
+    assert asked_by(["w"], {"forward": 0.7, "turn": -0.25}) == {"forward": 1.0, "turn": -0.25}
+
+
+def test_every_axis_has_a_key_for_each_direction():
+    assert {axis for axis, _ in KEYS.values()} == AXES
+    assert len(KEYS) == 2 * len(AXES)
+
+
+def test_keys_without_a_meaning_ask_for_nothing():
+    assert asked_by([" ", "p", "\x1b"]) == {}
+
+
+def test_a_page_asks_by_keys_and_axes():
+    assert read_asked({"keys": ["w"], "axes": {"hand_z": -0.5}}) == {"forward": 1.0, "hand_z": -0.5}
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"keys": "w"},
+        {"keys": [1]},
+        {"axes": [1.0]},
+        {"axes": {"warp": 1.0}},
+        {"axes": {"forward": math.nan}},
+        {"axes": {"forward": True}},
+        {"axes": {"forward": "1"}},
+    ],
+)
+def test_what_is_no_such_thing_is_refused(values):
+    with pytest.raises(ValueError, match="must be"):
+        read_asked(values)

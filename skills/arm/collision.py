@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -14,9 +15,14 @@ from skills.api import NO_WORK_COUNTER, WorkCounter
 from skills.arm.kinematics import ArmModel
 from skills.robot import Capabilities, FloatArray
 
-_WORLD = "WorldModelInstance"
+if TYPE_CHECKING:
+    from pydrake.planning import SceneGraphCollisionChecker
+
+AROUND: Final = "around"
+"""The name of the body that stands for all boxes."""
 EDGE_STEP_RAD = 0.05
 """How far apart (rad, all joints together) the configurations of a motion are checked."""
+_SCENES_KEPT, _FAR_M = 4, 100.0
 
 
 @dataclass(frozen=True)
@@ -49,62 +55,58 @@ class ArmScene:
         work: WorkCounter = NO_WORK_COUNTER,
     ) -> None:
         """`work` counts the checks."""
-        from pydrake.multibody.parsing import Parser
-        from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
-
         self.model, self._work = model, work
-        builder = RobotDiagramBuilder()
-        plant = builder.plant()
-        (robot,) = Parser(plant).AddModelsFromString(_without_visuals(capabilities.description), "urdf")
-        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("body", robot))
-        plant.Finalize()
-        self._instance = plant.GetModelInstanceName(robot)
-        self._checker = SceneGraphCollisionChecker(
-            model=builder.Build(), robot_model_instances=[robot], edge_step_size=EDGE_STEP_RAD
-        )
-        self._checker.SetPaddingAllRobotEnvironmentPairs(padding_m)
-        self._q = np.zeros(plant.num_positions())
-        joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
-        starts = {joint.name(): joint.position_start() for joint in joints if joint.num_positions() == 1}
-        for name, start in starts.items():
-            self._q[start] = joint_positions_rad.get(name, 0.0)
-        self._arm = np.array([starts[name] for name in model.names])
-        self._gripper = starts[model.gripper.name]
-        self._boxes: tuple[Box, ...] = ()
-        self._allow_stowed_contacts()
+        self._description = _without_visuals(capabilities.description)
+        self._joints_rad = dict(joint_positions_rad)
+        self._padding_m, self._opening_rad = padding_m, 0.0
+        self._held: tuple[Box, ...] = ()
+        self._built: dict[bytes, _BuiltScene] = {}
+        self._now = self._with(())
 
-    def set_boxes(self, boxes: Sequence[Box]) -> None:
-        """Replace the boxes around the robot (frame B)."""
-        self._boxes = tuple(boxes)
-        self._checker.RemoveAllAddedCollisionShapes("around")
-        for box in boxes:
-            self._add("around", box, _WORLD, "world")
+    def set_boxes(self, boxes: Sequence[Box], X_BF: RigidTransform | None = None) -> None:
+        """Replace the boxes around the robot, given in frame F, the body's own where X_BF is left out.
+
+        Boxes of one of the last few calls are found again at once; only X_BF may differ.
+        """
+        self._now = self._with(tuple(boxes))
+        self._now.place(RigidTransform() if X_BF is None else X_BF)
 
     @contextmanager
     def with_only(self, boxes: Sequence[Box], opening_rad: float) -> Iterator[None]:
-        """For a while other boxes stand around, and the gripper is open so far."""
-        before, gripper = self._boxes, self._q[self._gripper]
+        """For a while other boxes (frame B) stand around, and the gripper is open so far."""
+        before, opening_before_rad = self._now, self._opening_rad
         self.set_boxes(boxes)
-        self.set_opening(opening_rad)
+        self._opening_rad = opening_rad
         try:
             yield
         finally:
-            self.set_boxes(before)
-            self._q[self._gripper] = gripper
+            self._now, self._opening_rad = before, opening_before_rad
 
     def hold(self, boxes: Sequence[Box]) -> None:
         """Replace the boxes fixed to the hand (frame H), for a thing held."""
-        self._checker.RemoveAllAddedCollisionShapes("held")
-        for box in boxes:
-            self._add("held", box, self._instance, self.model.hand_link)
+        self._held = tuple(boxes)
 
     def set_opening(self, opening_rad: float) -> None:
         """Angle of the gripper in later checks, 0 closed."""
-        self._q[self._gripper] = -opening_rad
+        self._opening_rad = opening_rad
 
     def set_padding(self, padding_m: float) -> None:
         """Distance that the robot keeps from boxes in later checks."""
-        self._checker.SetPaddingAllRobotEnvironmentPairs(padding_m)
+        self._padding_m = padding_m
+
+    def _with(self, boxes: tuple[Box, ...]) -> _BuiltScene:
+        """The scene with these boxes, the one built before where it is still kept."""
+        key = b"".join(box.X_FG.GetAsMatrix34().tobytes() + np.array(box.size_m).tobytes() for box in boxes)
+        built = self._built.pop(key, None) or _BuiltScene(self._description, self.model, boxes, self._joints_rad)
+        self._built[key] = built
+        if len(self._built) > _SCENES_KEPT:
+            del self._built[next(iter(self._built))]
+        return built
+
+    @property
+    def _checker(self) -> SceneGraphCollisionChecker:
+        """The checker of the present boxes, with the present padding and thing held."""
+        return self._now.checker(self._padding_m, self._held)
 
     def free(self, q_rad: FloatArray) -> bool:
         """Whether arm angles q_rad (J,) collide with nothing."""
@@ -122,37 +124,107 @@ class ArmScene:
 
     def gravity_efforts(self, q_rad: FloatArray) -> FloatArray:
         """Efforts (J,), N m, with which the arm holds its own weight at angles q_rad (J,), the body level."""
-        plant = self._checker.plant()
-        context = self._checker.UpdatePositions(self._full(q_rad))
-        held: FloatArray = -plant.CalcGravityGeneralizedForces(context)[self._arm]
+        checker = self._checker
+        context = checker.UpdatePositions(self._full(q_rad))
+        held: FloatArray = -checker.plant().CalcGravityGeneralizedForces(context)[self._now.arm_velocities]
         return held
 
     def contacts(self, q_rad: FloatArray) -> tuple[tuple[str, str], ...]:
-        """Names of the links that touch or come closer than the padding, for messages."""
-        clearance = self._checker.CalcRobotClearance(self._full(q_rad), 0.0)
-        bodies = [
-            (self._checker.get_body(a).name(), self._checker.get_body(b).name())
-            for a, b in zip(clearance.robot_indices(), clearance.other_indices(), strict=True)
-        ]
-        return tuple(bodies)
+        """Names of the links that touch or come closer than the padding, for messages; boxes are `AROUND`."""
+        return _contacts(self._checker, self._full(q_rad))
 
     def _full(self, q_rad: FloatArray) -> FloatArray:
+        return self._now.positions(q_rad, self._opening_rad)
+
+
+class _BuiltScene:
+    """Drake's collision checker with the robot welded by its body and all boxes on one floating body.
+
+    Boxes are part of the model from the start: shapes that are added to a checker later cost 12 ms each.
+    """
+
+    def __init__(
+        self, description: str, model: ArmModel, boxes: tuple[Box, ...], joint_positions_rad: Mapping[str, float]
+    ) -> None:
+        from pydrake.geometry import Box as BoxShape
+        from pydrake.multibody.parsing import Parser
+        from pydrake.multibody.plant import CoulombFriction
+        from pydrake.multibody.tree import SpatialInertia
+        from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
+
+        builder = RobotDiagramBuilder()
+        plant = builder.plant()
+        (robot,) = Parser(plant).AddModelsFromString(description, "urdf")
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("body", robot))
+        around = plant.AddRigidBody(
+            AROUND, plant.AddModelInstance(AROUND), SpatialInertia.SolidSphereWithMass(1.0, 1.0)
+        )
+        for number, box in enumerate(boxes):
+            friction = CoulombFriction(1.0, 1.0)
+            plant.RegisterCollisionGeometry(around, box.X_FG, BoxShape(*box.size_m), f"box_{number}", friction)
+        plant.Finalize()
+        self._model, self._instance = model, plant.GetModelInstanceName(robot)
+        self._checker = SceneGraphCollisionChecker(
+            model=builder.Build(), robot_model_instances=[robot], edge_step_size=EDGE_STEP_RAD
+        )
+        self._padding_m: float | None = None
+        self._held: tuple[Box, ...] = ()
+        self._q = np.array(plant.GetPositions(plant.CreateDefaultContext()))
+        joints = {plant.get_joint(index).name(): plant.get_joint(index) for index in plant.GetJointIndices(robot)}
+        for name, joint in joints.items():
+            if joint.num_positions() == 1:
+                self._q[joint.position_start()] = joint_positions_rad.get(name, 0.0)
+        self._arm = np.array([joints[name].position_start() for name in model.names])
+        self.arm_velocities = np.array([joints[name].velocity_start() for name in model.names])
+        self._gripper = joints[model.gripper.name].position_start()
+        self._around = around.floating_positions_start()
+        self.place(RigidTransform([0.0, 0.0, _FAR_M]))
+        self._allow_stowed_contacts()
+        self.place(RigidTransform())
+
+    def place(self, X_BF: RigidTransform) -> None:
+        """Put the boxes' frame F there."""
+        quaternion = X_BF.rotation().ToQuaternion().wxyz()
+        self._q[self._around : self._around + 7] = [*quaternion, *X_BF.translation()]
+
+    def positions(self, q_rad: FloatArray, opening_rad: float) -> FloatArray:
+        """All positions of the model with the arm at q_rad (J,)."""
         q = self._q.copy()
         q[self._arm] = q_rad
+        q[self._gripper] = -opening_rad
         return q
 
-    def _add(self, group: str, box: Box, instance: str, body: str) -> None:
+    def checker(self, padding_m: float, held: tuple[Box, ...]) -> SceneGraphCollisionChecker:
+        """The checker with a padding to the boxes (m) and a thing in the hand (frame H)."""
         from pydrake.geometry import Box as BoxShape
         from pydrake.planning import BodyShapeDescription
 
-        shape = BodyShapeDescription(BoxShape(*box.size_m), box.X_FG, instance, body)
-        self._checker.AddCollisionShape(group, shape)
+        if held != self._held:
+            self._checker.RemoveAllAddedCollisionShapes("held")
+            for box in held:
+                shape = BodyShapeDescription(BoxShape(*box.size_m), box.X_FG, self._instance, self._model.hand_link)
+                self._checker.AddCollisionShape("held", shape)
+            self._held = held
+        if padding_m != self._padding_m:
+            self._checker.SetPaddingAllRobotEnvironmentPairs(padding_m)
+            self._padding_m = padding_m
+        return self._checker
 
     def _allow_stowed_contacts(self) -> None:
         """Links that touch when the arm is stowed may touch: resting there is what stowing means."""
-        for a, b in self.contacts(self.model.stowed_rad):
+        for a, b in _contacts(self._checker, self.positions(self._model.stowed_rad, 0.0)):
             plant = self._checker.plant()
             self._checker.SetCollisionFilteredBetween(plant.GetBodyByName(a), plant.GetBodyByName(b), True)
+
+
+def _contacts(checker: SceneGraphCollisionChecker, q_rad: FloatArray) -> tuple[tuple[str, str], ...]:
+    """Names of the links that touch or come closer than the padding at all positions q_rad of the model."""
+    clearance = checker.CalcRobotClearance(q_rad, 0.0)
+    bodies = [
+        (checker.get_body(a).name(), checker.get_body(b).name())
+        for a, b in zip(clearance.robot_indices(), clearance.other_indices(), strict=True)
+    ]
+    return tuple(bodies)
 
 
 def _without_visuals(description: str) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import PlanningError
-from skills.arm.collision import EDGE_STEP_RAD, ArmScene
+from skills.arm.collision import AROUND, EDGE_STEP_RAD, ArmScene
 from skills.arm.kinematics import ArmModel
 from skills.quantities import Count, Duration, Length, Tries, Turn, TurnAcceleration, TurnRate
 from skills.robot import ArmTrajectory, FloatArray
@@ -167,9 +167,7 @@ def _after(count: int) -> Callable[[], bool]:
 
 
 def _pairs(scene: ArmScene, q_rad: FloatArray) -> str:
-    names = {
-        tuple("what stands around" if name == "world" else name for name in pair) for pair in scene.contacts(q_rad)
-    }
+    names = {tuple("what stands around" if name == AROUND else name for name in pair) for pair in scene.contacts(q_rad)}
     return ", ".join(sorted(f"{a} with {b}" for a, b in names)) or "nothing"
 
 

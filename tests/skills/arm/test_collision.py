@@ -1,0 +1,68 @@
+"""The collision scene: boxes in any frame, those of before found again, a thing in the hand, its own padding."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from plant.spot.capabilities import spot_capabilities
+from skills.arm.collision import AROUND, ArmScene, Box
+from skills.arm.kinematics import arm_model
+
+CAPABILITIES = spot_capabilities()
+MODEL = arm_model(CAPABILITIES)
+AHEAD = MODEL.inverse(RigidTransform([0.8, 0.0, 0.2]))[0]
+AT_HAND = Box(RigidTransform([0.85, 0.0, 0.2]), (0.1, 0.1, 0.1))
+
+
+@pytest.fixture(scope="module")
+def scene() -> ArmScene:
+    return ArmScene(CAPABILITIES, MODEL, {})
+
+
+def test_boxes_in_another_frame_stand_where_that_frame_is(scene: ArmScene) -> None:
+    # frame F 2 m to the left: free; F at the body: in contact
+    scene.set_boxes([AT_HAND], RigidTransform([0.0, 2.0, 0.0]))
+    assert scene.free(AHEAD)
+    scene.set_boxes([AT_HAND], RigidTransform())
+    assert not scene.free(AHEAD)
+
+
+def test_what_is_touched_is_named(scene: ArmScene) -> None:
+    scene.set_boxes([AT_HAND])
+    assert any(AROUND in pair for pair in scene.contacts(AHEAD))
+
+
+def test_boxes_of_before_stand_where_they_stood_after_other_boxes(scene: ArmScene) -> None:
+    scene.set_boxes([AT_HAND])
+    with scene.with_only((), 0.0):
+        assert scene.free(AHEAD)
+    assert not scene.free(AHEAD)
+
+
+def test_the_padding_counts_for_boxes_set_later(scene: ArmScene) -> None:
+    # a box that ends 5 cm below the hand's origin, which is 3 to 4 cm high: free with 1 cm, too near with 10 cm
+    below = Box(RigidTransform([0.85, 0.0, 0.2 - 0.05 - 0.1]), (0.1, 0.1, 0.1))
+    scene.set_padding(0.10)
+    scene.set_boxes([below])
+    assert not scene.free(AHEAD)
+    scene.set_padding(0.002)
+    assert scene.free(AHEAD)
+
+
+def test_a_thing_in_the_hand_stays_there_when_the_boxes_change(scene: ArmScene) -> None:
+    far_ahead = Box(RigidTransform([1.4, 0.0, 0.2]), (0.1, 0.1, 0.1))
+    scene.hold([Box(RigidTransform([0.5, 0.0, 0.0]), (0.5, 0.05, 0.05))])
+    scene.set_boxes([far_ahead])
+    assert not scene.free(AHEAD)
+    scene.hold(())
+    assert scene.free(AHEAD)
+
+
+def test_checks_of_a_scene_do_not_depend_on_those_before(scene: ArmScene) -> None:
+    rng = np.random.default_rng(4)
+    turns = rng.uniform(MODEL.lower_rad, MODEL.upper_rad, (20, len(MODEL.names)))
+    scene.set_boxes([AT_HAND])
+    first = [scene.free(q) for q in turns]
+    scene.set_boxes(())
+    scene.set_boxes([AT_HAND])
+    assert [scene.free(q) for q in turns] == first

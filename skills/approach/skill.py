@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
-import numpy as np
-from pydrake.math import RigidTransform
-
 from skills.api import Cause, ObjectObservation, Succeeded, Surface
 from skills.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
 from skills.arm.arm_skill import ArmSkill
-from skills.arm.kinematics import ArmModel
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
-from skills.grasp.candidates import GraspCandidate, Target
-from skills.grasp.planning import body_height_m, within_reach
+from skills.detect.viewpoints import surface_boxes
+from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, observed_target, space_about
 from skills.navigate.footprint import Footprint
 from skills.navigate.skill import NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
 from skills.robot import Pose2D
 
 _STILL_BEFORE_M = 1.3
+ReachCost = Callable[[Pose2D], float | None]
 
 
 @dataclass(frozen=True)
@@ -69,24 +66,30 @@ class Approach(ArmSkill[ApproachInputs]):
     def run(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         """Choose a place, go, look again."""
         seen = inputs.observation
-        point_W = (seen.position_W[0], seen.position_W[1])
-        here = self.context.pose()
-        from_here = self._reach_cost(seen)(here) if is_comfortable(here, point_W) else None
-        if from_here is None or from_here > self.options.good_grasp:
-            free, reach_cost = self._free_places(seen), self._reach_cost(seen)
-            places = yield from self.compute(
-                lambda: reachable(free, reach_cost),
-                latency_s=0.2,
-                name="choose a place",
-                message="choosing where to stand",
-            )
-            if not places:
-                raise SkillFailure(Cause.PLANNING, self._why_none(seen))
+        places = yield from self._places(inputs)
+        if not places:
+            raise SkillFailure(Cause.PLANNING, self._why_none(seen))
+        if places[0].pose != self.context.pose():
             yield from self.stow()
             tolerances = (self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s)
             goals = [NavigateInputs(place.pose, *tolerances) for place in places[: self.options.tries]]
             yield from go_to_one(self, goals)
         return (yield from self._look_again(inputs))
+
+    def _places(self, inputs: ApproachInputs) -> Routine[list[Standing]]:
+        """Where to stand, best first: where the robot stands already, when that is good enough."""
+        seen, here, enough = inputs.observation, self.context.pose(), self.options.good_grasp
+        comfortable = is_comfortable(here, (seen.position_W[0], seen.position_W[1]))
+        free, reach_cost = self._free_places(seen), self._reach_cost(seen, own_surfaces(inputs))
+
+        def choose() -> list[Standing]:
+            cost_at = reach_cost()
+            from_here = cost_at(here) if comfortable else None
+            return [Standing(here, 0.0)] if from_here is not None and from_here <= enough else reachable(free, cost_at)
+
+        return (
+            yield from self.compute(choose, latency_s=0.2, name="choose a place", message="choosing where to stand")
+        )
 
     def undone(self, inputs: ApproachInputs) -> str | None:
         """Judged by the robot's pose."""
@@ -96,8 +99,7 @@ class Approach(ArmSkill[ApproachInputs]):
 
     def _look_again(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         seen = inputs.observation
-        surfaces = tuple(s for s in inputs.surfaces if s.name == seen.surface) or inputs.surfaces
-        again = DetectInputs((seen.thing.name,), surfaces, seen.thing.attributes, seen.position_W)
+        again = DetectInputs((seen.thing.name,), own_surfaces(inputs), seen.thing.attributes, seen.position_W)
         found = yield from self.perform(Detect(self.context), again)
         return Succeeded(f"standing before the {seen.thing}", found.outputs)
 
@@ -115,43 +117,31 @@ class Approach(ArmSkill[ApproachInputs]):
         size_mm = " x ".join(f"{1000 * side:.0f}" for side in seen.size_m)
         return f"the gripper cannot take hold of the {seen.thing} as it lies ({size_mm} mm)"
 
-    def _reach_cost(self, seen: ObjectObservation) -> Callable[[Pose2D], float | None]:
-        base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
-        model = self.model
-        candidates = partial(self.context.stack.grasp_planner.candidates, p_BS=model.p_BS, gripper=self.gripper)
-        height_m = body_height_m(base_m, self.context.robot.capabilities())
-        return lambda pose: grasp_cost(model, candidates, pose.transform(height_m), seen)
+    def _reach_cost(self, seen: ObjectObservation, surfaces: Sequence[Surface]) -> Callable[[], ReachCost]:
+        """Gives, inside a Worker job, what a grasp of the object costs from a pose: None where none is reached."""
+        base_m, X_WB = seen.position_W[2] - 0.5 * seen.size_m[2], self.X_WB()
+        off_m = math.hypot(seen.position_W[0] - X_WB.translation()[0], seen.position_W[1] - X_WB.translation()[1])
+        self.known_W = space_about(seen.position_W, base_m)
+        boxes = [*surface_boxes(surfaces, X_WB), *self.seen_boxes(beyond_m=off_m)]
+        self.known_W = None
+        heights_m = body_heights_m(base_m, self.context.robot.capabilities())
+        candidates = partial(self.context.stack.grasp_planner.candidates, p_BS=self.model.p_BS, gripper=self.gripper)
+        scene_now, opening_rad = self.scene_now(boxes), WIDE * self.open_rad
+
+        def prepared() -> ReachCost:
+            scene = scene_now()
+            scene.set_opening(opening_rad)
+            check = ReachCheck(scene, boxes, X_WB, seen, candidates)
+
+            def cost(pose: Pose2D) -> float | None:
+                best = check.best(pose.transform, heights_m)
+                return None if best is None else best.cost
+
+            return cost
+
+        return prepared
 
 
-def grasp_cost(
-    model: ArmModel,
-    candidates_of: Callable[[Target], list[GraspCandidate]],
-    X_WB: RigidTransform,
-    seen: ObjectObservation,
-) -> float | None:
-    """Cost of the best grasp of an object that the arm reaches with the body at X_WB, beyond the best there is.
-
-    None when it reaches no grasp.
-    """
-    up_B = X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
-    candidates = candidates_of(observed_target(seen, X_WB))
-    reached = (candidate.cost for candidate in candidates if within_reach(model, candidate, up_B))
-    best = next(reached, None)
-    return None if best is None else best - candidates[0].cost
-
-
-def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
-    """An observation as a grasp target: its box filled with points."""
-    length, width, height = seen.size_m
-    X_BW = X_WB.inverse()
-    base_m = float((X_BW @ np.array(seen.position_W))[2]) - 0.5 * height
-    turn = RigidTransform(X_BW.rotation())
-    axis = turn @ np.array([np.cos(seen.yaw_rad), np.sin(seen.yaw_rad), 0.0])
-    yaw = float(np.arctan2(axis[1], axis[0]))
-    grid = np.stack(np.meshgrid(np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 7)), axis=-1).reshape(-1, 2)
-    along = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
-    centre = (X_BW @ np.array(seen.position_W))[:2]
-    xy = centre + (grid * [length, min(width, 0.06)]) @ along
-    points = np.column_stack([xy, np.full(len(xy), base_m + height)])
-    is_round = height > 0.075 and length < 1.2 * width
-    return Target(points, (float(centre[0]), float(centre[1])), yaw, length, width, height, base_m, is_round)
+def own_surfaces(inputs: ApproachInputs) -> tuple[Surface, ...]:
+    """The surface that the object lies on, or all that are given where it is not among them."""
+    return tuple(s for s in inputs.surfaces if s.name == inputs.observation.surface) or inputs.surfaces

@@ -109,9 +109,13 @@ class ArmSkill(RoutineSkill[InputsT]):
         """The body's pose in the world, as estimated."""
         return self.context.X_WB()
 
-    def scene_now(self) -> Callable[[], ArmScene]:
-        """Gives, inside a Worker job, the collision scene with what stands around and what is held just now."""
-        robot, model, boxes, held = self.context.robot, self.model, [*self.boxes, *self.seen_boxes()], self.held
+    def scene_now(self, boxes: Sequence[Box] | None = None) -> Callable[[], ArmScene]:
+        """Gives, inside a Worker job, the collision scene with what stands around and what is held just now.
+
+        `boxes` (frame B) stand around instead of what is known, where they are given.
+        """
+        robot, model, held = self.context.robot, self.model, self.held
+        boxes = [*self.boxes, *self.seen_boxes()] if boxes is None else boxes
         capabilities, joints = robot.capabilities(), robot.joints()
         work, opening_rad = self.context.work, max(0.0, robot.gripper().opening_rad)
 
@@ -125,8 +129,11 @@ class ArmSkill(RoutineSkill[InputsT]):
 
         return prepared
 
-    def seen_boxes(self) -> list[Box]:
-        """What the hand camera has seen within reach, but what is known better and what is at the arm itself."""
+    def seen_boxes(self, beyond_m: float = 0.0) -> list[Box]:
+        """What the hand camera has seen within reach, but what is known better and what is at the arm itself.
+
+        `beyond_m` is added to the reach.
+        """
         X_WB, q_rad = self.X_WB(), self.q_rad()
         arm_W = self.model.points_B(q_rad) @ X_WB.rotation().matrix().T + X_WB.translation()
         tip_W = X_WB @ self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])
@@ -138,7 +145,7 @@ class ArmSkill(RoutineSkill[InputsT]):
                 out |= np.all((points_W > self.known_W[0]) & (points_W < self.known_W[1]), axis=1)
             return np.asarray(out | self._own(points_W))
 
-        return solid_boxes(self.context.solid.cells, X_WB, self._reach_m(), left_out)
+        return solid_boxes(self.context.solid.cells, X_WB, self._reach_m() + beyond_m, left_out)
 
     def _reach_m(self) -> float:
         """How far from the body's origin the arm and what it holds may come."""

@@ -13,15 +13,13 @@ from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.quantities import Margin, TurnRate
-from skills.robot import ArmTrajectory, Capabilities, FloatArray, GripperCapabilities
+from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
 from skills.stack import ArmPlanner
 
 PREGRASPS_M = (0.12, 0.07, 0.045)
 """How far before the grasp the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0))
 """Ways to lift, up and back towards the shoulder, the best first."""
-_LOW_SURFACE_M, _HIGH_SURFACE_M = 0.2, 0.72
-_BELOW_LIMIT_M = 0.005
 _SLOW_POINTS = 3
 
 
@@ -134,21 +132,13 @@ def lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[Float
 
 
 def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray, arm_planner: ArmPlanner) -> FloatArray:
-    """The first way to lift that the arm can follow. Raises PlanningError."""
+    """The first way to lift that the arm can follow and that touches nothing. Raises PlanningError."""
     X_BH = scene.model.X_BH(q_rad)
     for lift_B in lifts(scene.model, X_BH, up_B):
         try:
-            arm_planner.line(scene.model, q_rad, RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B))
+            lifted = RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B)
+            arm_planner.line(scene.model, q_rad, lifted, scene)
         except PlanningError:
             continue
         return lift_B
     raise PlanningError("the arm cannot lift the object from there")
-
-
-def body_height_m(base_m: float, capabilities: Capabilities) -> float:
-    """Height of the body's origin over the floor to take an object that stands base_m over the floor."""
-    if base_m < _LOW_SURFACE_M:
-        return min(capabilities.standing_height_m, capabilities.height_range_m[0] + _BELOW_LIMIT_M)
-    if base_m < _HIGH_SURFACE_M:
-        return capabilities.standing_height_m
-    return max(capabilities.standing_height_m, capabilities.height_range_m[1] - _BELOW_LIMIT_M)

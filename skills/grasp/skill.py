@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from typing import ClassVar
 
 import numpy as np
@@ -18,7 +18,8 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, body_height_m, lifts
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
+from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, space_about
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
 from skills.perception.surface_segmentation import Cluster, SurfaceView, cluster_of, parted, view_surface
@@ -31,9 +32,9 @@ _PER_KG_N, _MOST_OF_FORCE = 12.0, 0.95
 _RELAX_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.014, 0.12, 0.8
 _SURFACE_AROUND_M = 0.2
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
-_SURFACE_BAND_M, _KNOWN_ABOVE_M = 0.06, 0.34
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
+_HEIGHTS_TRIED = 2
 _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 
@@ -101,12 +102,9 @@ class Grasp(ArmSkill[GraspInputs]):
         thing = inputs.observation.thing
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "the gripper holds something already")
-        seen, capabilities = inputs.observation, self.context.robot.capabilities()
+        seen = inputs.observation
         try:
-            height_m = body_height_m(seen.position_W[2] - 0.5 * seen.size_m[2], capabilities)
-            yield from self.stand_at(height_m, f"standing up to the {thing}")
-            view = yield from self._look_closely(seen)
-            plan = yield from self._plan(view, str(thing), inputs.avoid)
+            view, plan = yield from self._plan_from_a_height(seen, inputs.avoid)
             self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
             yield from self._take(view, plan, str(thing))
         except SkillFailure as failure:
@@ -116,8 +114,46 @@ class Grasp(ArmSkill[GraspInputs]):
             yield from self._carry(plan.candidate, str(thing))
         except SkillFailure as failure:
             raise self._telling(failure) from failure
-        yield from self.stand_at(capabilities.standing_height_m, f"carrying the {thing}")
+        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, f"carrying the {thing}")
         return Succeeded(f"holding the {thing}", {"tried": self._tried})
+
+    def _plan_from_a_height(
+        self, seen: ObjectObservation, avoid: tuple[TriedGrasp, ...]
+    ) -> Routine[tuple[CloseView, GraspPlan]]:
+        """Look and plan with the body at the height that suits best, or at another where that one does not do."""
+        heights_m = yield from self._heights(seen)
+        for number, height_m in enumerate(heights_m, start=1):
+            yield from self.stand_at(height_m, f"standing up to the {seen.thing}")
+            try:
+                view = yield from self._look_closely(seen)
+                return view, (yield from self._plan(view, str(seen.thing), avoid))
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING or number == len(heights_m):
+                    raise
+        raise AssertionError("there is at least one height")
+
+    def _heights(self, seen: ObjectObservation) -> Routine[list[float]]:
+        """Body heights (m) from which the arm seems to reach the object, the best first; at least the usual one."""
+        base_m, X_WB = seen.position_W[2] - 0.5 * seen.size_m[2], self.X_WB()
+        heights_m = body_heights_m(base_m, self.context.robot.capabilities())
+        if len(heights_m) == 1:
+            return list(heights_m)
+        surface = _square(seen.position_W, base_m, "guess", _SURFACE_AROUND_M)
+        self.known_W = space_about(seen.position_W, base_m)
+        boxes = [*surface_boxes([surface], X_WB), *self.seen_boxes()]
+        candidates = partial(self.context.stack.grasp_planner.candidates, p_BS=self.model.p_BS, gripper=self.gripper)
+        scene_now, opening_rad, pose = self.scene_now(boxes), WIDE * self.open_rad, self.context.pose()
+
+        def choose() -> list[float]:
+            scene = scene_now()
+            scene.set_opening(opening_rad)
+            found = ReachCheck(scene, boxes, X_WB, seen, candidates).all(pose.transform, heights_m)
+            return [each.height_m for each in sorted(found, key=lambda each: each.cost)][:_HEIGHTS_TRIED]
+
+        chosen = yield from self.compute(
+            choose, latency_s=0.1, name="choose a height", message=f"choosing how high to stand before the {seen.thing}"
+        )
+        return chosen or [heights_m[0]]
 
     def begin(self, inputs: GraspInputs) -> None:
         """Forget an earlier attempt, but not the grasps that `inputs` names."""
@@ -174,7 +210,7 @@ class Grasp(ArmSkill[GraspInputs]):
         best: CloseView | None = None
         for aside_rad in _ASIDE_RAD:
             self.boxes = surface_boxes([_square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
-            self.known_W = _about(seen.position_W, base_m, _SURFACE_AROUND_M)
+            self.known_W = space_about(seen.position_W, base_m)
             try:
                 view = yield from self._look_from(seen, base_m, aside_rad)
             except SkillFailure as failure:
@@ -187,7 +223,7 @@ class Grasp(ArmSkill[GraspInputs]):
                 break
         if best is None:
             raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} is no longer where it was seen")
-        self.known_W = _about(seen.position_W, base_m, _LOOK_HALF_SIDE_M)
+        self.known_W = space_about(seen.position_W, base_m, _LOOK_HALF_SIDE_M)
         return best
 
     def _look_from(self, seen: ObjectObservation, base_m: float, aside_rad: float) -> Routine[CloseView | None]:
@@ -222,7 +258,7 @@ class Grasp(ArmSkill[GraspInputs]):
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
             raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the gripper")
-        opening = 0.9 * self.open_rad
+        opening = WIDE * self.open_rad
         yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
 
         scene_now, q, stack, seen = self.scene_now(), self.q_rad(), self.context.stack, self.seen_boxes()
@@ -329,7 +365,7 @@ class Grasp(ArmSkill[GraspInputs]):
                 continue
 
     def _open(self) -> Routine[None]:
-        yield from self.move_gripper(0.9 * self.open_rad, GRIPPER_FORCE_N, "opening the gripper after the failure")
+        yield from self.move_gripper(WIDE * self.open_rad, GRIPPER_FORCE_N, "opening the gripper after the failure")
 
     def _draw_back(self) -> Routine[None]:
         """Out of the object's reach, since the closing gripper must not catch it."""
@@ -344,13 +380,6 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _up_B(self) -> FloatArray:
         return np.asarray(self.X_WB().rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
-
-
-def _about(position_W: tuple[float, float, float], base_m: float, half_m: float) -> tuple[FloatArray, FloatArray]:
-    """The corners of the space on a surface about an object."""
-    x, y, _ = position_W
-    low = np.array([x - half_m, y - half_m, base_m - _SURFACE_BAND_M])
-    return low, np.array([x + half_m, y + half_m, base_m + _KNOWN_ABOVE_M])
 
 
 def _square(

@@ -8,9 +8,9 @@ import pytest
 from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectObservation, Thing
-from skills.approach.skill import grasp_cost, observed_target
 from skills.approach.standing import free_places, is_comfortable, reachable
 from skills.grasp.planning import GeometricGraspPlanner
+from skills.grasp.reach import grasp_cost, observed_target
 from skills.navigate.footprint import Footprint
 from skills.robot import Pose2D
 

@@ -1,0 +1,157 @@
+"""From where an object is taken: the body heights to choose among, and the grasps that the arm reaches there.
+
+A grasp counts as reached when the arm gets to it, to its pre-grasp and to the end of a lift without touching what is
+known to stand around.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Final
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import ObjectObservation
+from skills.arm.collision import ArmScene, Box
+from skills.arm.kinematics import ArmModel
+from skills.grasp.candidates import GraspCandidate, Target
+from skills.grasp.planning import PREGRASPS_M, lifts, within_reach
+from skills.robot import Capabilities, FloatArray
+
+_LOW_SURFACE_M, _HIGH_SURFACE_M = 0.2, 0.72
+_BELOW_LIMIT_M = 0.005
+_OTHER_HEIGHT_COST: Final = 0.15
+"""What a body height that is not the usual one costs: the body moves, and is less steady."""
+_PADDING_M, _MARGIN_RAD = 0.004, 0.08
+_LOOKED_AT = 60
+_SURFACE_AROUND_M, _SURFACE_BAND_M, _KNOWN_ABOVE_M = 0.2, 0.06, 0.34
+WIDE: Final = 0.9
+"""How far the gripper is open, as a part of all that it opens, as it reaches for an object."""
+
+CandidatesOf = Callable[[Target], list[GraspCandidate]]
+
+
+@dataclass(frozen=True)
+class Reached:
+    """The best grasp that is reached with the body at a height: what it costs beyond the best there is."""
+
+    cost: float
+    height_m: float
+
+
+@dataclass(frozen=True)
+class ReachCheck:
+    """What is needed to say how an object is reached from a pose of the body.
+
+    The boxes that stand around, without the object, are given in the body frame of the moment at X_WB.
+    """
+
+    scene: ArmScene
+    boxes: Sequence[Box]
+    X_WB: RigidTransform
+    seen: ObjectObservation
+    candidates_of: CandidatesOf
+
+    def best(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> Reached | None:
+        """The best height, the first of which is the usual one; None where no grasp is reached from any.
+
+        `at` gives X_WB for a height.
+        """
+        found = self.all(at, heights_m)
+        return min(found, key=lambda reached: reached.cost, default=None)
+
+    def all(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> list[Reached]:
+        """The best grasp from each height from which one is reached; the usual height alone where that is enough."""
+        found = []
+        for height_m in heights_m:
+            cost = self._cost(at(height_m))
+            if cost is None:
+                continue
+            if height_m == heights_m[0] and cost < _OTHER_HEIGHT_COST:
+                return [Reached(cost, height_m)]
+            found.append(Reached(cost + (0.0 if height_m == heights_m[0] else _OTHER_HEIGHT_COST), height_m))
+        return found
+
+    def _cost(self, X_WB: RigidTransform) -> float | None:
+        up_B = _up_B(X_WB)
+        self.scene.set_padding(_PADDING_M)
+        self.scene.set_boxes(self.boxes, X_WB.inverse() @ self.X_WB)
+        return grasp_cost(
+            self.scene.model, self.candidates_of, X_WB, self.seen, lambda each: _free(self.scene, each, up_B)
+        )
+
+
+def grasp_cost(
+    model: ArmModel,
+    candidates_of: CandidatesOf,
+    X_WB: RigidTransform,
+    seen: ObjectObservation,
+    free: Callable[[GraspCandidate], bool] = lambda candidate: True,
+) -> float | None:
+    """Cost of the best grasp that the arm reaches with the body at X_WB and that is `free`, beyond the best there is.
+
+    None when there is no such grasp.
+    """
+    candidates = candidates_of(observed_target(seen, X_WB))
+    reached = (each for each in candidates if within_reach(model, each, _up_B(X_WB), _MARGIN_RAD))
+    best = next((each for each in islice(reached, _LOOKED_AT) if free(each)), None)
+    return None if best is None else best.cost - candidates[0].cost
+
+
+def _up_B(X_WB: RigidTransform) -> FloatArray:
+    """Up in the body frame."""
+    return np.asarray(X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
+
+
+def _free(scene: ArmScene, candidate: GraspCandidate, up_B: FloatArray) -> bool:
+    """Whether the arm touches nothing at a grasp, before it and after a lift."""
+    X_BH = candidate.X_BH
+    if not (_any_free(scene, X_BH) and any(_any_free(scene, candidate.retreated(m)) for m in PREGRASPS_M)):
+        return False
+    lifted = (RigidTransform(X_BH.rotation(), X_BH.translation() + way_B) for way_B in lifts(scene.model, X_BH, up_B))
+    return any(_any_free(scene, X) for X in lifted)
+
+
+def _any_free(scene: ArmScene, X_BH: RigidTransform) -> bool:
+    return any(scene.free(q) for q in scene.model.inverse(X_BH, _MARGIN_RAD))
+
+
+def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ...]:
+    """Heights of the body's origin over the floor to take an object that stands base_m over the floor, the usual first.
+
+    A robot whose body cannot change its height has one.
+    """
+    low, high = capabilities.height_range_m
+    lowest, usual = min(capabilities.standing_height_m, low + _BELOW_LIMIT_M), capabilities.standing_height_m
+    highest = max(usual, high - _BELOW_LIMIT_M)
+    first = lowest if base_m < _LOW_SURFACE_M else usual if base_m < _HIGH_SURFACE_M else highest
+    return tuple(dict.fromkeys((first, usual, lowest, highest)))
+
+
+def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
+    """An observation as a grasp target: its box filled with points."""
+    length, width, height = seen.size_m
+    X_BW = X_WB.inverse()
+    base_m = float((X_BW @ np.array(seen.position_W))[2]) - 0.5 * height
+    turn = RigidTransform(X_BW.rotation())
+    axis = turn @ np.array([np.cos(seen.yaw_rad), np.sin(seen.yaw_rad), 0.0])
+    yaw = float(np.arctan2(axis[1], axis[0]))
+    grid = np.stack(np.meshgrid(np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 7)), axis=-1).reshape(-1, 2)
+    along = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    centre = (X_BW @ np.array(seen.position_W))[:2]
+    xy = centre + (grid * [length, min(width, 0.06)]) @ along
+    points = np.column_stack([xy, np.full(len(xy), base_m + height)])
+    is_round = height > 0.075 and length < 1.2 * width
+    return Target(points, (float(centre[0]), float(centre[1])), yaw, length, width, height, base_m, is_round)
+
+
+def space_about(
+    position_W: tuple[float, float, float], base_m: float, half_m: float = _SURFACE_AROUND_M
+) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest corner (world, m) of the space on a surface about an object that stands base_m high."""
+    x, y, _ = position_W
+    low = np.array([x - half_m, y - half_m, base_m - _SURFACE_BAND_M])
+    return low, np.array([x + half_m, y + half_m, base_m + _KNOWN_ABOVE_M])

@@ -77,10 +77,10 @@ class ArmSkill(RoutineSkill[InputsT]):
         p_BP = self.X_WB().inverse() @ np.asarray(p_W)
         return float(np.linalg.norm(self.model.X_BH(self.q_rad()).translation() - p_BP)) < within_m
 
-    def try_shift_hand(self, offset_B: FloatArray, message: str) -> Routine[bool]:
-        """Shift the hand where a straight way is found; whether there was one."""
+    def try_shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[bool]:
+        """Shift the hand where a straight way is found; whether there was one. It may have to touch nothing."""
         try:
-            yield from self.shift_hand(offset_B, message)
+            yield from self.shift_hand(offset_B, message, clear_of_boxes=clear_of_boxes)
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING:
                 raise
@@ -176,26 +176,32 @@ class ArmSkill(RoutineSkill[InputsT]):
         return q_goal_rad
 
     def move_straight(
-        self, p_BH: FloatArray, message: str, scene: ArmScene | None = None, q_from_rad: FloatArray | None = None
+        self, p_BH: FloatArray, message: str, q_from_rad: FloatArray | None = None, *, clear_of_boxes: bool = False
     ) -> Routine[None]:
         """Move the hand straight to p_BH with the orientation that it has.
 
-        The line begins at the joint angles of the arm, or at `q_from_rad`, which the arm about has.
+        The line begins at the joint angles of the arm, or at `q_from_rad`, which the arm about has. With
+        `clear_of_boxes` it must not touch what stands around.
         """
 
         q = self.q_rad() if q_from_rad is None else q_from_rad
+        scene_now = self.scene_now() if clear_of_boxes else None
 
         def plan() -> ArmTrajectory:
             X_BH = RigidTransform(self.model.X_BH(q).rotation(), p_BH)
+            scene = None if scene_now is None else scene_now()
+            if scene is not None:
+                scene.set_padding(0.0)
             planner = self.context.stack.arm_planner
             return planner.timed(planner.line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
 
         trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)
         yield from self.follow(trajectory, message)
 
-    def shift_hand(self, offset_B: FloatArray, message: str) -> Routine[None]:
+    def shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[None]:
         """Move the hand straight by an offset in the body frame."""
-        yield from self.move_straight(self.model.X_BH(self.q_rad()).translation() + offset_B, message)
+        p_BH = self.model.X_BH(self.q_rad()).translation() + offset_B
+        yield from self.move_straight(p_BH, message, clear_of_boxes=clear_of_boxes)
 
     def weigh(self, p_HO: FloatArray, message: str) -> Routine[float]:
         """The mass (kg) of what the still hand holds at p_HO (3,), from the arm's efforts; body level.

@@ -21,6 +21,7 @@ _ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M = 0.004, 0.003
 _LEAST_GRIP_M = 0.008
 _BIN_M, _BREADTH_M = 0.01, 0.036
 _LEAST_BEYOND_M = 0.004
+_YIELD_M, _LEAST_TOUCHING, _LOOSE_COST = 0.006, 0.55, 1.5
 _FROM_ABOVE_RAD = np.radians(50.0)
 _BELOW_PALM_M, _OVER_TOP_M, _TIPS_UP_M = 0.05, 0.01, 0.012
 
@@ -122,13 +123,24 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
             if np.count_nonzero(local) < 8:
                 continue
             low, high = np.percentile(t[local], [1, 99])
+            touching = min(_touching(s[local], -t[local], -low), _touching(s[local], t[local], high))
+            if touching < _LEAST_TOUCHING:
+                continue
             xy = np.array(target.centre_B) + (0.0 if square else middle + shift) * along + 0.5 * (low + high) * across
             half_depth = 0.5 * (target.length_m if turn == 0.0 else target.width_m) if target.upright else 0.02
             for azimuth in (yaw, yaw + np.pi):
                 off = abs(wrap(azimuth - ahead_rad))
-                yield _Placement(
-                    xy, azimuth, float(high - low), half_depth, 4.0 * abs(shift) + 2.0 * (high - low) + 0.15 * off
-                )
+                cost = 4.0 * abs(shift) + 2.0 * (high - low) + 0.15 * off + _LOOSE_COST * (1.0 - touching)
+                yield _Placement(xy, azimuth, float(high - low), half_depth, cost)
+
+
+def _touching(s: FloatArray, t: FloatArray, edge_m: float) -> float:
+    """Over which part of its breadth a finger that closes at edge_m touches an outline (s along, t across, m).
+
+    A finger at the cheek of a hammer's head touches at one end of its breadth only, and the hammer turns out of it.
+    """
+    bins = np.round(s / _BIN_M).astype(int)
+    return float(np.mean([np.percentile(t[bins == k], 98) > edge_m - _YIELD_M for k in np.unique(bins)]))
 
 
 def _balance(s: FloatArray, t: FloatArray) -> float:

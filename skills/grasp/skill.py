@@ -35,6 +35,7 @@ _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
 _HEIGHTS_TRIED = 2
+_LEVEL, _PULL_BACK_UP_M = 0.5, (0.02, 0.0)
 _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
 
@@ -348,12 +349,22 @@ class Grasp(ArmSkill[GraspInputs]):
         """Draw back from the surface, hold the object near the body, and check once more."""
         opening = self._check_held(thing, None)
         message = f"carrying the {thing}"
-        ahead = grasp.X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
-        yield from self.try_shift_hand(-self.options.pull_back_m * ahead + 0.02 * self._up_B(), message)
+        for up_m in _PULL_BACK_UP_M:
+            way_B = self.options.pull_back_m * self._back_B(grasp) + up_m * self._up_B()
+            if (yield from self.try_shift_hand(way_B, message, clear_of_boxes=True)):
+                break
         R_BH = self.model.X_BH(self.q_rad()).rotation()
         yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
         yield from self.pause(0.2, message)
         self._check_held(thing, opening)
+
+    def _back_B(self, grasp: GraspCandidate) -> FloatArray:
+        """The level direction out of a grasp: against the fingers, or towards the shoulder where they point down."""
+        X_BH = grasp.X_BH
+        against = -X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
+        if np.linalg.norm(against) < _LEVEL:
+            against = (self.model.p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
+        return np.asarray(against / np.linalg.norm(against))
 
     def _let_go(self, draw_back: bool = True) -> Routine[None]:
         """On failure: open the gripper, draw back from the object, stow; what does not work is left out."""
@@ -370,8 +381,12 @@ class Grasp(ArmSkill[GraspInputs]):
     def _draw_back(self) -> Routine[None]:
         """Out of the object's reach, since the closing gripper must not catch it."""
         ahead = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
-        for distance_m in _DRAW_BACK_M:
-            if (yield from self.try_shift_hand(-distance_m * ahead, "drawing back after the failure")):
+        ways = [(distance_m, True) for distance_m in _DRAW_BACK_M] + [
+            (distance_m, False) for distance_m in _DRAW_BACK_M
+        ]
+        for distance_m, clear in ways:
+            message = "drawing back after the failure"
+            if (yield from self.try_shift_hand(-distance_m * ahead, message, clear_of_boxes=clear)):
                 break
         yield from self.move_gripper(0.0, GRIPPER_FORCE_N, "closing the empty gripper")
 

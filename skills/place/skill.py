@@ -19,6 +19,7 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.geometry import wrap
 from skills.grasp.candidates import hand_rotation
+from skills.grasp.reach import body_heights_m
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
@@ -94,13 +95,14 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self._go_near(surface)
         view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
         held = self._held(carried)
-        q_above_rad = yield from self._go_above(surface, view, held)
+        q_above_rad = yield from self._go_above_from_a_height(surface, view, held)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
         yield from self._lower(surface, q_above_rad)
         yield from self._let_go()
         yield from self._check(surface, spot_W)
         yield from self.stow()
+        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
         return Succeeded(f"put the object down on the {surface.name}")
 
     def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
@@ -165,6 +167,18 @@ class Place(ArmSkill[PlaceInputs]):
         if view is None:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         return view
+
+    def _go_above_from_a_height(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
+        """As `_go_above`, with the body at the first height from which the arm gets there."""
+        heights_m = body_heights_m(surface.height_m, self.context.robot.capabilities())
+        for number, height_m in enumerate(heights_m, start=1):
+            yield from self.stand_at(height_m, f"standing up to the {surface.name}")
+            try:
+                return (yield from self._go_above(surface, view, held))
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING or number == len(heights_m):
+                    raise
+        raise AssertionError("there is at least one height")
 
     def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
         """Bring the object above the best free spot; gives the joint angles that the arm is to have there."""

@@ -47,12 +47,16 @@ class Target:
 
 @dataclass(frozen=True)
 class GraspCandidate:
-    """A hand pose about an object, the width between the fingers (m), its cost, its tilt (rad, 0 level)."""
+    """A hand pose about an object, the width between the fingers (m), its cost, its tilt (rad, 0 level).
+
+    `lever_m` is how far beside the grip the object's centre of mass seems to be, level and across the fingers.
+    """
 
     X_BH: RigidTransform
     width_m: float
     cost: float
     tilt_rad: float
+    lever_m: float = 0.0
 
     def retreated(self, distance_m: float) -> RigidTransform:
         """The hand pose drawn back along the fingers."""
@@ -68,6 +72,7 @@ class _Placement:
     width_m: float
     half_depth_m: float
     cost: float
+    lever_m: float = 0.0
 
 
 def grasp_candidates(
@@ -131,7 +136,7 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
             for azimuth in (yaw, yaw + np.pi):
                 off = abs(wrap(azimuth - ahead_rad))
                 cost = 4.0 * abs(shift) + 2.0 * (high - low) + 0.15 * off + _LOOSE_COST * (1.0 - touching)
-                yield _Placement(xy, azimuth, float(high - low), half_depth, cost)
+                yield _Placement(xy, azimuth, float(high - low), half_depth, cost, abs(shift))
 
 
 def _touching(s: FloatArray, t: FloatArray, edge_m: float) -> float:
@@ -187,7 +192,7 @@ def _candidate(
     p_HT = np.array([depth, 0.0, gripper.fixed_z_m + beside_m + 0.5 * placement.width_m])
     p_BT = np.array([*placement.xy, target.base_m + height])
     X_BH = RigidTransform(R_BH, p_BT - R_BH.matrix() @ p_HT)
-    return GraspCandidate(X_BH, placement.width_m, float(cost), tilt)
+    return GraspCandidate(X_BH, placement.width_m, float(cost), tilt, placement.lever_m)
 
 
 def _top_grip(half_depth_m: float, tilt_rad: float, gripper: GripperCapabilities) -> tuple[float, float]:

@@ -28,7 +28,7 @@ from skills.robot import FloatArray, Image
 
 _LOOK_HALF_SIDE_M = 0.4
 _CLOSED_RAD = 0.06
-_PER_KG_N, _MOST_OF_FORCE = 12.0, 0.95
+_PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95
 _RELAX_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.014, 0.12, 0.8
 _SURFACE_AROUND_M = 0.2
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
@@ -285,7 +285,8 @@ class Grasp(ArmSkill[GraspInputs]):
         touched = yield from self.follow(plan.last_bit, f"reaching for the {thing}", self.held_up(ahead))
         yield from self._to_the_ground(ahead, touched, f"reaching for the {thing}")
         X_BH = self.model.X_BH(self.q_rad())
-        yield from self.move_gripper(0.0, self.options.force_n, f"closing on the {thing}")
+        force_n = self.options.force_n + _PER_LEVER_N_M * plan.candidate.lever_m
+        yield from self.move_gripper(0.0, force_n, f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
         self.held = [_held_box(X_BH.inverse(), view.target_box)]
@@ -296,7 +297,7 @@ class Grasp(ArmSkill[GraspInputs]):
         mass_kg = yield from self.weigh(p_HO, f"lifting the {thing}")
         self._check_held(thing, opening)
         yield from self._refuse_heavy(mass_kg, plan.lift_B, thing)
-        firmly_n = min(self.options.force_n + _PER_KG_N * max(mass_kg, 0.0), _MOST_OF_FORCE * self.gripper.max_force_n)
+        firmly_n = min(force_n + _PER_KG_N * max(mass_kg, 0.0), _MOST_OF_FORCE * self.gripper.max_force_n)
         yield from self.move_gripper(0.0, firmly_n, f"lifting the {thing}")
 
     def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, thing: str) -> Routine[None]:

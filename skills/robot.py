@@ -82,9 +82,10 @@ class ArmCapabilities:
 class GripperCapabilities:
     """The gripper: 0 is closed, `open_rad` is fully open (a positive finger angle).
 
-    Geometry in the hand frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, fingertips at
-    `tip_x_m`, the inner face of the fixed finger at `fixed_z_m`; tips are 2 `half_breadth_m` wide and `tip_thickness_m`
-    thick. What it grips has its middle about `grip_x_m` ahead of H, is up to `max_grasp_m` wide and ends by `length_m`.
+    Geometry in the hand frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, the tip of the
+    moving finger at `tip_x_m` and of the fixed one at `fixed_tip_x_m`, whose inner face is at `fixed_z_m`; tips are
+    2 `half_breadth_m` wide and `tip_thickness_m` thick. What it grips has its middle about `grip_x_m` ahead of H, is up
+    to `max_grasp_m` wide and ends by `length_m`.
     """
 
     joint_name: str
@@ -94,6 +95,7 @@ class GripperCapabilities:
     depth_m: float
     palm_x_m: float
     tip_x_m: float
+    fixed_tip_x_m: float
     fixed_z_m: float
     half_breadth_m: float
     tip_thickness_m: float

@@ -17,10 +17,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 from skills.geometry import wrap
 from skills.robot import FloatArray, GripperCapabilities
 
-_ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M = 0.004, 0.003
-_LEAST_GRIP_M = 0.008
+_ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M, _THIN_ABOVE_M = 0.004, 0.003, 0.001
+_LEAST_GRIP_M, THIN_M, _LEAST_OF_THIN = 0.008, 0.020, 0.35
 _BIN_M, _BREADTH_M = 0.01, 0.036
-_LEAST_BEYOND_M = 0.004
+_LEAST_BEYOND, _BESIDE_THIN_M = 0.25, 0.012
+_ENDING_LEVEL_M, _BEVEL_M, _SHORTER_CLOSED_M = 0.017, 0.003, 0.004
 _YIELD_M, _LEAST_TOUCHING, _LOOSE_COST = 0.006, 0.55, 1.5
 _FROM_ABOVE_RAD = np.radians(50.0)
 _BELOW_PALM_M, _OVER_TOP_M, _TIPS_UP_M = 0.05, 0.01, 0.012
@@ -86,8 +87,9 @@ def grasp_candidates(
     placements = _round_placements(target, ahead) if target.round else list(_long_placements(target, ahead))
     tried = [
         _candidate(target, placement, attitude, side, gripper, beside_m[0 if target.upright else 1])
-        for placement, attitude, side in itertools.product(placements, _attitudes(target), (1.0, -1.0))
+        for placement in placements
         if placement.width_m < gripper.max_grasp_m
+        for attitude, side in itertools.product(_attitudes(target, placement.width_m, gripper), (1.0, -1.0))
     ]
     found = [candidate for candidate in tried if candidate is not None]
     if not target.upright:
@@ -96,12 +98,16 @@ def grasp_candidates(
     return sorted(found, key=lambda candidate: candidate.cost)
 
 
-def _attitudes(target: Target) -> Sequence[tuple[float, float]]:
-    """Tilts of the fingers below level and, for what is taken from above, leans about its long axis; rad."""
+def _attitudes(target: Target, width_m: float, gripper: GripperCapabilities) -> Sequence[tuple[float, float]]:
+    """Tilts of the fingers below level and, for what is taken from above, leans about its long axis; rad.
+
+    With the first lean fingers of different length end level on both sides of something of a width.
+    """
     if target.upright:
         return [(float(np.radians(tilt)), 0.0) for tilt in (10.0, 0.0, 20.0, 32.0, 45.0, 60.0, 75.0, 90.0)]
     down = [(90.0, 0.0), (78.0, 0.0), (66.0, 0.0), (54.0, 0.0), (44.0, 0.0)]
-    leaning = [(90.0, lean) for lean in (18.0, -18.0, 32.0, -32.0, 44.0, -44.0)]
+    ending_level = np.degrees(np.arctan2(_closed_tip_x_m(gripper) - gripper.fixed_tip_x_m, width_m + _ENDING_LEVEL_M))
+    leaning = [(90.0, lean) for lean in (ending_level, -ending_level, 22.0, -22.0, 32.0, -32.0, 44.0, -44.0)]
     return [(float(np.radians(tilt)), float(np.radians(lean))) for tilt, lean in (*down, *leaning)]
 
 
@@ -179,15 +185,12 @@ def _candidate(
         depth = gripper.palm_x_m + placement.half_depth_m + 0.008
         cost = placement.cost + 0.4 * abs(tilt - np.radians(10.0))
     else:
-        height = 0.5 * target.height_m
-        down = -R_BH.matrix()[2, 0]
-        least = _LEAST_BEYOND_M if target.height_m < 0.04 else -height
-        clearance = height - _tip_drop(R_BH, placement.width_m, gripper, beside_m)
-        above = _above_surface(target.height_m, clearance - least * down)
-        beyond = (clearance - above) / down
-        if beyond < least or height + beyond * down < _LEAST_GRIP_M:
+        beside_m = min(beside_m, _BESIDE_THIN_M) if target.height_m < THIN_M else beside_m
+        low = _low_grip(R_BH, target.height_m, placement.width_m, gripper, beside_m)
+        if low is None:
             return None
-        depth = gripper.tip_x_m - beyond
+        depth, beyond = low
+        height = 0.5 * target.height_m
         cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
     p_HT = np.array([depth, 0.0, gripper.fixed_z_m + beside_m + 0.5 * placement.width_m])
     p_BT = np.array([*placement.xy, target.base_m + height])
@@ -209,13 +212,38 @@ def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationM
     return RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
 
 
+def _low_grip(
+    R_BH: RotationMatrix, height_m: float, width_m: float, gripper: GripperCapabilities, beside_m: float
+) -> tuple[float, float] | None:
+    """How far before the hand it holds the middle of what lies, and how far its fingers reach past that; m.
+
+    The lowest corner of the closed fingers stays just above the surface; the finger that ends higher counts for what
+    they hold. None where that is too little.
+    """
+    up_H, inner_z = R_BH.matrix()[2], gripper.fixed_z_m
+    width_m, down = width_m + beside_m, -float(up_H[0])
+    fixed_end, moving_end = (gripper.fixed_tip_x_m, inner_z), (_closed_tip_x_m(gripper), inner_z + width_m)
+    thick = gripper.tip_thickness_m
+    backs = ((x - _BEVEL_M, z + out) for (x, z), out in ((fixed_end, -thick), (moving_end, thick)))
+    corners = [fixed_end, moving_end, *backs]
+    lowest = min(up_H[0] * x + up_H[2] * z for x, z in corners) - abs(up_H[1]) * gripper.half_breadth_m
+    open_m = max(up_H[0] * x + up_H[2] * z for x, z in (fixed_end, moving_end)) - lowest
+    least = -(_LEAST_BEYOND if height_m < 0.04 else 0.5) * height_m
+    above = _above_surface(height_m, 0.5 * height_m - open_m - least * down)
+    beyond = (0.5 * height_m - above - open_m) / down
+    if beyond < least or height_m - above - open_m < min(_LEAST_GRIP_M, _LEAST_OF_THIN * height_m):
+        return None
+    middle_z = up_H[2] * (inner_z + 0.5 * width_m)
+    return float((above - 0.5 * height_m - lowest + middle_z) / down), float(beyond)
+
+
+def _closed_tip_x_m(gripper: GripperCapabilities) -> float:
+    """Where the moving finger ends when it holds something narrow: it turns, and reaches farthest half open."""
+    return max(gripper.fixed_tip_x_m, gripper.tip_x_m - _SHORTER_CLOSED_M)
+
+
 def _above_surface(height_m: float, spare_m: float) -> float:
     """How far the fingertips stay above the surface (m): more for what is high, less for what is flat."""
     usual = _ABOVE_SURFACE_M + 0.4 * max(0.0, height_m - 0.03)
-    return float(np.clip(spare_m - 1e-6, _LEAST_ABOVE_SURFACE_M, usual))
-
-
-def _tip_drop(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities, beside_m: float) -> float:
-    """How far below the middle of the fingertips their lowest corner lies, for an object of some width between them."""
-    half = 0.5 * width_m + beside_m + gripper.tip_thickness_m
-    return float(abs(R_BH.matrix()[2, 1]) * gripper.half_breadth_m + abs(R_BH.matrix()[2, 2]) * half)
+    least = _THIN_ABOVE_M if height_m < THIN_M else _LEAST_ABOVE_SURFACE_M
+    return float(np.clip(spare_m - 1e-6, least, usual))

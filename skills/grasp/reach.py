@@ -25,7 +25,8 @@ _LOW_SURFACE_M, _HIGH_SURFACE_M = 0.2, 0.72
 _BELOW_LIMIT_M = 0.005
 _OTHER_HEIGHT_COST: Final = 0.15
 """What a body height that is not the usual one costs: the body moves, and is less steady."""
-_PADDING_M, _MARGIN_RAD = 0.004, 0.08
+_PADDING_M, _MARGIN_RAD = -0.002, 0.08
+"""Fingertips end 1 mm above the surface where something thin lies."""
 _LOOKED_AT = 60
 _SURFACE_AROUND_M, _SURFACE_BAND_M, _KNOWN_ABOVE_M = 0.2, 0.06, 0.34
 WIDE: Final = 0.9

@@ -16,7 +16,7 @@ from skills.arm.collision import ArmScene, Box, box_corners
 from skills.arm.poses import carry_configuration, close_viewpoints, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
-from skills.grasp.candidates import GraspCandidate, Target
+from skills.grasp.candidates import THIN_M, GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, space_about
@@ -29,8 +29,8 @@ from skills.robot import FloatArray, Image
 _LOOK_HALF_SIDE_M = 0.4
 _CLOSED_RAD = 0.06
 _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95
-_RELAX_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.014, 0.12, 0.8
-_SURFACE_AROUND_M = 0.2
+_RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.014, 0.12, 0.8
+_SURFACE_AROUND_M, _SURFACE_YIELDS_M = 0.2, 0.003
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
@@ -283,7 +283,8 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.follow(plan.to_grasp, f"reaching for the {thing}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
         touched = yield from self.follow(plan.last_bit, f"reaching for the {thing}", self.held_up(ahead))
-        yield from self._to_the_ground(ahead, touched, f"reaching for the {thing}")
+        relax_m = _RELAX_M if view.target.height_m > THIN_M else _RELAX_THIN_M
+        yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {thing}")
         X_BH = self.model.X_BH(self.q_rad())
         force_n = self.options.force_n + _PER_LEVER_N_M * plan.candidate.lever_m
         yield from self.move_gripper(0.0, force_n, f"closing on the {thing}")
@@ -315,7 +316,7 @@ class Grasp(ArmSkill[GraspInputs]):
         most = f"the arm carries {arm.max_payload_kg:.1f} kg at most"
         raise SkillFailure(Cause.PRECONDITION, f"the {thing} weighs {mass_kg:.1f} kg, and {most}")
 
-    def _to_the_ground(self, ahead_B: FloatArray, touched: bool, message: str) -> Routine[None]:
+    def _to_the_ground(self, ahead_B: FloatArray, touched: bool, relax_m: float, message: str) -> Routine[None]:
         """Fingers that point down go on until they touch the surface, whose height is known to a few mm only."""
         X_BH, planner = self.model.X_BH(self.q_rad()), self.context.stack.arm_planner
         if not touched and ahead_B @ self._up_B() < -_DOWN:
@@ -328,7 +329,7 @@ class Grasp(ArmSkill[GraspInputs]):
                 planner.timed(path, speed_rad_s=_FEEL_RAD_S), message, self.held_up(ahead_B)
             )
         if touched:
-            yield from self.try_shift_hand(-_RELAX_M * ahead_B, message)
+            yield from self.try_shift_hand(-relax_m * ahead_B, message)
 
     def _lift(self, planned_B: FloatArray, message: str) -> Routine[None]:
         """Lift as planned or, where the hand came to stand otherwise, in another way. Raises SkillFailure."""
@@ -430,7 +431,10 @@ def _examine(
 
 
 def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:
-    """The surface as far as its own points show it, and as much all around the object, since its edge may be unseen."""
+    """The surface as far as its own points show it, and as much all around the object, since its edge may be unseen.
+
+    It lies a little low: fingers that take something thin come within a millimetre of it, and feel for it.
+    """
     xy = view.plane_points.p_W[:, :2]
     low, high = np.percentile(xy, [0.2, 99.8], axis=0)
     low, high = (
@@ -438,7 +442,8 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
         np.maximum(high, np.array(centre) + _SURFACE_AROUND_M),
     )
     corners = ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
-    return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), view.plane.height_m)
+    top_m = view.plane.height_m - _SURFACE_YIELDS_M
+    return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), top_m)
 
 
 def _same_thing(

@@ -56,6 +56,7 @@ TOY = Capabilities(
         depth_m=0.08,
         palm_x_m=0.125,
         tip_x_m=0.215,
+        fixed_tip_x_m=0.215,
         fixed_z_m=-0.040,
         half_breadth_m=0.020,
         tip_thickness_m=0.012,

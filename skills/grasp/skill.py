@@ -34,6 +34,7 @@ _SURFACE_AROUND_M, _SURFACE_YIELDS_M = 0.2, 0.003
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
+_CARRY_RAD_S, _GENTLY_RAD_S, _LONG_LEVER_M = 0.9, 0.45, 0.05
 _HEIGHTS_TRIED = 2
 _LEVEL, _PULL_BACK_UP_M = 0.5, (0.02, 0.0)
 _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
@@ -112,7 +113,7 @@ class Grasp(ArmSkill[GraspInputs]):
             yield from self._let_go(draw_back=len(self._tried) > len(inputs.avoid))
             raise self._telling(failure) from failure
         try:
-            yield from self._carry(plan.candidate, str(thing))
+            yield from self._carry(plan.candidate, str(thing), view.target.height_m < THIN_M)
         except SkillFailure as failure:
             raise self._telling(failure) from failure
         yield from self.stand_at(self.context.robot.capabilities().standing_height_m, f"carrying the {thing}")
@@ -287,6 +288,7 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {thing}")
         X_BH = self.model.X_BH(self.q_rad())
         force_n = self.options.force_n + _PER_LEVER_N_M * plan.candidate.lever_m
+        force_n = min(force_n, _MOST_OF_FORCE * self.gripper.max_force_n)
         yield from self.move_gripper(0.0, force_n, f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
@@ -347,7 +349,7 @@ class Grasp(ArmSkill[GraspInputs]):
             raise SkillFailure(Cause.POSTCONDITION, f"the {thing} slipped in the gripper while it was lifted")
         return gripper.opening_rad
 
-    def _carry(self, grasp: GraspCandidate, thing: str) -> Routine[None]:
+    def _carry(self, grasp: GraspCandidate, thing: str, gently: bool) -> Routine[None]:
         """Draw back from the surface, hold the object near the body, and check once more."""
         opening = self._check_held(thing, None)
         message = f"carrying the {thing}"
@@ -356,7 +358,8 @@ class Grasp(ArmSkill[GraspInputs]):
             if (yield from self.try_shift_hand(way_B, message, clear_of_boxes=True)):
                 break
         R_BH = self.model.X_BH(self.q_rad()).rotation()
-        yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=0.9)
+        speed_rad_s = _GENTLY_RAD_S if gently or grasp.lever_m > _LONG_LEVER_M else _CARRY_RAD_S
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, R_BH, q), message, speed_rad_s=speed_rad_s)
         yield from self.pause(0.2, message)
         self._check_held(thing, opening)
 

@@ -5,7 +5,7 @@ import pytest
 
 from plant.spot.capabilities import spot_capabilities
 from skills.arm.kinematics import arm_model
-from skills.grasp.candidates import Target, grasp_candidates
+from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
 from skills.grasp.planning import within_reach
 
 MODEL, GRIPPER = arm_model(spot_capabilities()), spot_capabilities().gripper
@@ -27,6 +27,11 @@ def _hammer(yaw):
     handle = np.stack(np.meshgrid(np.linspace(-0.165, 0.13, 150), np.linspace(-0.015, 0.015, 15)), -1).reshape(-1, 2)
     head = np.stack(np.meshgrid(np.linspace(0.13, 0.165, 18), np.linspace(-0.06, 0.06, 60)), -1).reshape(-1, 2)
     return _target(0.33, 0.12, 0.03, yaw=yaw, points=np.concatenate([handle, head]))
+
+
+def _wrench(yaw):
+    """Seen from above: a flat handle of 14 mm."""
+    return _target(0.27, 0.014, 0.0096, yaw=yaw)
 
 
 def test_a_can_is_taken_from_the_side_with_the_wrist_rolled():
@@ -68,27 +73,39 @@ def test_a_hammer_is_taken_across_its_handle(yaw):
     assert best.X_BH.rotation().matrix()[2, 0] < -0.9
 
 
-def test_fingertips_keep_off_the_surface():
-    gripper = GRIPPER
-    for target in (_hammer(0.6), _target(0.05, 0.05, 0.05)):
-        for candidate in grasp_candidates(target, MODEL.p_BS, GRIPPER):
-            for y in (-0.03, 0.03):
-                assert (candidate.X_BH @ np.array([gripper.tip_x_m, y, gripper.fixed_z_m]))[2] > target.base_m + 0.002
+def _tips_m(candidate: GraspCandidate, base_m: float, beside_m: float) -> list[float]:
+    """How high over the surface the ends of the fixed finger and of the moving one at the object are."""
+    fixed = (GRIPPER.fixed_tip_x_m, GRIPPER.fixed_z_m)
+    moving = (GRIPPER.tip_x_m - 0.004, GRIPPER.fixed_z_m + candidate.width_m + beside_m)
+    ends = [np.array([x, y, z]) for x, z in (fixed, moving) for y in (-GRIPPER.half_breadth_m, GRIPPER.half_breadth_m)]
+    return [float((candidate.X_BH @ end)[2]) - base_m for end in ends]
 
 
-@pytest.mark.parametrize(("height_m", "room_m"), [(0.030, 0.004), (0.022, 0.003)])
-def test_fingertips_stay_further_off_the_surface_where_a_thing_is_high_enough(height_m, room_m):
-    # a plain rod, straight from above: half of 30 mm leaves 4 mm and a grip, half of 22 mm less, but 3 mm at least
-    gripper, base = GRIPPER, 0.2
-    straight = [
-        candidate
-        for candidate in grasp_candidates(_target(0.25, 0.02, height_m, base=base), MODEL.p_BS, GRIPPER)
-        if candidate.X_BH.rotation().matrix()[2, 0] < -0.999
-    ]
-    assert straight
-    for candidate in straight:
-        tip = (candidate.X_BH @ np.array([gripper.tip_x_m, 0.0, gripper.fixed_z_m]))[2] - base
-        assert room_m - 1e-6 <= tip < room_m + 0.002
+# target, what is left beside the fixed finger (m) -> the least room under the fingers, m
+@pytest.mark.parametrize(
+    ("target", "beside_m", "least_m"),
+    [(_hammer(0.6), 0.017, 0.003), (_target(0.05, 0.05, 0.05), 0.017, 0.003), (_wrench(0.3), 0.012, 0.001)],
+)
+def test_fingertips_keep_off_the_surface(target, beside_m, least_m):
+    for candidate in grasp_candidates(target, MODEL.p_BS, GRIPPER):
+        assert min(_tips_m(candidate, target.base_m, beside_m)) > least_m - 1e-6
+
+
+def test_what_is_thin_is_held_by_fingers_that_end_level():
+    # 9.6 mm: straight from above the fixed finger, 11 mm shorter than the other can be, would pass over it
+    found = grasp_candidates(_wrench(0.3), MODEL.p_BS, GRIPPER)
+    assert found
+    for candidate in found:
+        assert max(_tips_m(candidate, _wrench(0.3).base_m, 0.012)) < 0.0096 - 0.003
+
+
+def test_nobody_takes_a_sheet_of_paper():
+    assert grasp_candidates(_target(0.25, 0.02, 0.002), MODEL.p_BS, GRIPPER) == []
+
+
+def test_a_finger_that_would_touch_at_one_end_of_its_breadth_only_is_no_grasp():
+    # a hammer's head, 35 mm along the handle, is wide over less than half of what a finger covers
+    assert all(candidate.width_m < 0.05 for candidate in grasp_candidates(_hammer(0.6), MODEL.p_BS, GRIPPER))
 
 
 def test_a_thing_wider_than_the_gripper_has_no_candidates():

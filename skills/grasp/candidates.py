@@ -221,8 +221,8 @@ def _low_grip(
     they hold. None where that is too little.
     """
     up_H, inner_z = R_BH.matrix()[2], gripper.fixed_z_m
-    width_m, down = width_m + beside_m, -float(up_H[0])
-    fixed_end, moving_end = (gripper.fixed_tip_x_m, inner_z), (_closed_tip_x_m(gripper), inner_z + width_m)
+    down, outer_z = -float(up_H[0]), inner_z + beside_m + width_m
+    fixed_end, moving_end = (gripper.fixed_tip_x_m, inner_z), (_closed_tip_x_m(gripper), outer_z)
     thick = gripper.tip_thickness_m
     backs = ((x - _BEVEL_M, z + out) for (x, z), out in ((fixed_end, -thick), (moving_end, thick)))
     corners = [fixed_end, moving_end, *backs]
@@ -233,7 +233,7 @@ def _low_grip(
     beyond = (0.5 * height_m - above - open_m) / down
     if beyond < least or height_m - above - open_m < min(_LEAST_GRIP_M, _LEAST_OF_THIN * height_m):
         return None
-    middle_z = up_H[2] * (inner_z + 0.5 * width_m)
+    middle_z = up_H[2] * (outer_z - 0.5 * width_m)
     return float((above - 0.5 * height_m - lowest + middle_z) / down), float(beyond)
 
 

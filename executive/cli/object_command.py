@@ -82,8 +82,8 @@ def _imported(mesh: Path, wanted: Wanted, out: Path) -> ImportedObject:
     """Import beside the folder, and put it there when it is whole. Raises InputError."""
     from plant.models.importing import ObjectImportError, ObjectsExtraMissingError, import_object
 
+    _refuse_wrong(wanted)
     try:
-        wanted.refuse_wrong()
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             raise InputError("there is something already", hint="name a new folder by --out", file=out)
         with tempfile.TemporaryDirectory(prefix="errand-object-") as draft:
@@ -98,6 +98,16 @@ def _imported(mesh: Path, wanted: Wanted, out: Path) -> ImportedObject:
         hint = "name another --out"
         raise InputError(f"the model cannot be written ({error.strerror})", hint=hint, file=out) from error
     return made
+
+
+def _refuse_wrong(wanted: Wanted) -> None:
+    """Raises InputError."""
+    from plant.models.importing import ObjectImportError
+
+    try:
+        wanted.refuse_wrong()
+    except ObjectImportError as error:
+        raise InputError(error.message, hint=error.hint) from error
 
 
 def _read(folder: Path) -> ImportedObject:

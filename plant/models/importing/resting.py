@@ -107,7 +107,9 @@ def feet(points: FloatArray, com: FloatArray) -> list[Sphere]:
         new = all(float(side.normal @ other.normal) < 0.97 for other in sides)
         if new and side.area_m2 > _LEAST_AREA * surface and len(sides) < MOST_SIDES:
             sides.append(side)
-    return [Sphere(radius=radius, p=(float(p[0]), float(p[1]), float(p[2]))) for s in sides for p in _centres(s, radius)]
+    return [
+        Sphere(radius=radius, p=(float(p[0]), float(p[1]), float(p[2]))) for s in sides for p in _centres(s, radius)
+    ]
 
 
 def _centres(side: Side, radius: float) -> Sequence[FloatArray]:

@@ -79,7 +79,9 @@ def same_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
     """Each point once (N, 3), and the corners of the triangles (T, 3), where nearly the same is the same."""
     corners = triangles.reshape(-1, 3)
     step = max(float(np.ptp(corners, axis=0).max()) * _SAME_POINT, 1e-12)
-    _, first, index = np.unique(np.round(corners / step).astype(np.int64), axis=0, return_index=True, return_inverse=True)
+    _, first, index = np.unique(
+        np.round(corners / step).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
     return corners[first], index.reshape(-1, 3)
 
 

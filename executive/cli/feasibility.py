@@ -91,7 +91,7 @@ def refuse_impossible(prepared: Prepared) -> None:
 
 
 def abilities_in(world: World) -> Abilities:
-    """What the robot can lift, and what the lightest object of each class weighs: in a world with imported ones, too."""
+    """What the robot can lift, and what the lightest object of each class weighs in a world with imports."""
     abilities = abilities_of()
     masses, others = dict(abilities.masses_kg), {rule.model for rule in world.seed_rules.objects}
     for name in sorted(others & set(world.imports)):

@@ -1,4 +1,4 @@
-"""The keys `imports` and `objects` of a mission file: models of your own, and objects that lie there at the beginning."""
+"""The keys `imports` and `objects` of a mission file: models of your own, and further objects."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ CORNERS: Final = 6
 MOST_SIDES: Final = 6
 _THICKNESS: Final = 0.01
 _LEAST_M: Final = 0.0003
-"""Points belong to a side when they are that near to its plane: a share of the body's height over it, and at least m."""
+"""Points belong to a side when they are that near to its plane: a share of the body's height over it, or metres."""
 _LEAST_TIPPING_RAD: Final = 0.05
 _LEAST_AREA: Final = 0.04
 _MOST_CANDIDATES: Final = 60

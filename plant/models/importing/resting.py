@@ -6,7 +6,6 @@ get spheres at their corners, which touch the plane from inside.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,6 +25,8 @@ _LEAST_M: Final = 0.0003
 _LEAST_TIPPING_RAD: Final = 0.05
 _LEAST_AREA: Final = 0.04
 _MOST_CANDIDATES: Final = 60
+_OTHER_SIDE: Final = 0.97
+_PROJECTIONS, _EXACT = 200, 0.02
 DOWN: Final = (0.0, 0.0, -1.0)
 
 
@@ -97,29 +98,51 @@ def side_towards(points: FloatArray, com: FloatArray, normal: FloatArray) -> Sid
 def feet(points: FloatArray, com: FloatArray) -> list[Sphere]:
     """Small spheres at the corners of the sides on which a body can rest, that on which it stands first.
 
-    They touch the sides' planes from inside.
+    They touch the sides' planes from inside; of a body with plane sides they stand out nowhere.
     """
+    hull = ConvexHull(points)
     radius = min(FOOT_M, float(np.ptp(points, axis=0).min()) / 6.0)
-    surface = float(ConvexHull(points).area)
     standing = side_towards(points, com, np.array(DOWN))
     sides = [] if standing is None else [standing]
     for side in resting_sides(points, com):
-        new = all(float(side.normal @ other.normal) < 0.97 for other in sides)
-        if new and side.area_m2 > _LEAST_AREA * surface and len(sides) < MOST_SIDES:
+        new = all(float(side.normal @ other.normal) < _OTHER_SIDE for other in sides)
+        if new and side.area_m2 > _LEAST_AREA * hull.area and len(sides) < MOST_SIDES:
             sides.append(side)
-    return [
-        Sphere(radius=radius, p=(float(p[0]), float(p[1]), float(p[2]))) for s in sides for p in _centres(s, radius)
-    ]
+    found = [_feet_of(side, hull.equations, radius) for side in sides]
+    if standing is not None and not found[0]:
+        found[0] = _rounded_feet(standing, radius)
+    return [foot for each in found for foot in each]
 
 
-def _centres(side: Side, radius: float) -> Sequence[FloatArray]:
+def _rounded_feet(side: Side, radius: float) -> list[Sphere]:
+    """Those of a side that is no plane, as of a ball, which would roll away."""
     middle = side.corners.mean(axis=0)
-    centres = []
-    for corner in _spread(side.corners):
-        inward = middle - corner
-        length = float(np.linalg.norm(inward))
-        centres.append(corner + inward / length * min(2.0 * radius, length / 2.0) - side.normal * radius)
-    return centres
+    centres = middle + (_spread(side.corners) - middle) / 2.0 - side.normal * radius
+    return [Sphere(radius=radius, p=(x, y, z)) for x, y, z in centres.tolist()]
+
+
+def _feet_of(side: Side, hull: FloatArray, radius: float) -> list[Sphere]:
+    """Those of one side, smaller where it is narrow."""
+    corners = _spread(side.corners)
+    for small in (radius, radius / 2.0, radius / 4.0):
+        centres = [_inside(corner - small * side.normal, side.normal, hull, small) for corner in corners]
+        found = [centre.tolist() for centre in centres if centre is not None]
+        if len(found) == len(corners):
+            return [Sphere(radius=small, p=(x, y, z)) for x, y, z in found]
+    return []
+
+
+def _inside(start: FloatArray, normal: FloatArray, hull: FloatArray, radius: float) -> FloatArray | None:
+    """The point near `start` in its plane where a sphere does not stand out of a hull's half spaces (K, 4), or None."""
+    centre = start
+    for _ in range(_PROJECTIONS):
+        out = hull[:, :3] @ centre + hull[:, 3] + radius
+        worst = int(np.argmax(out))
+        if out[worst] < _EXACT * radius:
+            return centre
+        centre = centre - hull[worst, :3] * out[worst]
+        centre = centre - normal * float((centre - start) @ normal)
+    return None
 
 
 def _spread(corners: FloatArray) -> FloatArray:

@@ -212,12 +212,16 @@ def _write_appearance(folder: Path, name: str, patches: Sequence[Patch]) -> None
 
 
 def _corner_normals(triangles: FloatArray) -> FloatArray:
-    """Unit normals (T, 3, 3) of corners: the mean of those of the triangles that meet there without an edge."""
+    """Unit normals (T, 3, 3) of corners: the mean of those of the triangles that meet there without an edge.
+
+    A triangle counts by its angle there.
+    """
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     facing = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-20)
     _, index = same_points(triangles)
     order = np.argsort(index.reshape(-1), kind="stable")
-    place, own, weighted = index.reshape(-1)[order], facing[order // 3], across[order // 3]
+    place, own = index.reshape(-1)[order], facing[order // 3]
+    weighted = own * _corner_angles(triangles).reshape(-1, 1)[order]
     sums = weighted.copy()
     for step in range(1, _MOST_NEIGHBOURS):
         together = place[step:] == place[:-step]
@@ -231,6 +235,15 @@ def _corner_normals(triangles: FloatArray) -> FloatArray:
     normals = np.empty_like(sums)
     normals[order] = sums
     return normals.reshape(-1, 3, 3)
+
+
+def _corner_angles(triangles: FloatArray) -> FloatArray:
+    """The angles (T, 3) of triangles at their corners."""
+    ahead = np.roll(triangles, -1, axis=1) - triangles
+    behind = np.roll(triangles, 1, axis=1) - triangles
+    lengths = np.linalg.norm(ahead, axis=2) * np.linalg.norm(behind, axis=2)
+    cosine = np.einsum("tij,tij->ti", ahead, behind) / np.maximum(lengths, 1e-20)
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 def _facts(wanted: Wanted, body: _Body, mass: MassProperties, parts: int) -> ImportedObject:

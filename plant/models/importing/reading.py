@@ -65,7 +65,7 @@ def read_patches(path: Path) -> tuple[Patch, ...]:
             f"it cannot be read as a mesh ({type(error).__name__})", "export it once more, for example as OBJ or GLB"
         ) from error
     if not patches:
-        raise ObjectImportError("there are no triangles in it", "give a file with a surface, no points and no lines")
+        raise ObjectImportError("it is no mesh: there are no triangles in it", "give a file with a surface")
     if not all(np.isfinite(patch.triangles).all() for patch in patches):
         raise ObjectImportError("some of its points are no finite numbers", "export it once more")
     return patches

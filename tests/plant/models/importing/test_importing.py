@@ -33,6 +33,10 @@ def l_shape():
     return trimesh.creation.extrude_triangulation(L_SHAPE, np.array(triangles_of(L_SHAPE)), 0.05)
 
 
+def pipe():
+    return trimesh.creation.annulus(0.03, 0.04, 0.1, sections=8)
+
+
 def lidless_box():
     box = trimesh.creation.box((0.1, 0.08, 0.06))
     box.update_faces(box.face_normals[:, 2] < 0.5)
@@ -170,7 +174,7 @@ def one_turned():
         (one_turned, "its triangles do not all look outward"),
         (lambda: trimesh.creation.box((200.0, 80.0, 60.0)), "if its unit is millimetres, give --scale 0.001"),
         (lambda: trimesh.creation.box((0.002, 0.001, 0.001)), "give --scale"),
-        (lambda: trimesh.PointCloud(np.eye(3)), "there are no triangles in it"),
+        (lambda: trimesh.PointCloud(np.eye(3)), "it is no mesh: there are no triangles in it"),
     ],
 )
 def test_what_is_no_body_is_refused(tmp_path, make, why):
@@ -190,9 +194,7 @@ def test_a_million_triangles_are_counted_and_refused(tmp_path):
     data = np.zeros(count, triangle)
     data["corners"] = np.random.default_rng(1).uniform(size=(count, 3, 3))
     (tmp_path / "m.stl").write_bytes(b" " * 80 + np.uint32(count).tobytes() + data.tobytes())
-    with pytest.raises(
-        ObjectImportError, match="it has 1000000 triangles, and at most 200000 are taken; make it coarser"
-    ):
+    with pytest.raises(ObjectImportError, match="it has 1000000 triangles, and at most 200000 are taken"):
         import_object(tmp_path / "m.stl", Wanted("gadget", 1.0), tmp_path)
 
 

@@ -89,7 +89,8 @@ def _imported(mesh: Path, wanted: Wanted, out: Path) -> ImportedObject:
         with tempfile.TemporaryDirectory(prefix="errand-object-") as draft:
             made = import_object(mesh, wanted, Path(draft))
             out.mkdir(parents=True, exist_ok=True)
-            shutil.copytree(draft, out, dirs_exist_ok=True, copy_function=shutil.copyfile)
+            for file in Path(draft).iterdir():
+                shutil.copyfile(file, out / file.name)
     except ObjectImportError as error:
         raise InputError(error.message, hint=error.hint, file=mesh) from error
     except ObjectsExtraMissingError as error:

@@ -17,7 +17,7 @@ from plant.models.importing.libraries import objects_module
 from skills.robot import FloatArray, Picture
 
 MAX_BYTES: Final = 200_000_000
-MOST_TRIANGLES: Final = 200_000
+MOST_TRIANGLES: Final = 100_000
 LARGEST_PICTURE_PX: Final = 1024
 Y_UP: Final = (".gltf", ".glb")
 """Formats that define y as up."""

@@ -144,12 +144,12 @@ def convex_parts(solid: Solid) -> tuple[FloatArray, ...]:
         coacd.Mesh(solid.points, solid.faces),
         threshold=CONCAVITY,
         max_convex_hull=MOST_PARTS,
-        max_ch_vertex=MOST_CORNERS,
         seed=0,
         **_EFFORT,
     )
     low, high = solid.points.min(axis=0), solid.points.max(axis=0)
-    return tuple(np.clip(np.asarray(points, dtype=np.float64), low, high) for points, _ in found)
+    clipped = (np.clip(np.asarray(points, dtype=np.float64), low, high) for points, _ in found)
+    return tuple(_few_corners(points[ConvexHull(points).vertices]) for points in clipped)
 
 
 def _few_corners(corners: FloatArray) -> FloatArray:

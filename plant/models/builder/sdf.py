@@ -24,13 +24,14 @@ class Model:
     mass: MassProperties | None = None
     friction: float = 0.8
     comment: str = field(default="")
+    maker: str = "a builder script"
 
 
 def model_sdf(model: Model) -> str:
     """The SDF text of a model."""
     collisions = "".join(_collision(index, shape, model.friction) for index, shape in enumerate(model.collisions))
     return f"""<?xml version="1.0"?>
-<!-- {model.comment or model.name}; made by a builder script, don't edit. -->
+<!-- {model.comment or model.name}; made by {model.maker}, don't edit. -->
 <sdf version="1.9" xmlns:drake="drake.mit.edu">
   <model name="{model.name}">
     <link name="{model.name}">

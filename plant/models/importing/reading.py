@@ -21,10 +21,11 @@ MOST_TRIANGLES: Final = 100_000
 LARGEST_PICTURE_PX: Final = 1024
 Y_UP: Final = (".gltf", ".glb")
 """Formats that define y as up."""
+MOST_COLOURS: Final = 64
+"""More colours than that are rounded to few."""
 GREY: Final[Colour] = (0.7, 0.7, 0.7)
 _NO_MESHES: Final = frozenset({"zip", "tar.gz", "bz2", "tar.bz2", "stl_ascii", "dxf", "xyz"})
 _SHADES: Final = 5
-_FEW_COLOURS: Final = 64
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,8 @@ def read_patches(path: Path) -> tuple[Patch, ...]:
         ) from error
     if not patches:
         raise ObjectImportError("it is no mesh: there are no triangles in it", "give a file with a surface")
+    if len({patch.colour for patch in patches}) > MOST_COLOURS:
+        patches = tuple(replace(patch, colour=_rounded(patch.colour)) for patch in patches)
     if not all(np.isfinite(patch.triangles).all() for patch in patches):
         raise ObjectImportError("some of its points are no finite numbers", "export it once more")
     return patches
@@ -127,9 +130,15 @@ def _colour(rgb: ArrayLike) -> Colour:
     return r, g, b
 
 
+def _rounded(colour: Colour) -> Colour:
+    """One of few colours."""
+    r, g, b = (round(value * (_SHADES - 1)) / (_SHADES - 1) for value in colour)
+    return r, g, b
+
+
 def _by_colour(colours: NDArray[np.uint8]) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.bool_]]]:
     """Colours, and which triangles (T,) have each; many colours are rounded to few."""
-    if len(np.unique(colours, axis=0)) > _FEW_COLOURS:
+    if len(np.unique(colours, axis=0)) > MOST_COLOURS:
         step = 255 / (_SHADES - 1)
         colours = np.round(np.round(colours / step) * step).astype(np.uint8)
     unique, index = np.unique(colours, axis=0, return_inverse=True)

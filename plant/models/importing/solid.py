@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from plant.models.importing.errors import ObjectImportError
 from plant.models.importing.libraries import objects_module
@@ -23,6 +24,7 @@ AS_GOOD_AS_CONVEX: Final = 0.97
 _EFFORT: Final = MappingProxyType({"mcts_iterations": 60, "mcts_nodes": 10, "resolution": 1000})
 """Half of CoACD's usual search, which takes a quarter of the time and finds no worse parts."""
 _SAME_POINT: Final = 1e-6
+_LEAST_VOLUME: Final = 1e-6
 Faces = NDArray[np.int64]
 
 
@@ -64,7 +66,7 @@ def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid
     points, faces = _closed(points, faces, rims)
     solid = Solid(points, faces)
     box = float(np.prod(np.ptp(points, axis=0)))
-    if abs(solid.volume_m3) <= 1e-6 * box or box == 0.0:
+    if abs(solid.volume_m3) <= _LEAST_VOLUME * box or box == 0.0:
         raise ObjectImportError("it encloses no volume", "give a body with a thickness, no sheet")
     inward = solid.volume_m3 < 0
     return (Solid(points, faces[:, ::-1]) if inward else solid), inward
@@ -135,9 +137,10 @@ def convex_parts(solid: Solid) -> tuple[FloatArray, ...]:
     Raises:
         ObjectsExtraMissingError: CoACD is not installed.
     """
-    hull = ConvexHull(solid.points)
+    hull = hull_of(solid.points)
+    whole = _few_corners(solid.points[hull.vertices])
     if solid.volume_m3 >= AS_GOOD_AS_CONVEX * hull.volume:
-        return (_few_corners(solid.points[hull.vertices]),)
+        return (whole,)
     coacd = objects_module("coacd")
     coacd.set_log_level("off")
     found = coacd.run_coacd(
@@ -148,8 +151,25 @@ def convex_parts(solid: Solid) -> tuple[FloatArray, ...]:
         **_EFFORT,
     )
     low, high = solid.points.min(axis=0), solid.points.max(axis=0)
-    clipped = (np.clip(np.asarray(points, dtype=np.float64), low, high) for points, _ in found)
-    return tuple(_few_corners(points[ConvexHull(points).vertices]) for points in clipped)
+    return tuple(_cornered(np.clip(points, low, high) for points, _ in found)) or (whole,)
+
+
+def _cornered(parts: Iterable[FloatArray]) -> Iterator[FloatArray]:
+    """The corners of parts; those as thin as paper are left out."""
+    for points in parts:
+        try:
+            hull = hull_of(points)
+        except ObjectImportError:
+            continue
+        yield _few_corners(points[hull.vertices])
+
+
+def hull_of(points: FloatArray) -> ConvexHull:
+    """The convex hull of points (N, 3). Raises ObjectImportError: they lie in a plane."""
+    try:
+        return ConvexHull(points)
+    except QhullError as error:
+        raise ObjectImportError("it encloses no volume", "give a body with a thickness, no sheet") from error
 
 
 def _few_corners(corners: FloatArray) -> FloatArray:

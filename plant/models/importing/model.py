@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from plant.models.builder.inertia import scaled_to, solid_mass
 from plant.models.builder.mesh import (
     SMOOTH_COSINE,
+    Colour,
     Material,
     Mesh,
     mtl_text,
@@ -30,7 +30,7 @@ from plant.models.imported import NAME, ImportedObject, write_imported
 from plant.models.importing.errors import ObjectImportError
 from plant.models.importing.reading import Y_UP, Patch, read_patches
 from plant.models.importing.resting import feet, resting_rotation
-from plant.models.importing.solid import Solid, convex_parts, same_points, solid_of
+from plant.models.importing.solid import Solid, convex_parts, hull_of, same_points, solid_of
 from plant.pictures import save_png
 from skills.robot import FloatArray, Picture
 
@@ -120,9 +120,10 @@ def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
         f"{wanted.name}.obj",
         [*(ConvexMesh(file=file) for file in files), *bearing],
         mass,
-        comment=f"{wanted.name}, imported from a mesh",
+        comment=wanted.name,
+        maker="`errand object import`",
     )
-    write_text(folder / f"{wanted.name}.sdf", model_sdf(model).replace("a builder script", "`errand object import`"))
+    write_text(folder / f"{wanted.name}.sdf", model_sdf(model))
     _write_appearance(folder, wanted.name, body.patches)
     made = _facts(wanted, body, mass, len(parts))
     write_imported(folder, made)
@@ -178,7 +179,7 @@ def _shrunk(part: FloatArray, points: FloatArray) -> FloatArray:
 
 def _hull_text(points: FloatArray) -> str:
     """The convex hull of points as OBJ, its triangles looking outward."""
-    hull = ConvexHull(points)
+    hull = hull_of(points)
     corners, faces = points[hull.vertices], np.searchsorted(hull.vertices, hull.simplices)
     a, b, c = (corners[faces[:, k]] for k in range(3))
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
@@ -188,19 +189,18 @@ def _hull_text(points: FloatArray) -> str:
 
 
 def _write_appearance(folder: Path, name: str, patches: Sequence[Patch]) -> None:
-    """The visual geometry with its pictures."""
+    """The visual geometry with its pictures; equal colours and equal pictures are one material."""
     materials, pictures = dict[str, Material](), dict[str, Picture]()
-    mesh = Mesh(materials)
+    mesh, known = Mesh(materials), dict[Colour | bytes, str]()
     normals = _corner_normals(np.concatenate([patch.triangles for patch in patches]))
     start = 0
-    for number, patch in enumerate(patches):
-        material = f"surface_{number:03d}"
-        if patch.picture is not None:
-            pictures[f"{material}.png"] = patch.picture
-            materials[material] = Material(texture=f"{material}.png")
-        else:
-            material = next((known for known, m in materials.items() if m == Material(patch.colour)), material)
+    for patch in patches:
+        key = patch.colour if patch.picture is None else patch.picture.tobytes()
+        material = known.setdefault(key, f"surface_{len(known):03d}")
+        if patch.picture is None:
             materials[material] = Material(patch.colour)
+        else:
+            materials[material], pictures[f"{material}.png"] = Material(texture=f"{material}.png"), patch.picture
         mesh.add_triangles(material, patch.triangles, normals[start : start + len(patch.triangles)], patch.uvs)
         start += len(patch.triangles)
     write_text(folder / f"{name}.obj", obj_text(mesh, f"{name}.mtl", places=PLACES))

@@ -146,6 +146,27 @@ def test_colours_of_triangles_stay(tmp_path):
     assert {(200, 0, 0), (0, 0, 200)} <= set(map(tuple, palette.tolist()))
 
 
+def test_very_many_colours_become_few(tmp_path):
+    ball = trimesh.creation.icosphere(3, 0.04)
+    ball.visual.face_colors = np.random.default_rng(1).integers(0, 255, (len(ball.faces), 4))
+    _, folder = imported(ball, tmp_path)
+    assert len(np.unique(cv2.imread(str(folder / "palette.png")).reshape(-1, 3), axis=0)) <= 125
+
+
+def test_parts_of_one_colour_share_it(tmp_path):
+    scene = trimesh.Scene()
+    for number in range(3):
+        material = trimesh.visual.material.PBRMaterial(baseColorFactor=[255, 0, 0, 255])
+        box = trimesh.creation.box((0.05, 0.05, 0.05))
+        box.apply_translation((0.05 * number, 0.0, 0.0))
+        box.visual = trimesh.visual.TextureVisuals(material=material)
+        scene.add_geometry(box)
+    made, folder = imported(scene, tmp_path, "glb")
+    assert made.size_m == pytest.approx((0.15, 0.05, 0.05))
+    assert sorted(path.name for path in folder.glob("*.png")) == ["palette.png"]
+    assert (folder / "gadget.obj").read_text().count("usemtl") == 1
+
+
 def test_a_texture_stays(tmp_path):
     image = pytest.importorskip("PIL.Image").new("RGB", (8, 8), (10, 200, 30))
     box = trimesh.creation.box((0.1, 0.1, 0.1))

@@ -14,7 +14,7 @@ from executive.mission.errors import InputError
 from plant.models.imported import ImportedFolderError, ImportedObject, read_imported
 
 if TYPE_CHECKING:
-    from plant.models.importing import Wanted
+    from plant.models.builder.importing import Wanted
 
 __all__ = ["object_group"]
 
@@ -44,7 +44,7 @@ def import_command(
     as_json: AsJson = False,
 ) -> None:
     """Make a model of a mesh: visual geometry, convex collision parts, and inertia from its volume and mass."""
-    from plant.models.importing import Wanted
+    from plant.models.builder.importing import Wanted
 
     with refusals():
         wanted = Wanted(name, mass, class_name, scale, up, close_holes)
@@ -80,7 +80,7 @@ def show(
 
 def _imported(mesh: Path, wanted: Wanted, out: Path) -> ImportedObject:
     """Import beside the folder, and put it there when it is whole. Raises InputError."""
-    from plant.models.importing import ObjectImportError, ObjectsExtraMissingError, import_object
+    from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError, import_object
 
     _refuse_wrong(wanted)
     try:
@@ -103,7 +103,7 @@ def _imported(mesh: Path, wanted: Wanted, out: Path) -> ImportedObject:
 
 def _refuse_wrong(wanted: Wanted) -> None:
     """Raises InputError."""
-    from plant.models.importing import ObjectImportError
+    from plant.models.builder.importing import ObjectImportError
 
     try:
         wanted.refuse_wrong()

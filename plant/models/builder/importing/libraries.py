@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from plant.models.importing.errors import ObjectsExtraMissingError
+from plant.models.builder.importing.errors import ObjectsExtraMissingError
 
 
 def objects_module(name: str) -> Any:

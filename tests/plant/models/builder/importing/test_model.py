@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError, Wanted, import_object
 from plant.models.builder.outlines import triangles_of
 from plant.models.imported import ImportedFolderError, ImportedObject, read_imported
-from plant.models.importing import ObjectImportError, ObjectsExtraMissingError, Wanted, import_object
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("coacd")

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from plant.models.importing.errors import ObjectImportError
-from plant.models.importing.libraries import objects_module
+from plant.models.builder.importing.errors import ObjectImportError
+from plant.models.builder.importing.libraries import objects_module
 from skills.robot import FloatArray
 
 MOST_PARTS: Final = 16

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from plant.models.builder.importing.errors import ObjectImportError
+from plant.models.builder.importing.libraries import objects_module
 from plant.models.builder.mesh import Colour
-from plant.models.importing.errors import ObjectImportError
-from plant.models.importing.libraries import objects_module
 from skills.robot import FloatArray, Picture
 
 MAX_BYTES: Final = 200_000_000

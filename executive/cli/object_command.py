@@ -12,6 +12,7 @@ import typer
 from executive.cli.output import print_json, refusals
 from executive.mission.errors import InputError
 from plant.models.imported import ImportedFolderError, ImportedObject, read_imported
+from skills.perception.class_forms import class_forms
 
 if TYPE_CHECKING:
     from plant.models.builder.importing import Wanted
@@ -49,6 +50,8 @@ def import_command(
     with refusals():
         wanted = Wanted(name, mass, class_name, scale, up, close_holes)
         made = _imported(mesh, wanted, out)
+    if (doubt := _unlike_its_class(made)) is not None:
+        typer.echo(f"errand: warning: {doubt}", err=True)
     if as_json:
         print_json(_facts(made, out))
     else:
@@ -109,6 +112,19 @@ def _refuse_wrong(wanted: Wanted) -> None:
         wanted.refuse_wrong()
     except ObjectImportError as error:
         raise InputError(error.message, hint=error.hint) from error
+
+
+def _unlike_its_class(made: ImportedObject) -> str | None:
+    """Why the robot may not take it for one of its class: by its size; None where that fits."""
+    form = class_forms().get(made.class_name)
+    if form is None:
+        return None
+    _, width, length = sorted(made.size_m)
+    for what, value, (low, high) in (("long", length, form.length_m), ("wide", width, form.width_m)):
+        if not low <= value <= high:
+            expected = f"of class {made.class_name} the robot expects {low:g} to {high:g} m, and may not find it"
+            return f"{made.name} is {value:.3f} m {what}; {expected}"
+    return None
 
 
 def _read(folder: Path) -> ImportedObject:

@@ -54,6 +54,15 @@ def test_a_mesh_becomes_a_model_that_is_shown(mesh, tmp_path):
     assert picture.std() > 5.0
 
 
+def test_a_size_that_its_class_never_has_is_warned_of(mesh, tmp_path):
+    result = made(mesh, tmp_path / "drill", "--class", "screwdriver", "--scale", 3)
+    assert result.exit_code == 0
+    assert result.stderr == (
+        "errand: warning: drill is 0.600 m long; of class screwdriver the robot expects 0.08 to 0.45 m, "
+        "and may not find it\n"
+    )
+
+
 def test_scripts_are_told_the_same_twice(mesh, tmp_path):
     first = json.loads(made(mesh, tmp_path / "drill", "--json").stdout)
     assert first == json.loads(invoke("object", "show", tmp_path / "drill", "--json").stdout)

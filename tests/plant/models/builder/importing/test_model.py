@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError, Wanted, import_object
 from plant.models.builder.outlines import triangles_of
-from plant.models.imported import ImportedFolderError, ImportedObject, read_imported
+from plant.models.imported import ImportedObject, read_imported
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("coacd")
@@ -225,21 +225,3 @@ def test_without_the_extra_the_library_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(ObjectsExtraMissingError, match="trimesh"):
         import_object(tmp_path / "m.stl", Wanted("gadget", 1.0), tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "why"),
-    [
-        ("mass_kg: 0.6", "mass_kg: -1", "mass_kg"),
-        ("name: gadget", "name: ../gadget", "name"),
-        ("round:", "rnd:", "rnd"),
-        ("name: gadget", "name: [", "cannot be read as YAML"),
-        ("name: gadget", "name: other", "other.sdf is missing"),
-    ],
-)
-def test_a_damaged_folder_is_refused_with_its_place(tmp_path, old, new, why):
-    _, folder = imported(trimesh.creation.box((0.1, 0.1, 0.1)), tmp_path)
-    facts = folder / "object.yaml"
-    facts.write_text(facts.read_text().replace(old, new, 1))
-    with pytest.raises(ImportedFolderError, match=f"{re.escape(str(folder))}.*{why}"):
-        read_imported(folder)

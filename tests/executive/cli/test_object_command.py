@@ -104,6 +104,12 @@ def test_what_cannot_be_is_one_line_and_status_2(mesh, tmp_path, arguments, why)
         ("notes.stl", "hello", "notes.stl: it is no mesh: there are no triangles in it"),
         ("notes.obj", "hello", "notes.obj: it is no mesh: there are no triangles in it"),
         ("notes.glb", "hello", "notes.glb: it cannot be read as a mesh"),
+        ("plane.obj", "v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "plane.obj: it cannot be read as a mesh"),
+        (
+            "parts.gltf",
+            '{"asset": {"version": "2.0"}, "buffers": [{"uri": "no.bin", "byteLength": 1}], "scenes": [{}]}',
+            "parts.gltf: a file that it names is missing; put it beside the mesh",
+        ),
         ("empty.obj", "", "empty.obj: it is no mesh: there are no triangles in it"),
         ("empty.ply", "", "empty.ply: it cannot be read as a mesh"),
         ("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "sheet.obj: it is open (not watertight), at 3 edges"),

@@ -61,6 +61,10 @@ def read_patches(path: Path) -> tuple[Patch, ...]:
         patches = tuple(patch for part in parts for patch in _patches(part))
     except ObjectImportError:
         raise
+    except FileNotFoundError as error:
+        raise ObjectImportError(
+            "a file that it names is missing", "put it beside the mesh, or export as GLB"
+        ) from error
     except Exception as error:  # readers of foreign formats raise anything
         raise ObjectImportError(
             f"it cannot be read as a mesh ({type(error).__name__})", "export it once more, for example as OBJ or GLB"
@@ -91,6 +95,8 @@ def _refuse_unreadable(path: Path, formats: list[str]) -> None:
 def _patches(part: Any) -> Iterator[Patch]:
     """The patches of one mesh, by colour where it has several."""
     triangles = np.asarray(part.triangles, dtype=np.float64)
+    if triangles.shape[1:] != (3, 3):
+        raise ValueError(f"triangles of {triangles.shape[1:]} numbers")
     plain = np.zeros((len(triangles), 3, 2))
     visual = part.visual
     if visual.kind == "texture":

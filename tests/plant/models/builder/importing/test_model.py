@@ -92,6 +92,11 @@ def test_no_sphere_that_bears_it_stands_out_of_it(tmp_path):
     assert reach[:, 2].max() == pytest.approx(made.size_m[2] / 2, abs=1e-4)
 
 
+def test_a_ball_gets_spheres_to_rest_on(tmp_path):
+    _, folder = imported(trimesh.creation.icosphere(3, 0.04), tmp_path)
+    assert (folder / "gadget.sdf").read_text().count("<sphere>") >= 3
+
+
 def test_millimetres_are_scaled(tmp_path):
     mesh = l_shape()
     mesh.apply_scale(1000.0)

@@ -38,6 +38,7 @@ TRAINING = (
 TRAINS = (
     "dataset_command",
     "learning",
+    "object_command",
     "refine_command",
     "score_command",
     "score_report",

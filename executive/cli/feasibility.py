@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache, cached_property
 from pathlib import Path
 from xml.etree import ElementTree
@@ -75,7 +76,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
         prepared.tree,
         knowledge=prepared.knowledge,
         start=world.start,
-        abilities=abilities_of(),
+        abilities=abilities_in(world),
         planner=planner or route_planner_of(world, prepared.request.stack),
         estimates=load_estimates(),
     )
@@ -87,6 +88,18 @@ def refuse_impossible(prepared: Prepared) -> None:
     for error in check_prepared(prepared).errors:
         problems.add(error)
     problems.raise_any()
+
+
+def abilities_in(world: World) -> Abilities:
+    """What the robot can lift, and what the lightest object of each class weighs in a world with imports."""
+    abilities = abilities_of()
+    masses, others = dict(abilities.masses_kg), {rule.model for rule in world.seed_rules.objects}
+    for name in sorted(others & set(world.imports)):
+        own = world.imports[name].object
+        only = own.class_name not in others or own.class_name not in masses
+        masses[own.class_name] = own.mass_kg if only else min(own.mass_kg, masses[own.class_name])
+        others.add(own.class_name)
+    return replace(abilities, masses_kg=masses)
 
 
 @cache

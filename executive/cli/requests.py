@@ -13,8 +13,9 @@ from executive.cli.worlds import knowledge_of, open_world, refuse_blocked, with_
 from executive.language import Understanding, load_parser
 from executive.language.questions import Answerer
 from executive.mission.command import parse_command
-from executive.mission.errors import InputError
+from executive.mission.errors import InputError, Problems
 from executive.mission.file.model import DEFAULT_WORLD, Mission
+from executive.mission.file.objects import import_folders
 from executive.mission.file.overrides import overridden
 from executive.mission.file.people import routes_in
 from executive.mission.file.resolve import load_mission, mission_from_file
@@ -23,7 +24,7 @@ from executive.mission.knowledge import Knowledge, Pose
 from executive.mission.mission import mission_from_commands, mission_from_meaning, understood
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
-from plant.worlds.world import RouteRule, World, WorldError
+from plant.worlds.world import ObjectRule, RouteRule, World, WorldError
 
 __all__ = ["Prepared", "fingerprint", "prepare", "replacing"]
 
@@ -89,7 +90,7 @@ def _filed(request: Request, file: Path, ask: Answerer | None) -> Prepared:
     knowledge = overridden(loaded, knowledge)
     answer = answerer(request.answers, request.questions or loaded.questions, ask)
     mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
-    world = _with_people(loaded, world, knowledge)
+    world = _with_people(loaded, _with_objects(loaded, world, knowledge), knowledge)
     text = file.read_text(encoding="utf-8")
     return _prepared(replace(request, text=text), mission, world, knowledge)
 
@@ -101,6 +102,25 @@ def _with_people(loaded: MissionFile, world: World, knowledge: Knowledge) -> Wor
         return world.with_routes(routes) if routes else world
     except WorldError as error:
         raise loaded.error(("people",), str(error), "change the route or its name here") from error
+
+
+def _with_objects(loaded: MissionFile, world: World, knowledge: Knowledge) -> World:
+    """The world with the models and objects of a mission's file. Raises InputError."""
+    problems = Problems()
+    for index, folder in enumerate(import_folders(loaded)):
+        try:
+            world = world.with_imports([folder])
+        except WorldError as error:
+            problems.add(loaded.error(("imports", index), str(error), ""))
+    problems.raise_any()
+    for name, file in (loaded.objects or {}).items():
+        surfaces = tuple(knowledge.place(surface) or surface for surface in file.surfaces)
+        try:
+            world = world.with_objects([ObjectRule(name=name, model=file.model, surfaces=surfaces)])
+        except WorldError as error:
+            problems.add(loaded.error(("objects", name), str(error), ""))
+    problems.raise_any()
+    return world
 
 
 def _standing(request: Request, world: World) -> tuple[World, Knowledge]:

@@ -48,9 +48,9 @@ def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
     """
     catalogue, outlines, placed = load_catalogue(), list[FloatArray](), list[Placement]()
     for index, rule in enumerate(world.seed_rules.objects):
-        form = _form(_model_class(catalogue, rule.model, world), seed, index)
+        class_name, form = _model(catalogue, rule.model, world, seed, index)
         rng = np.random.default_rng([seed, _OBJECT_STREAM, index])
-        placement, outline = _place(world, rule, form, outlines, rng)
+        placement, outline = _place(world, rule, (class_name, form), outlines, rng)
         placed.append(placement)
         outlines.append(outline)
     return tuple(placed)
@@ -71,6 +71,14 @@ def _model_class(catalogue: dict[str, ModelClass], name: str, world: World) -> M
     return catalogue[name]
 
 
+def _model(catalogue: dict[str, ModelClass], name: str, world: World, seed: int, index: int) -> tuple[str, ModelForm]:
+    """Class and form of an object: those of the imported model of that name, else a form of the class."""
+    if name in world.imports:
+        found = world.imports[name]
+        return found.object.class_name, found.object.form(found.folder)
+    return name, _form(_model_class(catalogue, name, world), seed, index)
+
+
 def _form(model: ModelClass, seed: int, index: int) -> ModelForm:
     """The form that an object has at a seed."""
     forms = tuple(model.forms.values())
@@ -78,10 +86,14 @@ def _form(model: ModelClass, seed: int, index: int) -> ModelForm:
 
 
 def _place(
-    world: World, rule: ObjectRule, form: ModelForm, others: Sequence[FloatArray], rng: np.random.Generator
+    world: World,
+    rule: ObjectRule,
+    model: tuple[str, ModelForm],
+    others: Sequence[FloatArray],
+    rng: np.random.Generator,
 ) -> tuple[Placement, FloatArray]:
-    """A free pose for one thing, and its outline there."""
-    rules = world.seed_rules.rules
+    """A free pose for one thing of a class and form, and its outline there."""
+    rules, (class_name, form) = world.seed_rules.rules, model
     first = int(rng.integers(len(rule.surfaces)))
     obstacles = [*others, *(np.array(polygon) for polygon in world.seed_rules.keep_clear)]
     for name in (*rule.surfaces[first:], *rule.surfaces[:first]):
@@ -92,7 +104,7 @@ def _place(
             if inside and all(polygon_distance(outline, other) >= rules.clear_m for other in obstacles):
                 z = surface.height_m + form.rest_height_m + rules.drop_m
                 X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z], dtype=np.float64))
-                return Placement(rule.name, rule.model, form, X_WO, name), outline
+                return Placement(rule.name, class_name, form, X_WO, name), outline
     raise WorldError(f"{world.folder / 'objects.yaml'}: {rule.name} finds no free spot on {', '.join(rule.surfaces)}")
 
 

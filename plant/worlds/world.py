@@ -6,7 +6,7 @@ Only what a plant needs is read of `knowledge.yaml`: the start pose, rooms and s
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Final, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from plant.models.catalogue import load_catalogue
+from plant.models.imported import ImportedFolderError, ImportedObject, read_imported
 from skills.robot import Pose2D
 
 if TYPE_CHECKING:
@@ -49,10 +51,10 @@ class Rules(_Strict):
 
 
 class ObjectRule(_Strict):
-    """A loose object, its class, and the surfaces on which it may lie."""
+    """A loose object, its class or imported model, and the surfaces on which it may lie."""
 
     name: str = Field(description="its name in this world")
-    model: str = Field(description="a class of `plant/models/catalogue.yaml`")
+    model: str = Field(description="a class of `plant/models/catalogue.yaml`, or the name of an imported object")
     surfaces: tuple[str, ...] = Field(min_length=1, description="surfaces of knowledge.yaml; the seed chooses one")
 
 
@@ -107,6 +109,9 @@ class SeedRules(_Strict):
         description="for each surface, the edges (from and to, x and y) that the robot can stand before"
     )
     keep_clear: tuple[Polygon, ...] = Field(default=(), description="outlines where no object may lie, corners (x, y)")
+    imports: tuple[str, ...] = Field(
+        default=(), description="folders of `errand object import`, as seen from this file's folder"
+    )
     objects: tuple[ObjectRule, ...] = Field(description="the loose objects")
     people: tuple[PersonRule, ...] = Field(default=(), description="the people")
 
@@ -155,12 +160,20 @@ class SurfaceTop:
 
 
 @dataclass(frozen=True)
+class Import:
+    """An imported model: the folder of its files, and what they hold."""
+
+    folder: Path
+    object: ImportedObject
+
+
+@dataclass(frozen=True)
 class World:
     """A world's files and what the plant needs to know of them. Lengths in metres, world frame.
 
     Only its geometry and a start are needed: no dock, rooms, surfaces or seed rules. `standing` tells where somebody
     stands who is in a room, or at a surface. The robot has the grids of the folder `maps`, None for those in the
-    world's own `map`.
+    world's own `map`. `imports` are the models that are not of the catalogue, by name.
     """
 
     name: str
@@ -173,6 +186,7 @@ class World:
     seed_rules: SeedRules
     standing: Mapping[str, Point] = field(default_factory=dict)
     maps: Path | None = None
+    imports: Mapping[str, Import] = field(default_factory=dict)
 
     @property
     def corners(self) -> Polygon:
@@ -190,7 +204,23 @@ class World:
         before = {rule.name: rule for rule in rules.people}
         walking = {name: PersonRule(name=name, route=route) for name, route in routes.items()}
         changed = rules.model_copy(update={"people": tuple({**before, **walking}.values())})
-        _check_people(self.folder / "objects.yaml", changed, self.standing)
+        _check_people(changed, self.standing)
+        return replace(self, seed_rules=changed)
+
+    def with_imports(self, folders: Iterable[Path]) -> World:
+        """The same with the models of these folders. Raises WorldError: a folder holds none, or a name is taken."""
+        return replace(self, imports=_with_imports(self.imports, folders))
+
+    def with_objects(self, objects: Iterable[ObjectRule]) -> World:
+        """The same with these loose objects, besides those that it has.
+
+        Raises WorldError: a name is taken, a model or a surface is not known, or cannot carry objects.
+        """
+        rules = self.seed_rules
+        changed = rules.model_copy(update={"objects": (*rules.objects, *objects)})
+        _check_surfaces(changed, self.surfaces)
+        _check_people(changed, self.standing)
+        _check_models(changed, self.imports)
         return replace(self, seed_rules=changed)
 
     def without_people(self) -> World:
@@ -241,9 +271,14 @@ def load_world(name_or_path: str | Path) -> World:
     objects = folder / "objects.yaml"
     rules = _read(objects, SeedRules) if objects.exists() or objects.is_symlink() else NO_SEED_RULES
     surfaces = {name: SurfaceTop(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
-    _check_surfaces(objects, rules, surfaces)
     standing = _standing(knowledge)
-    _check_people(objects, rules, standing)
+    try:
+        _check_surfaces(rules, surfaces)
+        _check_people(rules, standing)
+        imports = _with_imports({}, (folder / each for each in rules.imports))
+        _check_models(rules, imports)
+    except WorldError as error:
+        raise WorldError(f"{objects}: {error}") from error
     return World(
         name=folder.name,
         folder=folder,
@@ -254,7 +289,26 @@ def load_world(name_or_path: str | Path) -> World:
         surface_places={name: top.place for name, top in knowledge.surfaces.items()},
         seed_rules=rules,
         standing=standing,
+        imports=imports,
     )
+
+
+def _with_imports(known: Mapping[str, Import], folders: Iterable[Path]) -> Mapping[str, Import]:
+    """The known models and those of folders by name. Raises WorldError."""
+    found = dict(known)
+    for folder in dict.fromkeys(each.resolve() for each in folders):
+        try:
+            made = read_imported(folder)
+        except ImportedFolderError as error:
+            raise WorldError(str(error)) from error
+        if made.name in load_catalogue():
+            raise WorldError(f"{folder}: the name {made.name!r} is that of a class; import it under another name")
+        other = found.setdefault(made.name, Import(folder, made))
+        if other.folder != folder:
+            raise WorldError(
+                f"{folder} and {other.folder} are both called {made.name!r}; import one under another name"
+            )
+    return found
 
 
 def _standing(knowledge: _Knowledge) -> dict[str, Point]:
@@ -323,28 +377,38 @@ def _line_of(node: yaml.Node | None, location: tuple[int | str, ...]) -> int:
     return line
 
 
-def _check_surfaces(path: Path, rules: SeedRules, surfaces: dict[str, SurfaceTop]) -> None:
+def _check_surfaces(rules: SeedRules, surfaces: dict[str, SurfaceTop]) -> None:
     """Every surface that the rules name is known, and those for things have fronts."""
     wanted = {name for thing in rules.objects for name in thing.surfaces}
     for name in sorted(wanted | set(rules.fronts)):
         if name not in surfaces:
             close = difflib.get_close_matches(name, surfaces, n=1)
             hint = f"; did you mean {close[0]!r}?" if close else ""
-            raise WorldError(f"{path}: no surface {name!r} in knowledge.yaml{hint}")
+            raise WorldError(f"no surface {name!r} in knowledge.yaml{hint}")
         if name in wanted and not rules.fronts.get(name):
-            raise WorldError(f"{path}: surface {name!r} may carry things but has no entry under `fronts`")
+            raise WorldError(f"surface {name!r} may carry things but has no entry under `fronts` in objects.yaml")
 
 
-def _check_people(path: Path, rules: SeedRules, standing: Mapping[str, Point]) -> None:
+def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
+    """Every object is of a class, or is imported."""
+    known = (*load_catalogue(), *imports)
+    for rule in rules.objects:
+        if rule.model not in known:
+            close = difflib.get_close_matches(rule.model, known, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(known)}"
+            raise WorldError(f"no model {rule.model!r} for {rule.name}; {hint}")
+
+
+def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
     """Names are taken once, and every place on a route is known."""
     names = [*(rule.name for rule in rules.objects), *(rule.name for rule in rules.people)]
     for name in names:
         if names.count(name) > 1:
-            raise WorldError(f"{path}: {name!r} names two objects or people; give one of them another name")
+            raise WorldError(f"{name!r} names two objects or people; give one of them another name")
     for rule in rules.people:
         for waypoint in () if rule.route is None else rule.route.waypoints:
             at = waypoint.at if isinstance(waypoint, StopRule) else waypoint
             if isinstance(at, str) and at not in standing:
                 close = difflib.get_close_matches(at, standing, n=1)
                 hint = f"did you mean {close[0]!r}?" if close else "give a point (x, y)"
-                raise WorldError(f"{path}: {rule.name} cannot walk to {at!r}: no place in knowledge.yaml; {hint}")
+                raise WorldError(f"{rule.name} cannot walk to {at!r}: no place in knowledge.yaml; {hint}")

@@ -1,12 +1,15 @@
 """How well the robot takes, holds and puts down single objects among others; prints a line a trial, JSON at the end.
 
     python -m tests.benchmarks.manipulation [--classes a,b] [--surfaces table,shelf,floor] [--trials N] [--clutter 0-4]
-        [--seed S] [--sheet FILE.png] [--jobs 2] [--json]
+        [--seed S] [--models DIR] [--jobs 2] [--json]
 
 Each trial is a room of its own: a table of random height, an open shelf or the floor with one object of the class and
 others around it, all set by the seed, and a second table. The robot goes to the object, takes it, holds it for ten
 seconds and puts it on the second table. The plant's truth judges: `lifted`, `held_10s`, `placed_upright` (None for what
-was not put down), `place_error_m` from the spot that the skill chose, and how many others were pushed over or off.
+was not put down), and how many others were pushed over or off.
+
+`--models` takes objects of your own in the place of the catalogue's: a folder of `errand object import`, or one of such
+folders. Each needs a class (`--class` when it was imported): the robot goes for what its detector knows.
 """
 
 from __future__ import annotations
@@ -35,6 +38,7 @@ from executive.run.runner import RunSettings, run
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
+from plant.models.imported import FACTS_FILE, ImportedFolderError, read_imported
 from plant.simulation import Simulation
 from plant.worlds.placement import place_objects
 from plant.worlds.world import SurfaceTop
@@ -48,12 +52,18 @@ HELD_S, LIFTED_M, UPRIGHT_RAD, DISTURBED_M, DISTURBED_RAD, LOOK_S = 10.0, 0.03, 
 
 @dataclass(frozen=True)
 class Trial:
-    """What is tried."""
+    """What is tried: with an object of the catalogue, or the imported one in the folder `model`."""
 
     class_name: str
     surface: str
     clutter: int
     seed: int
+    model: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """That of the class, or of the model."""
+        return self.class_name if self.model is None else self.model.name
 
 
 @dataclass
@@ -107,7 +117,7 @@ def others_of(trial: Trial) -> tuple[str, ...]:
 def attempt(trial: Trial) -> dict[str, Any]:
     """Take, hold, put down; what the plant's truth says of it."""
     with tempfile.TemporaryDirectory() as folder:
-        world = room(Path(folder), trial.class_name, others_of(trial), trial.surface, trial.seed)
+        world = room(Path(folder), trial.class_name, others_of(trial), trial.surface, trial.seed, trial.model)
         simulation = simulate(world, seed=trial.seed, robot_name=ROBOT, record=False)
         watch, before = Watch(simulation), poses(simulation)
         simulation.engine.observe(watch)
@@ -137,6 +147,7 @@ def attempt(trial: Trial) -> dict[str, Any]:
         claimed = bool(picks)
         return {
             "class": trial.class_name,
+            "name": trial.name,
             "model": str(place_objects(world, trial.seed)[0].form.file),
             "surface": trial.surface,
             "clutter": trial.clutter,
@@ -172,12 +183,30 @@ def disturbed(before: RigidTransform, after: RigidTransform) -> bool:
 def trials(options: argparse.Namespace) -> Iterator[Trial]:
     """`--trials` of each class, over the surfaces in turn; the seed chooses the clutter."""
     low, _, high = options.clutter.partition("-")
-    for class_name in options.classes.split(","):
+    targets = [(name, None) for name in options.classes.split(",")] if options.models is None else own(options.models)
+    for class_name, model in targets:
         for number in range(options.trials):
             seed = options.seed + number
             surface = options.surfaces.split(",")[number % len(options.surfaces.split(","))]
             clutter = int(np.random.default_rng([seed, 3]).integers(int(low), int(high or low) + 1))
-            yield Trial(class_name, surface, clutter, seed)
+            yield Trial(class_name, surface, clutter, seed, model)
+
+
+def own(folder: Path) -> list[tuple[str, Path | None]]:
+    """Class and folder of each imported object in a folder, or of the one that it is. Raises SystemExit."""
+    folders = (
+        [folder] if (folder / FACTS_FILE).exists() else sorted(path.parent for path in folder.glob(f"*/{FACTS_FILE}"))
+    )
+    try:
+        found = [(read_imported(each).class_name, each.resolve()) for each in folders]
+    except ImportedFolderError as error:
+        raise SystemExit(str(error)) from error
+    if not found:
+        raise SystemExit(f"{folder}: there is no imported object; make one by `errand object import`")
+    for class_name, each in found:
+        if class_name not in CLASSES:
+            raise SystemExit(f"{each}: no detector knows it; import it with --class, one of {', '.join(CLASSES)}")
+    return list(found)
 
 
 def told(run: dict[str, Any]) -> str:
@@ -186,7 +215,7 @@ def told(run: dict[str, Any]) -> str:
         name if run[name] else "-" * len(name) for name in ("lifted", "held_10s", "placed", "placed_upright")
     )
     return (
-        f"{run['class']:12} {run['surface']:6} clutter {run['clutter']} seed {run['seed']:3} {marks} "
+        f"{run['name']:12} {run['surface']:6} clutter {run['clutter']} seed {run['seed']:3} {marks} "
         f"others {run['others_disturbed']} bumps {run['collisions']} {run['sim_time_s']:5.0f} s  {run['cause']}"
     )
 
@@ -206,7 +235,7 @@ def summary(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "upright_rate": round(float(np.mean(put)), 3) if put else math.nan,
         "disturbed_rate": round(float(np.mean([run["others_disturbed"] > 0 for run in runs])), 3),
         "false_claims": sum(run["false_claim"] for run in runs),
-        "by_class": {c: rate("held_10s", [r for r in runs if r["class"] == c]) for c in {r["class"] for r in runs}},
+        "by_class": {c: rate("held_10s", [r for r in runs if r["name"] == c]) for c in {r["name"] for r in runs}},
         "by_surface": {
             s: rate("held_10s", [r for r in runs if r["surface"] == s]) for s in {r["surface"] for r in runs}
         },
@@ -219,6 +248,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--classes", default=",".join(CLASSES))
+    parser.add_argument("--models", type=Path, help="objects of your own, in the place of the classes")
     parser.add_argument("--surfaces", default=",".join(SURFACES))
     parser.add_argument("--trials", type=int, default=3, help="of each class")
     parser.add_argument("--clutter", default="0-4", help="how many others stand around, as LOW-HIGH")

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 import yaml
 
+from plant.models.imported import read_imported
 from plant.scenery import OWN_PACKAGE
 from plant.worlds.builder.__main__ import build
 from plant.worlds.builder.plan import Plan
@@ -22,8 +23,13 @@ _SECOND_M: Final = (1.0, 0.7, 0.72)  # width, depth, height
 _THINGS: Final = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
 
 
-def room(folder: Path, class_name: str, others: Sequence[str], surface: str, seed: int) -> World:
-    """A room with an object called `target` of a class, and others, on a surface; its heights come from the seed."""
+def room(
+    folder: Path, class_name: str, others: Sequence[str], surface: str, seed: int, model: Path | None = None
+) -> World:
+    """A room with an object called `target` of a class, and others, on a surface; its heights come from the seed.
+
+    The target is one of the catalogue's, or the imported one in the folder `model`.
+    """
     rng = np.random.default_rng([seed, SURFACES.index(surface)])
     middle_x, furniture = 2.5, dict[str, Any]()
     if surface == "table":
@@ -74,12 +80,14 @@ def room(folder: Path, class_name: str, others: Sequence[str], surface: str, see
         },
         "things": {name: {"aliases": [], "categories": [], "usual": [TAKEN]} for name in _THINGS},
     }  # fmt: skip
+    target = class_name if model is None else read_imported(model).name
     rules = {
+        "imports": [] if model is None else [str(model.resolve())],
         "rules": {"from_edge_m": list(from_edge), "clear_m": 0.03, "rim_m": 0.0, "drop_m": 0.001},
         "fronts": {TAKEN: [[[middle_x - 0.35, front], [middle_x + 0.35, front]]]},
         "objects": [
             {"name": name, "model": model, "surfaces": [TAKEN]}
-            for name, model in [("target", class_name), *((f"other_{n}", each) for n, each in enumerate(others))]
+            for name, model in [("target", target), *((f"other_{n}", each) for n, each in enumerate(others))]
         ],
     }
     (folder / "knowledge.yaml").write_text(yaml.safe_dump(knowledge, sort_keys=False), encoding="utf-8")

@@ -29,7 +29,7 @@ MAX_DEPTH: Final = 20
 REASON_LETTERS: Final = 500
 _NOT_UNDERSTOOD: Final = "the sentence was not understood"
 _NONE_GIVEN: Final[Given] = MappingProxyType({})
-_ONLY_AT_THE_TOP: Final = ("knowledge", "people", "robot", "world")
+_ONLY_AT_THE_TOP: Final = ("imports", "knowledge", "objects", "people", "robot", "world")
 
 
 def load_mission(path: Path | str, parameters: Given = _NONE_GIVEN) -> MissionFile:

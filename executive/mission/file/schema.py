@@ -22,6 +22,7 @@ from executive.mission.file.model import (
     StepGuards,
     StepPolicy,
 )
+from executive.mission.file.objects import ObjectFile
 from executive.mission.file.people import RouteFile
 from executive.mission.yaml_source import Name, Text, YamlSource
 from skills.quantities import Duration, bounds, without_range, without_unit
@@ -159,6 +160,12 @@ class MissionFile(PolicyFile):
     )
     people: dict[Name, RouteFile] | None = Field(
         None, description="People who walk while the mission runs, by name: new ones, or those of the world."
+    )
+    imports: tuple[Name, ...] | None = Field(
+        None, description="Folders of `errand object import`, as seen from this file's folder."
+    )
+    objects: dict[Name, ObjectFile] | None = Field(
+        None, description="Objects that lie there at the beginning besides those of the world, by name."
     )
     parameters: dict[str, Scalar] | None = Field(
         None,

@@ -185,8 +185,11 @@ def _cuts(span: float) -> list[tuple[float, float]]:
     return [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
 
 
-def obj_text(mesh: Mesh, material_file: str, shared_texture: str = "palette") -> str:
-    """The Wavefront OBJ form. Plain colours share one material that reads `shared_texture`; see `mtl_text`."""
+def obj_text(mesh: Mesh, material_file: str, shared_texture: str = "palette", places: int = 4) -> str:
+    """The Wavefront OBJ form. Plain colours share one material that reads `shared_texture`; see `mtl_text`.
+
+    Points have `places` decimal places of a metre.
+    """
     colours = plain_colours(mesh.materials)
     lines, merged = [f"mtllib {material_file}"], dict[str, list[tuple[FloatArray, FloatArray, FloatArray]]]()
     for material, points, normals, uvs in mesh.groups():
@@ -197,16 +200,18 @@ def obj_text(mesh: Mesh, material_file: str, shared_texture: str = "palette") ->
     counts = [0, 0, 0]
     for name, parts in sorted(merged.items()):
         points, normals, uvs = (np.concatenate([part[k] for part in parts]) for k in range(3))
-        lines += _obj_group(name, points, normals, uvs, counts)
+        lines += _obj_group(name, points, normals, uvs, counts, places)
     return "\n".join(lines) + "\n"
 
 
-def _obj_group(name: str, points: FloatArray, normals: FloatArray, uvs: FloatArray, counts: list[int]) -> list[str]:
+def _obj_group(
+    name: str, points: FloatArray, normals: FloatArray, uvs: FloatArray, counts: list[int], places: int
+) -> list[str]:
     """One material's lines; `counts` (vertices, texture coordinates, normals so far) is moved on."""
     lines, index = [], []
-    for k, (key, rows, places) in enumerate((("v", points, 4), ("vt", uvs, 4), ("vn", normals, 3))):
-        unique, inverse = np.unique(np.round(rows, places) + 0.0, axis=0, return_inverse=True)
-        lines += [f"{key} " + " ".join(f"{value:.{places}f}" for value in row) for row in unique]
+    for k, (key, rows, digits) in enumerate((("v", points, places), ("vt", uvs, 4), ("vn", normals, 3))):
+        unique, inverse = np.unique(np.round(rows, digits) + 0.0, axis=0, return_inverse=True)
+        lines += [f"{key} " + " ".join(f"{value:.{digits}f}" for value in row) for row in unique]
         index.append(inverse.reshape(-1) + counts[k] + 1)
         counts[k] += len(unique)
     lines.append(f"usemtl {name}")

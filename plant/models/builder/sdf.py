@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from plant.models.builder.shapes import MassProperties, Shape, number
+from plant.models.builder.shapes import Geometry, MassProperties, number
+
+_SMALL_KG_M2 = 5e-6
+"""Smaller moments of inertia are written with more places."""
 
 
 @dataclass(frozen=True)
@@ -17,17 +20,18 @@ class Model:
 
     name: str
     mesh: str
-    collisions: Sequence[Shape]
+    collisions: Sequence[Geometry]
     mass: MassProperties | None = None
     friction: float = 0.8
     comment: str = field(default="")
+    maker: str = "a builder script"
 
 
 def model_sdf(model: Model) -> str:
     """The SDF text of a model."""
     collisions = "".join(_collision(index, shape, model.friction) for index, shape in enumerate(model.collisions))
     return f"""<?xml version="1.0"?>
-<!-- {model.comment or model.name}; made by a builder script, don't edit. -->
+<!-- {model.comment or model.name}; made by {model.maker}, don't edit. -->
 <sdf version="1.9" xmlns:drake="drake.mit.edu">
   <model name="{model.name}">
     <link name="{model.name}">
@@ -46,7 +50,8 @@ def _inertial(mass: MassProperties | None) -> str:
     com = " ".join(number(v) for v in mass.com)
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     values = mass.inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
-    moments = "".join(f"<{name}>{value:.9f}</{name}>" for name, value in zip(names, values, strict=True))
+    places = 9 if min(mass.inertia.diagonal()) >= _SMALL_KG_M2 else 14
+    moments = "".join(f"<{name}>{value:.{places}f}</{name}>" for name, value in zip(names, values, strict=True))
     return f"""      <inertial>
         <pose>{com} 0 0 0</pose>
         <mass>{number(mass.mass_kg)}</mass>
@@ -55,7 +60,7 @@ def _inertial(mass: MassProperties | None) -> str:
 """
 
 
-def _collision(index: int, shape: Shape, friction: float) -> str:
+def _collision(index: int, shape: Geometry, friction: float) -> str:
     return f"""      <collision name="{type(shape).__name__.lower()}_{index}">
         <pose>{shape.pose_text()}</pose>
         <geometry>{shape.sdf()}</geometry>

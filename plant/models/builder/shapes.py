@@ -1,4 +1,4 @@
-"""Primitive collision shapes, their inertias and their SDF form."""
+"""Collision shapes and their SDF form; of the primitive ones also their inertias."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def number(value: float) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shape(ABC):
-    """A primitive shape in its model's frame: `p` is its centre (m), `rpy` its roll, pitch and yaw (rad)."""
+class Geometry(ABC):
+    """What collides, in its model's frame: `p` is its origin (m), `rpy` its roll, pitch and yaw (rad)."""
 
     p: Vector = (0.0, 0.0, 0.0)
     rpy: Vector = (0.0, 0.0, 0.0)
@@ -32,13 +32,29 @@ class Shape(ABC):
     def sdf(self) -> str:
         """The SDF `<geometry>` content."""
 
-    @abstractmethod
-    def _own_inertia(self) -> UnitInertia:
-        """About the centre, in the shape's own axes."""
-
     def pose_text(self) -> str:
         """The SDF pose."""
         return " ".join(number(v) for v in (*self.p, *self.rpy))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConvexMesh(Geometry):
+    """The convex hull of a mesh file beside the SDF."""
+
+    file: str
+
+    def sdf(self) -> str:
+        """The SDF `<geometry>` content."""
+        return f"<mesh><drake:declare_convex/><uri>{self.file}</uri></mesh>"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape(Geometry):
+    """A primitive shape; `p` is its centre."""
+
+    @abstractmethod
+    def _own_inertia(self) -> UnitInertia:
+        """About the centre, in the shape's own axes."""
 
     def rotation(self) -> FloatArray:
         """The (3, 3) rotation of the shape in the model's frame."""

@@ -1,0 +1,171 @@
+"""`errand object`: any mesh as a model for worlds and missions, and what such a model holds."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from executive.cli.output import print_json, refusals
+from executive.mission.errors import InputError
+from plant.models.imported import ImportedFolderError, ImportedObject, read_imported
+from skills.perception.class_forms import class_forms
+
+if TYPE_CHECKING:
+    from plant.models.builder.importing import Wanted
+
+__all__ = ["object_group"]
+
+PICTURE_PX = (640, 480)
+AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
+
+object_group = typer.Typer(name="object", help="Objects of your own, made of any mesh.", rich_markup_mode=None)
+
+
+@object_group.callback()
+def _group() -> None:
+    """Objects of your own, made of any mesh."""
+
+
+@object_group.command(name="import")
+def import_command(
+    mesh: Annotated[Path, typer.Argument(metavar="MESH", help="A closed mesh: OBJ, STL, PLY, OFF, glTF or GLB.")],
+    name: Annotated[str, typer.Option(help="What worlds call the model: letters, digits and _.")],
+    mass: Annotated[float, typer.Option(help="Its mass, kg.")],
+    out: Annotated[Path, typer.Option("--out", help="The model's folder; it is made.")],
+    class_name: Annotated[
+        str | None, typer.Option("--class", help="The class that the detector takes it for; else none of them.")
+    ] = None,
+    scale: Annotated[float, typer.Option(help="Metres per unit of the file; 0.001 for millimetres.")] = 1.0,
+    up: Annotated[str | None, typer.Option(help="The file's axis that is up: x, y or z; z, but y of glTF.")] = None,
+    close_holes: Annotated[bool, typer.Option("--close-holes", help="Close an open mesh where it is open.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Make a model of a mesh: visual geometry, convex collision parts, and inertia from its volume and mass."""
+    from plant.models.builder.importing import Wanted
+
+    with refusals():
+        wanted = Wanted(name, mass, class_name, scale, up, close_holes)
+        made = _imported(mesh, wanted, out)
+    if (doubt := _unlike_its_class(made)) is not None:
+        typer.echo(f"errand: warning: {doubt}", err=True)
+    if as_json:
+        print_json(_facts(made, out))
+    else:
+        typer.echo(f"{out}: {_in_words(made)}")
+
+
+@object_group.command()
+def show(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of `errand object import`.")],
+    picture: Annotated[Path | None, typer.Option("--picture", help="Draw it into this file, PNG.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Tell what an imported model holds: extents, mass, inertia, collision parts."""
+    with refusals():
+        found = _read(folder)
+        if picture is not None:
+            _draw(folder, found, picture)
+    if as_json:
+        print_json(_facts(found, folder))
+        return
+    typer.echo(f"{found.name}: class {_class_of(found)}")
+    typer.echo(f"extents (m)       {_numbers(found.size_m)}")
+    typer.echo(f"mass (kg)         {found.mass_kg:g}")
+    typer.echo(f"centre of mass    {_numbers(found.com_m)}")
+    typer.echo(f"inertia (kg m^2)  {_numbers(found.inertia_kg_m2)} (xx yy zz xy xz yz)")
+    typer.echo(f"collision parts   {found.collision_parts}")
+    typer.echo(f"triangles         {found.triangles}")
+
+
+def _imported(mesh: Path, wanted: Wanted, out: Path) -> ImportedObject:
+    """Import beside the folder, and put it there when it is whole. Raises InputError."""
+    from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError, import_object
+
+    _refuse_wrong(wanted)
+    try:
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise InputError("there is something already", hint="name a new folder by --out", file=out)
+        with tempfile.TemporaryDirectory(prefix="errand-object-") as draft:
+            made = import_object(mesh, wanted, Path(draft))
+            out.mkdir(parents=True, exist_ok=True)
+            for file in Path(draft).iterdir():
+                shutil.copyfile(file, out / file.name)
+    except ObjectImportError as error:
+        raise InputError(error.message, hint=error.hint, file=mesh) from error
+    except ObjectsExtraMissingError as error:
+        raise InputError(str(error), hint="pip install 'spot-errand[objects]'") from error
+    except OSError as error:
+        hint = "name another --out"
+        raise InputError(f"the model cannot be written ({error.strerror})", hint=hint, file=out) from error
+    return made
+
+
+def _refuse_wrong(wanted: Wanted) -> None:
+    """Raises InputError."""
+    from plant.models.builder.importing import ObjectImportError
+
+    try:
+        wanted.refuse_wrong()
+    except ObjectImportError as error:
+        raise InputError(error.message, hint=error.hint) from error
+
+
+def _unlike_its_class(made: ImportedObject) -> str | None:
+    """Why the robot may not take it for one of its class: by its size; None where that fits."""
+    form = class_forms().get(made.class_name)
+    if form is None:
+        return None
+    _, width, length = sorted(made.size_m)
+    for what, value, (low, high) in (("long", length, form.length_m), ("wide", width, form.width_m)):
+        if not low <= value <= high:
+            expected = f"of class {made.class_name} the robot expects {low:g} to {high:g} m, and may not find it"
+            return f"{made.name} is {value:.3f} m {what}; {expected}"
+    return None
+
+
+def _read(folder: Path) -> ImportedObject:
+    try:
+        return read_imported(folder)
+    except ImportedFolderError as error:
+        raise InputError(str(error)) from error
+
+
+def _draw(folder: Path, found: ImportedObject, picture: Path) -> None:
+    """Raises InputError."""
+    import numpy as np
+
+    from plant.models.portrait import Ball, portrait
+    from plant.pictures import save_png
+
+    if picture.suffix.lower() != ".png":
+        raise InputError("the picture is written as PNG", hint="name a file that ends in .png", file=picture)
+    ball = Ball(np.zeros(3), float(np.linalg.norm(found.size_m)) / 2.0)
+    mesh = folder.resolve() / f"{found.name}.obj"
+    if not mesh.is_file():
+        raise InputError(f"{mesh.name} is missing", hint="import the object once more", file=folder)
+    try:
+        save_png(picture, portrait(mesh, ball, found.size_m, PICTURE_PX))
+    except OSError as error:
+        raise InputError(f"the picture cannot be written ({error.strerror})", file=picture) from error
+
+
+def _in_words(made: ImportedObject) -> str:
+    size, parts = " x ".join(f"{value:.3f}" for value in made.size_m), made.collision_parts
+    told = f"{made.name}, class {_class_of(made)}, {size} m, {made.mass_kg:g} kg"
+    return f"{told}, {parts} collision part{'s' if parts > 1 else ''}"
+
+
+def _class_of(found: ImportedObject) -> str:
+    return found.class_name if found.class_name != found.name else "of its own, which no detector knows"
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return " ".join(f"{0.0 if abs(value) < 1e-12 else value:.4g}" for value in values)
+
+
+def _facts(found: ImportedObject, folder: Path) -> dict[str, object]:
+    return {"folder": str(folder), **found.model_dump(mode="json", by_alias=True)}

@@ -1,0 +1,266 @@
+"""From a mesh file to a model: visual geometry with normals, convex collision parts, mass and inertia, as SDF."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from plant.models.builder.importing.errors import ObjectImportError
+from plant.models.builder.importing.reading import Y_UP, Patch, read_patches
+from plant.models.builder.importing.resting import feet, resting_rotation
+from plant.models.builder.importing.solid import Solid, convex_parts, hull_of, same_points, solid_of
+from plant.models.builder.inertia import scaled_to, solid_mass
+from plant.models.builder.mesh import (
+    SMOOTH_COSINE,
+    Colour,
+    Material,
+    Mesh,
+    mtl_text,
+    obj_text,
+    palette_picture,
+    plain_colours,
+    write_text,
+)
+from plant.models.builder.sdf import Model, model_sdf
+from plant.models.builder.shapes import ConvexMesh, MassProperties
+from plant.models.catalogue import load_catalogue
+from plant.models.imported import NAME, ImportedObject, write_imported
+from plant.pictures import save_png
+from skills.robot import FloatArray, Picture
+
+LARGEST_M: Final = 5.0
+SMALLEST_M: Final = 0.005
+PROUD_M: Final = 0.0003
+"""The small spheres stand out by this much, so that they bear the body."""
+PLACES: Final = 6
+PERSON: Final = "person"
+_UP: Final = {
+    "x": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "z": np.eye(3),
+}
+_MOST_NEIGHBOURS: Final = 32
+_ROUND_SAME, _ROUND_WIDEST = 0.02, 0.52
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is wanted of a mesh: name, mass (kg), class, metres per unit, the axis that is up, and whether holes close.
+
+    Without a class, the object is of a class of its own, which no detector knows.
+    """
+
+    name: str
+    mass_kg: float
+    class_name: str | None = None
+    scale: float = 1.0
+    up: str | None = None
+    close_holes: bool = False
+
+    def refuse_wrong(self) -> None:
+        """Raise ObjectImportError for a value that cannot be."""
+        catalogue = load_catalogue()
+        if re.fullmatch(NAME, self.name) is None:
+            hint = "use letters, digits and _, a letter first, at most 40"
+            raise ObjectImportError(f"the name {self.name[:60]!r} is no identifier", hint)
+        if self.name.lower() in catalogue:
+            raise ObjectImportError(
+                f"the name {self.name!r} is taken by a class of objects", "give another one, and the class by --class"
+            )
+        classes = [name for name in catalogue if name != PERSON]
+        if self.class_name is not None and self.class_name not in classes:
+            hint = f"known are {', '.join(classes)}; leave it out for an object of another kind"
+            raise ObjectImportError(f"there is no class {self.class_name[:60]!r}", hint)
+        if not (math.isfinite(self.mass_kg) and self.mass_kg > 0.0):
+            raise ObjectImportError(f"the mass {self.mass_kg:g} kg is not positive", "weigh the object")
+        if not (math.isfinite(self.scale) and self.scale > 0.0):
+            raise ObjectImportError(f"the scale {self.scale:g} is not positive", "give metres per unit")
+        if self.up is not None and self.up not in _UP:
+            raise ObjectImportError(f"the axis {self.up[:20]!r} is none", "give x, y or z")
+
+
+@dataclass(frozen=True)
+class _Body:
+    """A mesh as it rests, about the centre of its bounding box: its appearance, and the solid that it bounds."""
+
+    patches: tuple[Patch, ...]
+    solid: Solid
+
+    def moved(self, R: FloatArray, p: FloatArray) -> _Body:
+        patches = tuple(patch.moved(R, p) for patch in self.patches)
+        return _Body(patches, Solid(self.solid.points @ R.T + p, self.solid.faces))
+
+
+def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
+    """Write the model of a mesh file into a folder that is there: SDF, OBJ, pictures, and what they are.
+
+    The object keeps its side that is down where it can rest on it; else it is laid down where it is lowest.
+
+    Raises:
+        ObjectImportError: the file or what is wanted of it cannot be used.
+        ObjectsExtraMissingError: the libraries are not installed.
+        OSError: the folder cannot be written.
+    """
+    wanted.refuse_wrong()
+    body = _at_rest(_placed(mesh, wanted))
+    mass = scaled_to(_mass(body.solid), wanted.mass_kg)
+    parts = [_shrunk(part, body.solid.points) for part in convex_parts(body.solid)]
+    bearing = feet(body.solid.points, mass.com)
+    files = [f"{wanted.name}_part_{number}.obj" for number in range(len(parts))]
+    for file, part in zip(files, parts, strict=True):
+        write_text(folder / file, _hull_text(part))
+    model = Model(
+        wanted.name,
+        f"{wanted.name}.obj",
+        [*(ConvexMesh(file=file) for file in files), *bearing],
+        mass,
+        comment=wanted.name,
+        maker="`errand object import`",
+    )
+    write_text(folder / f"{wanted.name}.sdf", model_sdf(model))
+    _write_appearance(folder, wanted.name, body.patches)
+    made = _facts(wanted, body, mass, len(parts))
+    write_imported(folder, made)
+    return made
+
+
+def _placed(mesh: Path, wanted: Wanted) -> _Body:
+    """The mesh in metres, z up. Raises ObjectImportError."""
+    up = wanted.up or ("y" if mesh.suffix.lower() in Y_UP else "z")
+    patches = tuple(patch.moved(wanted.scale * _UP[up], np.zeros(3)) for patch in read_patches(mesh))
+    triangles = np.concatenate([patch.triangles for patch in patches])
+    _refuse_size(np.ptp(triangles.reshape(-1, 3), axis=0), wanted.scale)
+    solid, inward = solid_of(triangles, close_holes=wanted.close_holes)
+    if inward:
+        patches = tuple(replace(p, triangles=p.triangles[:, ::-1], uvs=p.uvs[:, ::-1]) for p in patches)
+    return _Body(patches, solid)
+
+
+def _refuse_size(size_m: FloatArray, scale: float) -> None:
+    """Refuse what is no object for a table: the unit of the file is another one, then."""
+    told = " x ".join(f"{value:.3g}" for value in size_m)
+    if size_m.max() > LARGEST_M:
+        hint = f"if its unit is millimetres, give --scale {0.001 * scale:g}"
+        raise ObjectImportError(f"it is {told} m large", hint)
+    if size_m.max() < SMALLEST_M:
+        hint = "give --scale, the metres of one unit of the file"
+        raise ObjectImportError(f"it is {told} m small", hint)
+
+
+def _at_rest(body: _Body) -> _Body:
+    """The body laid down where it would fall, about the centre of its bounding box."""
+    turned = body.moved(resting_rotation(body.solid.points, _mass(body.solid).com), np.zeros(3))
+    points = turned.solid.points
+    return turned.moved(np.eye(3), -(points.min(axis=0) + points.max(axis=0)) / 2.0)
+
+
+def _mass(solid: Solid) -> MassProperties:
+    """Those of the solid filled evenly."""
+    mesh = Mesh({"": Material()})
+    corners = solid.triangles
+    mesh.add_triangles("", corners, np.zeros_like(corners), np.zeros((len(corners), 3, 2)))
+    return solid_mass(mesh, 1.0)
+
+
+def _shrunk(part: FloatArray, points: FloatArray) -> FloatArray:
+    """A convex part a little smaller, so that the spheres at the body's corners stand out."""
+    low, high = part.min(axis=0), part.max(axis=0)
+    scale = np.clip(1.0 - 2.0 * PROUD_M / np.maximum(high - low, 1e-9), 0.8, 1.0)
+    smaller = (low + high) / 2.0 + (part - (low + high) / 2.0) * scale
+    inset = np.minimum(PROUD_M, np.ptp(points, axis=0) / 10.0)
+    return np.asarray(np.clip(smaller, points.min(axis=0) + inset, points.max(axis=0) - inset))
+
+
+def _hull_text(points: FloatArray) -> str:
+    """The convex hull of points as OBJ, its triangles looking outward."""
+    hull = hull_of(points)
+    corners, faces = points[hull.vertices], np.searchsorted(hull.vertices, hull.simplices)
+    a, b, c = (corners[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces = np.where(inward[:, None], faces[:, ::-1], faces)
+    lines = [f"v {x:.{PLACES}f} {y:.{PLACES}f} {z:.{PLACES}f}" for x, y, z in corners]
+    return "\n".join([*lines, *(f"f {i} {j} {k}" for i, j, k in faces + 1)]) + "\n"
+
+
+def _write_appearance(folder: Path, name: str, patches: Sequence[Patch]) -> None:
+    """The visual geometry with its pictures; equal colours and equal pictures are one material."""
+    materials, pictures = dict[str, Material](), dict[str, Picture]()
+    mesh, known = Mesh(materials), dict[Colour | bytes, str]()
+    normals = _corner_normals(np.concatenate([patch.triangles for patch in patches]))
+    start = 0
+    for patch in patches:
+        key = patch.colour if patch.picture is None else patch.picture.tobytes()
+        material = known.setdefault(key, f"surface_{len(known):03d}")
+        if patch.picture is None:
+            materials[material] = Material(patch.colour)
+        else:
+            materials[material], pictures[f"{material}.png"] = Material(texture=f"{material}.png"), patch.picture
+        mesh.add_triangles(material, patch.triangles, normals[start : start + len(patch.triangles)], patch.uvs)
+        start += len(patch.triangles)
+    write_text(folder / f"{name}.obj", obj_text(mesh, f"{name}.mtl", places=PLACES))
+    write_text(folder / f"{name}.mtl", mtl_text(mesh, "palette.png"))
+    for file, picture in pictures.items():
+        save_png(folder / file, picture)
+    if plain_colours(materials):
+        save_png(folder / "palette.png", palette_picture(materials))
+
+
+def _corner_normals(triangles: FloatArray) -> FloatArray:
+    """Unit normals (T, 3, 3) of corners: the mean of those of the triangles that meet there without an edge.
+
+    A triangle counts by its angle there.
+    """
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    facing = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-20)
+    _, index = same_points(triangles)
+    order = np.argsort(index.reshape(-1), kind="stable")
+    place, own = index.reshape(-1)[order], facing[order // 3]
+    weighted = own * _corner_angles(triangles).reshape(-1, 1)[order]
+    sums = weighted.copy()
+    for step in range(1, _MOST_NEIGHBOURS):
+        together = place[step:] == place[:-step]
+        if not together.any():
+            break
+        smooth = together & (np.einsum("ij,ij->i", own[step:], own[:-step]) > SMOOTH_COSINE)
+        sums[step:][smooth] += weighted[:-step][smooth]
+        sums[:-step][smooth] += weighted[step:][smooth]
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    sums = np.where(lengths > 1e-20, sums / np.maximum(lengths, 1e-20), (0.0, 0.0, 1.0))
+    normals = np.empty_like(sums)
+    normals[order] = sums
+    return normals.reshape(-1, 3, 3)
+
+
+def _corner_angles(triangles: FloatArray) -> FloatArray:
+    """The angles (T, 3) of triangles at their corners."""
+    ahead = np.roll(triangles, -1, axis=1) - triangles
+    behind = np.roll(triangles, 1, axis=1) - triangles
+    lengths = np.linalg.norm(ahead, axis=2) * np.linalg.norm(behind, axis=2)
+    cosine = np.einsum("tij,tij->ti", ahead, behind) / np.maximum(lengths, 1e-20)
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def _facts(wanted: Wanted, body: _Body, mass: MassProperties, parts: int) -> ImportedObject:
+    points = body.solid.points
+    size = np.ptp(points, axis=0)
+    x, y, z = (round(float(value), 6) for value in size)
+    com_x, com_y, com_z = (round(float(value), 6) for value in mass.com)
+    widest = float(np.hypot(points[:, 0], points[:, 1]).max())
+    m = mass.inertia
+    return ImportedObject(
+        name=wanted.name,
+        class_name=wanted.class_name or wanted.name,
+        mass_kg=wanted.mass_kg,
+        size_m=(x, y, z),
+        com_m=(com_x, com_y, com_z),
+        inertia_kg_m2=(m[0, 0], m[1, 1], m[2, 2], m[0, 1], m[0, 2], m[1, 2]),
+        collision_parts=parts,
+        triangles=sum(len(patch.triangles) for patch in body.patches),
+        round=bool(abs(size[0] - size[1]) < _ROUND_SAME * size[0] and widest < _ROUND_WIDEST * size[0]),
+    )

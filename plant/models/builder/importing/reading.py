@@ -1,0 +1,152 @@
+"""Reads mesh files: triangles with colours, pictures and texture coordinates, whatever the format."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from plant.models.builder.importing.errors import ObjectImportError
+from plant.models.builder.importing.libraries import objects_module
+from plant.models.builder.mesh import Colour
+from skills.robot import FloatArray, Picture
+
+MAX_BYTES: Final = 200_000_000
+MOST_TRIANGLES: Final = 100_000
+LARGEST_PICTURE_PX: Final = 1024
+Y_UP: Final = (".gltf", ".glb")
+"""Formats that define y as up."""
+MOST_COLOURS: Final = 64
+"""More colours than that are rounded to few."""
+GREY: Final[Colour] = (0.7, 0.7, 0.7)
+_NO_MESHES: Final = frozenset({"zip", "tar.gz", "bz2", "tar.bz2", "stl_ascii", "dxf", "xyz"})
+_SHADES: Final = 5
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Triangles of one appearance: corners (T, 3, 3), texture coordinates (T, 3, 2), a colour or a picture."""
+
+    triangles: FloatArray
+    uvs: FloatArray
+    colour: Colour = GREY
+    picture: Picture | None = None
+
+    def moved(self, R: FloatArray, p: FloatArray) -> Patch:
+        """The same, turned or scaled by the (3, 3) matrix R, then moved by p."""
+        return replace(self, triangles=self.triangles @ R.T + p)
+
+
+def read_patches(path: Path) -> tuple[Patch, ...]:
+    """The triangles of a mesh file in its own unit and axes.
+
+    Raises:
+        ObjectImportError: the file is missing, too large or no mesh, is empty, or has too many triangles.
+        ObjectsExtraMissingError: trimesh is not installed.
+    """
+    trimesh = objects_module("trimesh")
+    _refuse_unreadable(path, sorted(trimesh.available_formats() - _NO_MESHES))
+    try:
+        scene = trimesh.load_scene(path, process=False)
+        parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+        count = sum(len(part.faces) for part in parts)
+        if count > MOST_TRIANGLES:
+            hint = "make it coarser, for example by Decimate in Blender or by MeshLab"
+            raise ObjectImportError(f"it has {count} triangles, and at most {MOST_TRIANGLES} are taken", hint)
+        patches = tuple(patch for part in parts for patch in _patches(part))
+    except ObjectImportError:
+        raise
+    except FileNotFoundError as error:
+        raise ObjectImportError(
+            "a file that it names is missing", "put it beside the mesh, or export as GLB"
+        ) from error
+    except Exception as error:  # readers of foreign formats raise anything
+        raise ObjectImportError(
+            f"it cannot be read as a mesh ({type(error).__name__})", "export it once more, for example as OBJ or GLB"
+        ) from error
+    if not patches:
+        raise ObjectImportError("it is no mesh: there are no triangles in it", "give a file with a surface")
+    if len({patch.colour for patch in patches}) > MOST_COLOURS:
+        patches = tuple(replace(patch, colour=_rounded(patch.colour)) for patch in patches)
+    if not all(np.isfinite(patch.triangles).all() for patch in patches):
+        raise ObjectImportError("some of its points are no finite numbers", "export it once more")
+    return patches
+
+
+def _refuse_unreadable(path: Path, formats: list[str]) -> None:
+    try:
+        if not path.is_file():
+            raise ObjectImportError("there is no such file", "check the path")
+        size = path.stat().st_size
+    except OSError as error:
+        raise ObjectImportError(f"it cannot be read ({error.strerror})", "check the path") from error
+    if path.suffix.lower().removeprefix(".") not in formats:
+        what = f"'{path.suffix}' is the ending of no mesh format" if path.suffix else "it has no ending"
+        raise ObjectImportError(what, f"give one of {', '.join(formats)}")
+    if size > MAX_BYTES:
+        raise ObjectImportError(f"it is larger than {MAX_BYTES} bytes", "make it coarser")
+
+
+def _patches(part: Any) -> Iterator[Patch]:
+    """The patches of one mesh, by colour where it has several."""
+    triangles = np.asarray(part.triangles, dtype=np.float64)
+    if triangles.shape[1:] != (3, 3):
+        raise ValueError(f"triangles of {triangles.shape[1:]} numbers")
+    plain = np.zeros((len(triangles), 3, 2))
+    visual = part.visual
+    if visual.kind == "texture":
+        picture = _picture(visual.material)
+        uv = getattr(visual, "uv", None)
+        if picture is None or uv is None:
+            yield Patch(triangles, plain, _colour(visual.material.main_color))
+        else:
+            yield Patch(triangles, _texture(np.asarray(uv)[part.faces]), picture=picture)
+    elif visual.kind in ("face", "vertex"):
+        colours = np.asarray(visual.face_colors)[:, :3].astype(np.uint8)
+        for colour, chosen in _by_colour(colours):
+            yield Patch(triangles[chosen], plain[chosen], _colour(colour))
+    else:
+        yield Patch(triangles, plain)
+
+
+def _picture(material: Any) -> Picture | None:
+    """The picture of a material's colour, RGB, shrunk to `LARGEST_PICTURE_PX`."""
+    found = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    if found is None:
+        return None
+    picture = np.asarray(found.convert("RGB"), dtype=np.uint8)
+    shrink = LARGEST_PICTURE_PX / max(picture.shape[:2])
+    if shrink < 1.0:
+        picture = np.asarray(cv2.resize(picture, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA), np.uint8)
+    return picture
+
+
+def _texture(uvs: FloatArray) -> FloatArray:
+    """Texture coordinates (T, 3, 2), each triangle's moved by whole textures to begin within the first one."""
+    return np.asarray(uvs - np.floor(uvs.min(axis=1, keepdims=True) + 1e-6))
+
+
+def _colour(rgb: ArrayLike) -> Colour:
+    r, g, b = (float(value) / 255.0 for value in np.asarray(rgb)[:3])
+    return r, g, b
+
+
+def _rounded(colour: Colour) -> Colour:
+    """One of few colours."""
+    r, g, b = (round(value * (_SHADES - 1)) / (_SHADES - 1) for value in colour)
+    return r, g, b
+
+
+def _by_colour(colours: NDArray[np.uint8]) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.bool_]]]:
+    """Colours, and which triangles (T,) have each; many colours are rounded to few."""
+    if len(np.unique(colours, axis=0)) > MOST_COLOURS:
+        step = 255 / (_SHADES - 1)
+        colours = np.round(np.round(colours / step) * step).astype(np.uint8)
+    unique, index = np.unique(colours, axis=0, return_inverse=True)
+    for number, colour in enumerate(unique):
+        yield colour, index.reshape(-1) == number

@@ -1,0 +1,183 @@
+"""A mesh as a solid body: is it closed, what volume does it enclose, and which convex parts fill it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from plant.models.builder.importing.errors import ObjectImportError
+from plant.models.builder.importing.libraries import objects_module
+from skills.robot import FloatArray
+
+MOST_PARTS: Final = 16
+MOST_CORNERS: Final = 64
+CONCAVITY: Final = 0.05
+"""How far CoACD lets a convex part differ from the body (its `threshold`)."""
+AS_GOOD_AS_CONVEX: Final = 0.97
+_EFFORT: Final = MappingProxyType({"mcts_iterations": 60, "mcts_nodes": 10, "resolution": 1000})
+"""Half of CoACD's usual search, which takes a quarter of the time and finds no worse parts."""
+_SAME_POINT: Final = 1e-6
+_LEAST_VOLUME: Final = 1e-6
+Faces = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed surface that looks outward: points (N, 3) in metres and corners of triangles (T, 3)."""
+
+    points: FloatArray
+    faces: Faces
+
+    @property
+    def triangles(self) -> FloatArray:
+        """Corners (T, 3, 3)."""
+        return np.asarray(self.points[self.faces])
+
+    @property
+    def volume_m3(self) -> float:
+        """What it encloses."""
+        return _volume(self.triangles)
+
+
+def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid, bool]:
+    """The body that triangles (T, 3, 3) enclose, and whether they looked inward.
+
+    A closed surface has for every edge of a triangle one that runs the other way. With `close_holes`, each ring of
+    edges without a partner is closed by a fan about its middle.
+
+    Raises:
+        ObjectImportError: the surface is open, its triangles are wound differently, or it is flat.
+    """
+    points, faces = _welded(triangles)
+    rims = _unpaired(faces)
+    if len(np.unique(rims, axis=0)) < len(rims):
+        hint = "let its normals be calculated anew in the program that made it"
+        raise ObjectImportError("its triangles do not all look outward", hint)
+    if len(rims) and not close_holes:
+        hint = "close it in the program that made it, or add --close-holes"
+        raise ObjectImportError(f"it is open (not watertight), at {len(rims)} edges", hint)
+    points, faces = _closed(points, faces, rims)
+    solid = Solid(points, faces)
+    box = float(np.prod(np.ptp(points, axis=0)))
+    if abs(solid.volume_m3) <= _LEAST_VOLUME * box or box == 0.0:
+        raise ObjectImportError("it encloses no volume", "give a body with a thickness, no sheet")
+    inward = solid.volume_m3 < 0
+    return (Solid(points, faces[:, ::-1]) if inward else solid), inward
+
+
+def _volume(triangles: FloatArray) -> float:
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+def same_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
+    """Each point once (N, 3), and the corners of the triangles (T, 3), where nearly the same is the same."""
+    corners = triangles.reshape(-1, 3)
+    step = max(float(np.ptp(corners, axis=0).max()) * _SAME_POINT, 1e-12)
+    _, first, index = np.unique(
+        np.round(corners / step).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    return corners[first], index.reshape(-1, 3)
+
+
+def _welded(triangles: FloatArray) -> tuple[FloatArray, Faces]:
+    points, faces = same_points(triangles)
+    apart = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return points, faces[apart]
+
+
+def _edges(faces: Faces) -> Faces:
+    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def _unpaired(faces: Faces) -> Faces:
+    """Edges (E, 2) of triangles for which none runs the other way, each as often as it lacks a partner."""
+    edges = _edges(faces)
+    low, sign = np.sort(edges, axis=1), np.where(edges[:, 0] < edges[:, 1], 1, -1)
+    unique, index = np.unique(low, axis=0, return_inverse=True)
+    surplus = np.zeros(len(unique), np.int64)
+    np.add.at(surplus, index.reshape(-1), sign)
+    open_ = np.flatnonzero(surplus)
+    ends = np.where((surplus[open_] > 0)[:, None], unique[open_], unique[open_][:, ::-1])
+    return np.repeat(ends, np.abs(surplus[open_]), axis=0)
+
+
+def _closed(points: FloatArray, faces: Faces, rims: Faces) -> tuple[FloatArray, Faces]:
+    """The surface with a fan in each ring of edges without a partner: every triangle is a ring, so they form rings."""
+    following: dict[int, list[int]] = {}
+    for a, b in rims.tolist():
+        following.setdefault(b, []).append(a)  # a fan runs against the rim
+    middles, fans = list[FloatArray](), list[list[int]]()
+    while following:
+        ring = [next(iter(following))]
+        while len(ring) == 1 or ring[-1] != ring[0]:
+            ahead = following[ring[-1]]
+            if len(ahead) == 1:
+                del following[ring[-1]]
+            ring.append(ahead.pop())
+        fans += [[len(points) + len(middles), a, b] for a, b in itertools.pairwise(ring)]
+        middles.append(points[ring[:-1]].mean(axis=0))
+    if not fans:
+        return points, faces
+    return np.vstack([points, *middles]), np.vstack([faces, np.array(fans, dtype=np.int64)])
+
+
+def convex_parts(solid: Solid) -> tuple[FloatArray, ...]:
+    """Corners (N, 3) of at most `MOST_PARTS` convex parts, each of at most `MOST_CORNERS`, that fill a body.
+
+    A body that fills its convex hull almost is its own only part; CoACD takes the others apart.
+
+    Raises:
+        ObjectsExtraMissingError: CoACD is not installed.
+    """
+    hull = hull_of(solid.points)
+    whole = _few_corners(solid.points[hull.vertices])
+    if solid.volume_m3 >= AS_GOOD_AS_CONVEX * hull.volume:
+        return (whole,)
+    coacd = objects_module("coacd")
+    coacd.set_log_level("off")
+    found = coacd.run_coacd(
+        coacd.Mesh(solid.points, solid.faces),
+        threshold=CONCAVITY,
+        max_convex_hull=MOST_PARTS,
+        seed=0,
+        **_EFFORT,
+    )
+    low, high = solid.points.min(axis=0), solid.points.max(axis=0)
+    return tuple(_cornered(np.clip(points, low, high) for points, _ in found)) or (whole,)
+
+
+def _cornered(parts: Iterable[FloatArray]) -> Iterator[FloatArray]:
+    """The corners of parts; those as thin as paper are left out."""
+    for points in parts:
+        try:
+            hull = hull_of(points)
+        except ObjectImportError:
+            continue
+        yield _few_corners(points[hull.vertices])
+
+
+def hull_of(points: FloatArray) -> ConvexHull:
+    """The convex hull of points (N, 3). Raises ObjectImportError: they lie in a plane."""
+    try:
+        return ConvexHull(points)
+    except QhullError as error:
+        raise ObjectImportError("it encloses no volume", "give a body with a thickness, no sheet") from error
+
+
+def _few_corners(corners: FloatArray) -> FloatArray:
+    """The corners that lie farthest in `MOST_CORNERS` directions, where there are more than so many."""
+    if len(corners) <= MOST_CORNERS:
+        return corners
+    step = np.arange(MOST_CORNERS) + 0.5
+    height, turn = 1.0 - 2.0 * step / MOST_CORNERS, np.pi * (1.0 + np.sqrt(5.0)) * step
+    across = np.sqrt(1.0 - height**2)
+    directions = np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
+    return np.asarray(corners[np.unique(np.argmax(corners @ directions.T, axis=0))])

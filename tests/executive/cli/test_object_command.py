@@ -1,0 +1,200 @@
+"""`errand object`, and missions with what it makes: each wrong input is one line and status 2."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import cv2
+import pytest
+from typer.testing import CliRunner
+
+from executive.cli import entry
+from plant.worlds.world import WORLDS_FOLDER
+
+trimesh = pytest.importorskip("trimesh")
+
+MISSION = """\
+name: bring the drill
+imports: [drill]
+objects:
+  my drill: {model: drill, surfaces: [workbench]}
+steps:
+  - say: bring me the wrench from the workshop
+"""
+
+
+def invoke(*arguments: object):
+    return CliRunner().invoke(entry.app, list(map(str, arguments)))
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    path = tmp_path / "drill.stl"
+    trimesh.creation.box((0.2, 0.06, 0.04)).export(path)
+    return path
+
+
+def made(mesh: Path, out: Path, *more: object):
+    return invoke("object", "import", mesh, "--name", "drill", "--mass", 1.2, "--out", out, *more)
+
+
+def test_a_mesh_becomes_a_model_that_is_shown(mesh, tmp_path):
+    result = made(mesh, tmp_path / "drill", "--class", "wrench")
+    assert result.exit_code == 0, result.output
+    assert "drill, class wrench, 0.200 x 0.060 x 0.040 m, 1.2 kg, 1 collision part\n" in result.stdout
+    shown = invoke("object", "show", tmp_path / "drill", "--picture", tmp_path / "drill.png")
+    assert shown.exit_code == 0, shown.output
+    lines = [" ".join(line.split()) for line in shown.stdout.splitlines()]
+    assert lines[:3] == ["drill: class wrench", "extents (m) 0.2 0.06 0.04", "mass (kg) 1.2"]
+    assert "collision parts 1" in lines
+    assert "inertia (kg m^2) 0.00052 0.00416 0.00436 0 0 0 (xx yy zz xy xz yz)" in lines
+    picture = cv2.imread(str(tmp_path / "drill.png"))
+    assert picture.shape == (480, 640, 3)
+    assert picture.std() > 5.0
+
+
+def test_a_size_that_its_class_never_has_is_warned_of(mesh, tmp_path):
+    result = made(mesh, tmp_path / "drill", "--class", "screwdriver", "--scale", 3)
+    assert result.exit_code == 0
+    assert result.stderr == (
+        "errand: warning: drill is 0.600 m long; of class screwdriver the robot expects 0.08 to 0.45 m, "
+        "and may not find it\n"
+    )
+
+
+def test_scripts_are_told_the_same_twice(mesh, tmp_path):
+    first = json.loads(made(mesh, tmp_path / "drill", "--json").stdout)
+    assert first == json.loads(invoke("object", "show", tmp_path / "drill", "--json").stdout)
+    assert (first["class"], first["mass_kg"], first["size_m"]) == ("drill", 1.2, [0.2, 0.06, 0.04])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (("--mass", 0), "the mass 0 kg is not positive"),
+        (("--mass", -1.5), "the mass -1.5 kg is not positive"),
+        (("--mass", "nan"), "the mass nan kg is not positive"),
+        (("--scale", 0), "the scale 0 is not positive"),
+        (("--scale", 1000), "drill.stl: it is 200 x 60 x 40 m large; if its unit is millimetres, give --scale 1"),
+        (("--name", "my drill"), "the name 'my drill' is no identifier"),
+        (("--name", "wrench"), "the name 'wrench' is taken by a class of objects"),
+        (("--class", "drill"), "there is no class 'drill'; known are beer, coke"),
+        (("--class", "person"), "there is no class 'person'"),
+        (("--up", "w"), "the axis 'w' is none; give x, y or z"),
+        (("--out", "{tmp}"), "there is something already; name a new folder by --out"),
+        (("--out", "{tmp}/drill.stl"), "there is something already"),
+    ],
+)
+def test_what_cannot_be_is_one_line_and_status_2(mesh, tmp_path, arguments, why):
+    given = [str(each).replace("{tmp}", str(tmp_path)) for each in arguments]
+    result = made(mesh, tmp_path / "made", *given)
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("errand: ") and why in line
+    assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "why"),
+    [
+        ("none.stl", None, "none.stl: there is no such file; check the path"),
+        ("notes.txt", "hello", "'.txt' is the ending of no mesh format; give one of glb, gltf, obj, off, ply, stl"),
+        ("notes", "hello", "it has no ending"),
+        ("notes.stl", "hello", "notes.stl: it is no mesh: there are no triangles in it"),
+        ("notes.obj", "hello", "notes.obj: it is no mesh: there are no triangles in it"),
+        ("notes.glb", "hello", "notes.glb: it cannot be read as a mesh"),
+        ("plane.obj", "v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "plane.obj: it cannot be read as a mesh"),
+        (
+            "parts.gltf",
+            '{"asset": {"version": "2.0"}, "buffers": [{"uri": "no.bin", "byteLength": 1}], "scenes": [{}]}',
+            "parts.gltf: a file that it names is missing; put it beside the mesh",
+        ),
+        ("empty.obj", "", "empty.obj: it is no mesh: there are no triangles in it"),
+        ("empty.ply", "", "empty.ply: it cannot be read as a mesh"),
+        ("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "sheet.obj: it is open (not watertight), at 3 edges"),
+        ("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n", "flat.obj: it encloses no volume"),
+    ],
+)
+def test_a_file_that_is_no_mesh_is_refused(tmp_path, name, text, why):
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    result = made(tmp_path / name, tmp_path / "made")
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert why in line
+    assert not (tmp_path / "made").exists()
+
+
+def test_an_open_mesh_offers_to_be_closed_and_is(tmp_path):
+    box = trimesh.creation.box((0.1, 0.08, 0.06))
+    box.update_faces(box.face_normals[:, 2] < 0.5)
+    box.export(tmp_path / "open.stl")
+    refused = made(tmp_path / "open.stl", tmp_path / "made")
+    assert refused.exit_code == 2
+    assert "it is open (not watertight), at 4 edges; close it in the program that made it, or add --close-holes" in (
+        refused.stderr
+    )
+    closed = made(tmp_path / "open.stl", tmp_path / "made", "--close-holes")
+    assert closed.exit_code == 0, closed.output
+
+
+@pytest.mark.parametrize("library", ["trimesh", "coacd"])
+def test_without_its_extra_it_says_what_to_install(tmp_path, monkeypatch, library):
+    trimesh.creation.annulus(0.03, 0.04, 0.1, sections=8).export(tmp_path / "pipe.stl")
+    monkeypatch.setitem(sys.modules, library, None)
+    result = made(tmp_path / "pipe.stl", tmp_path / "made")
+    assert result.exit_code == 2
+    assert f"needs {library}, which is not installed; pip install 'spot-errand[objects]'" in result.stderr
+
+
+def test_what_is_no_model_is_not_shown(tmp_path):
+    result = invoke("object", "show", tmp_path)
+    assert result.exit_code == 2
+    assert f"{tmp_path}: there is no imported object (object.yaml is missing)" in result.stderr
+
+
+def test_a_mission_with_an_imported_object_is_checked(mesh, tmp_path):
+    assert made(mesh, tmp_path / "drill", "--class", "wrench").exit_code == 0
+    (tmp_path / "m.yaml").write_text(MISSION)
+    result = invoke("check", tmp_path / "m.yaml")
+    assert result.exit_code == 0, result.output
+    assert "✓" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "why"),
+    [
+        ("[drill]", "[drill, drll]", 2, "drll: there is no imported object"),
+        ("model: drill", "model: drll", 4, "no model 'drll' for my drill; did you mean 'drill'?"),
+        ("[workbench]", "[workbnch]", 4, "no surface 'workbnch' in knowledge.yaml; did you mean 'workbench'?"),
+        ("[workbench]", "[desk]", 4, "surface 'desk' may carry things but has no entry under `fronts`"),
+        ("my drill:", "hammer:", 4, "'hammer' names two objects or people"),
+        ("[workbench]", "[]", 4, "surfaces"),
+    ],
+)
+def test_a_mission_that_names_what_is_not_there_is_refused_at_its_line(mesh, tmp_path, old, new, line, why):
+    assert made(mesh, tmp_path / "drill", "--class", "wrench").exit_code == 0
+    (tmp_path / "m.yaml").write_text(MISSION.replace(old, new))
+    result = invoke("check", tmp_path / "m.yaml")
+    assert result.exit_code == 2
+    assert f"m.yaml:{line}: " in result.stderr and why in result.stderr
+
+
+def test_an_imported_object_that_is_the_only_one_of_its_class_counts_with_its_mass(mesh, tmp_path):
+    assert made(mesh, tmp_path / "drill", "--class", "wrench", "--mass", 30).exit_code == 0
+    world = tmp_path / "world"
+    copy_of_flat(world, "{name: wrench, model: wrench", "{name: wrench, model: drill", imports="[../drill]")
+    (tmp_path / "m.yaml").write_text("name: m\nsteps: [{say: bring me the wrench}]\n")
+    result = invoke("check", tmp_path / "m.yaml", "--world", world)
+    assert result.exit_code == 2
+    assert "'wrench' is too heavy: 30 kg" in result.stderr
+
+
+def copy_of_flat(folder: Path, old: str, new: str, *, imports: str) -> None:
+    """The flat with other objects."""
+    shutil.copytree(WORLDS_FOLDER / "flat", folder)
+    path = folder / "objects.yaml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(f"imports: {imports}\n{text.replace(old, new)}")

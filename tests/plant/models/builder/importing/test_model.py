@@ -1,0 +1,232 @@
+"""Meshes become models: sizes, masses, collision parts, appearance; what is no solid body is refused."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError, Wanted, import_object
+from plant.models.builder.outlines import triangles_of
+from plant.models.imported import ImportedObject, read_imported
+
+trimesh = pytest.importorskip("trimesh")
+pytest.importorskip("coacd")
+
+L_SHAPE = np.array([[0, 0], [0.2, 0], [0.2, 0.05], [0.05, 0.05], [0.05, 0.2], [0, 0.2]])
+
+
+def imported(mesh, tmp_path: Path, ending: str = "ply", **wanted) -> tuple[ImportedObject, Path]:
+    """The mesh written to a file, and made a model of 0.6 kg."""
+    path, folder = tmp_path / f"mesh.{ending}", tmp_path / "model"
+    mesh.export(path)
+    folder.mkdir()
+    return import_object(path, Wanted(**{"name": "gadget", "mass_kg": 0.6, **wanted}), folder), folder
+
+
+def l_shape():
+    return trimesh.creation.extrude_triangulation(L_SHAPE, np.array(triangles_of(L_SHAPE)), 0.05)
+
+
+def pipe():
+    return trimesh.creation.annulus(0.03, 0.04, 0.1, sections=8)
+
+
+def lidless_box():
+    box = trimesh.creation.box((0.1, 0.08, 0.06))
+    box.update_faces(box.face_normals[:, 2] < 0.5)
+    return box
+
+
+def part_points(folder: Path) -> list[np.ndarray]:
+    files = sorted(folder.glob("gadget_part_*.obj"))
+    return [np.array([line.split()[1:] for line in f.read_text().splitlines() if line[0] == "v"], float) for f in files]
+
+
+def test_a_box_has_the_inertia_of_a_box(tmp_path):
+    made, folder = imported(trimesh.creation.box((0.2, 0.06, 0.04)), tmp_path)
+    assert made.size_m == pytest.approx((0.2, 0.06, 0.04))
+    assert made.com_m == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    expected = 0.6 / 12 * np.array([0.06**2 + 0.04**2, 0.2**2 + 0.04**2, 0.2**2 + 0.06**2])
+    np.testing.assert_allclose(made.inertia_kg_m2[:3], expected, rtol=1e-6)
+    assert (made.collision_parts, made.triangles, made.class_name, made.round) == (1, 12, "gadget", False)
+    assert read_imported(folder).size_m == made.size_m
+
+
+def test_its_form_has_the_height_at_which_it_rests(tmp_path):
+    made, folder = imported(trimesh.creation.cylinder(0.03, 0.1), tmp_path, class_name="cylinder")
+    form = made.form(folder)
+    assert (made.class_name, form.round, form.rest_height_m) == ("cylinder", True, pytest.approx(0.05))
+    assert form.path() == (folder / "gadget.sdf").resolve()
+
+
+@pytest.mark.parametrize(
+    "make", [l_shape, lambda: trimesh.creation.annulus(0.03, 0.04, 0.1, sections=8)], ids=["L", "pipe"]
+)
+def test_a_hollow_body_is_few_convex_parts_none_larger_than_it(tmp_path, make):
+    mesh = make()
+    made, folder = imported(mesh, tmp_path)
+    parts, half = part_points(folder), np.array(made.size_m) / 2
+    assert 2 <= made.collision_parts == len(parts) <= 16
+    assert all((np.abs(part) <= half + 1e-6).all() for part in parts)
+    volumes = sum(ConvexHull(part).volume for part in parts)
+    assert 0.85 * mesh.volume < volumes < 1.1 * mesh.volume
+    assert max(map(len, parts)) <= 64
+    sdf = (folder / "gadget.sdf").read_text()
+    assert sdf.count("<drake:declare_convex/>") == made.collision_parts
+    assert sdf.count("<drake:mu_dynamic>0.8<") == sdf.count("<collision ")
+
+
+def test_no_sphere_that_bears_it_stands_out_of_it(tmp_path):
+    made, folder = imported(l_shape(), tmp_path)
+    text = (folder / "gadget.sdf").read_text()
+    found = re.findall(r"<pose>(\S+ \S+ \S+) 0 0 0</pose>\s*<geometry><sphere><radius>([0-9.]+)<", text)
+    assert len(found) >= 8
+    reach = np.array([np.abs(np.array(p.split(), float)) + float(r) for p, r in found])
+    assert (reach <= np.array(made.size_m) / 2 + 1e-4).all()
+    assert reach[:, 2].max() == pytest.approx(made.size_m[2] / 2, abs=1e-4)
+
+
+def test_a_ball_gets_spheres_to_rest_on(tmp_path):
+    _, folder = imported(trimesh.creation.icosphere(3, 0.04), tmp_path)
+    assert (folder / "gadget.sdf").read_text().count("<sphere>") >= 3
+
+
+def test_millimetres_are_scaled(tmp_path):
+    mesh = l_shape()
+    mesh.apply_scale(1000.0)
+    made, _ = imported(mesh, tmp_path, scale=0.001)
+    assert made.size_m == pytest.approx((0.2, 0.2, 0.05), abs=1e-6)
+
+
+def test_what_cannot_stand_is_laid_down_along_x(tmp_path):
+    rod = trimesh.creation.cylinder(0.01, 0.3)
+    rod.apply_transform(trimesh.transformations.rotation_matrix(0.4, [1, 1, 0]))
+    made, _ = imported(rod, tmp_path)
+    assert made.size_m == pytest.approx((0.3, 0.02, 0.02), abs=2e-4)
+
+
+def test_what_stands_is_left_standing(tmp_path):
+    assert imported(trimesh.creation.box((0.04, 0.06, 0.2)), tmp_path)[0].size_m == pytest.approx((0.04, 0.06, 0.2))
+
+
+@pytest.mark.parametrize(("up", "ending"), [("y", "ply"), (None, "glb")])
+def test_y_may_be_up_and_is_in_gltf(tmp_path, up, ending):
+    made, _ = imported(trimesh.creation.box((0.04, 0.2, 0.06)), tmp_path, ending, up=up)
+    assert made.size_m == pytest.approx((0.04, 0.06, 0.2))
+
+
+def test_a_body_inside_out_is_turned(tmp_path):
+    box = trimesh.creation.box((0.1, 0.08, 0.06))
+    box.invert()
+    made, folder = imported(box, tmp_path)
+    assert min(made.inertia_kg_m2[:3]) > 0
+    lines = (folder / "gadget.obj").read_text().splitlines()
+    points, normals = (
+        np.array([line.split()[1:] for line in lines if line.startswith(k)], float) for k in ("v ", "vn")
+    )
+    corners = [line.split()[1:] for line in lines if line.startswith("f")]
+    for first in (face[0].split("/") for face in corners):
+        assert points[int(first[0]) - 1] @ normals[int(first[2]) - 1] > 0
+
+
+def test_edges_are_sharp_and_round_sides_are_smooth(tmp_path):
+    _, folder = imported(trimesh.creation.cylinder(0.03, 0.1, sections=32), tmp_path)
+    lines = (folder / "gadget.obj").read_text().splitlines()
+    normals = np.array([line.split()[1:] for line in lines if line.startswith("vn")], float)
+    assert set(np.round(np.abs(normals[:, 2]), 2)) == {0.0, 1.0}
+    assert len(normals) == 32 + 2
+
+
+def test_colours_of_triangles_stay(tmp_path):
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    box.visual.face_colors = [[200, 0, 0, 255]] * 6 + [[0, 0, 200, 255]] * 6
+    _, folder = imported(box, tmp_path)
+    palette = cv2.imread(str(folder / "palette.png"))[..., ::-1].reshape(-1, 3)
+    assert {(200, 0, 0), (0, 0, 200)} <= set(map(tuple, palette.tolist()))
+
+
+def test_very_many_colours_become_few(tmp_path):
+    ball = trimesh.creation.icosphere(3, 0.04)
+    ball.visual.face_colors = np.random.default_rng(1).integers(0, 255, (len(ball.faces), 4))
+    _, folder = imported(ball, tmp_path)
+    assert len(np.unique(cv2.imread(str(folder / "palette.png")).reshape(-1, 3), axis=0)) <= 125
+
+
+def test_parts_of_one_colour_share_it(tmp_path):
+    scene = trimesh.Scene()
+    for number in range(3):
+        material = trimesh.visual.material.PBRMaterial(baseColorFactor=[255, 0, 0, 255])
+        box = trimesh.creation.box((0.05, 0.05, 0.05))
+        box.apply_translation((0.05 * number, 0.0, 0.0))
+        box.visual = trimesh.visual.TextureVisuals(material=material)
+        scene.add_geometry(box)
+    made, folder = imported(scene, tmp_path, "glb")
+    assert made.size_m == pytest.approx((0.15, 0.05, 0.05))
+    assert sorted(path.name for path in folder.glob("*.png")) == ["palette.png"]
+    assert (folder / "gadget.obj").read_text().count("usemtl") == 1
+
+
+def test_a_texture_stays(tmp_path):
+    image = pytest.importorskip("PIL.Image").new("RGB", (8, 8), (10, 200, 30))
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=image)
+    box.visual = trimesh.visual.TextureVisuals(uv=np.random.default_rng(1).uniform(size=(8, 2)), material=material)
+    _, folder = imported(box, tmp_path, "glb")
+    assert (cv2.imread(str(folder / "surface_000.png"))[0, 0] == (30, 200, 10)).all()
+    assert "map_Kd surface_000.png" in (folder / "gadget.mtl").read_text()
+
+
+def test_an_open_body_can_be_closed(tmp_path):
+    made, _ = imported(lidless_box(), tmp_path, close_holes=True)
+    whole = 0.6 / 12 * (0.08**2 + 0.06**2)
+    assert made.inertia_kg_m2[0] == pytest.approx(whole, rel=1e-6)
+
+
+def one_turned():
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    box.faces[0] = box.faces[0][::-1]
+    return box
+
+
+@pytest.mark.parametrize(
+    ("make", "why"),
+    [
+        (lidless_box, "it is open (not watertight), at 4 edges"),
+        (one_turned, "its triangles do not all look outward"),
+        (lambda: trimesh.creation.box((200.0, 80.0, 60.0)), "if its unit is millimetres, give --scale 0.001"),
+        (lambda: trimesh.creation.box((0.002, 0.001, 0.001)), "give --scale"),
+        (lambda: trimesh.PointCloud(np.eye(3)), "it is no mesh: there are no triangles in it"),
+    ],
+)
+def test_what_is_no_body_is_refused(tmp_path, make, why):
+    with pytest.raises(ObjectImportError, match=re.escape(why)):
+        imported(make(), tmp_path)
+
+
+def test_points_that_are_no_numbers_are_refused(tmp_path):
+    (tmp_path / "m.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\nnan 1 0\n3 0 1 2\n")
+    with pytest.raises(ObjectImportError, match="no finite numbers"):
+        import_object(tmp_path / "m.off", Wanted("gadget", 1.0), tmp_path)
+
+
+def test_a_million_triangles_are_counted_and_refused(tmp_path):
+    count = 1_000_000
+    triangle = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+    data = np.zeros(count, triangle)
+    data["corners"] = np.random.default_rng(1).uniform(size=(count, 3, 3))
+    (tmp_path / "m.stl").write_bytes(b" " * 80 + np.uint32(count).tobytes() + data.tobytes())
+    with pytest.raises(ObjectImportError, match="it has 1000000 triangles, and at most 100000 are taken"):
+        import_object(tmp_path / "m.stl", Wanted("gadget", 1.0), tmp_path)
+
+
+def test_without_the_extra_the_library_is_named(tmp_path, monkeypatch):
+    (tmp_path / "m.stl").write_text("")
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(ObjectsExtraMissingError, match="trimesh"):
+        import_object(tmp_path / "m.stl", Wanted("gadget", 1.0), tmp_path)

@@ -1,0 +1,59 @@
+"""Folders of imported objects: what is written is read, and what is damaged is refused."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from plant.models.imported import ImportedFolderError, ImportedObject, read_imported, write_imported
+
+DRILL = ImportedObject(
+    name="drill",
+    class_name="wrench",
+    mass_kg=1.2,
+    size_m=(0.2, 0.06, 0.04),
+    com_m=(0.01, 0.0, 0.0),
+    inertia_kg_m2=(5.2e-4, 4.16e-3, 4.36e-3, 0.0, 1e-12, 0.0),
+    collision_parts=3,
+    triangles=120,
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "drill.sdf").write_text("<sdf/>")
+    write_imported(tmp_path, DRILL)
+    return tmp_path
+
+
+def test_what_is_written_is_read(folder: Path) -> None:
+    assert read_imported(folder) == DRILL
+
+
+def test_its_form_lies_in_the_folder_and_rests_at_half_its_height(folder: Path) -> None:
+    form = DRILL.form(folder)
+    assert form.path() == folder / "drill.sdf"
+    assert (form.half_extents_m, form.rest_height_m, form.round) == ((0.1, 0.03), 0.02, False)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ("mass_kg: 1.2", "mass_kg: -1", "mass_kg: "),
+        ("mass_kg: 1.2", "mass_kg: .nan", "mass_kg: "),
+        ("name: drill", "name: ../drill", "name: "),
+        ("round:", "rnd:", "rnd: "),
+        ("name: drill", "name: [", "cannot be read as YAML"),
+        ("name: drill", "name: other", "other.sdf is missing"),
+    ],
+)
+def test_a_damaged_folder_is_refused_with_its_place(folder: Path, old: str, new: str, why: str) -> None:
+    facts = folder / "object.yaml"
+    facts.write_text(facts.read_text().replace(old, new, 1))
+    with pytest.raises(ImportedFolderError, match=f"{re.escape(str(folder))}.*{why}.*`errand object import`"):
+        read_imported(folder)
+
+
+def test_a_folder_without_one_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ImportedFolderError, match=r"there is no imported object \(object.yaml is missing\)"):
+        read_imported(tmp_path)

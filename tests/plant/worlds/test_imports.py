@@ -1,0 +1,85 @@
+"""Worlds with imported models: they are placed, of their class, and rest where they lie."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plant.models.builder.importing import Wanted, import_object
+from plant.models.builder.outlines import triangles_of
+from plant.simulation import Simulation
+from plant.worlds.placement import place_objects
+from plant.worlds.world import WORLDS_FOLDER, ObjectRule, WorldError, load_world
+
+trimesh = pytest.importorskip("trimesh")
+pytest.importorskip("coacd")
+
+T_SHAPE = np.array([[-0.15, -0.013], [0.12, -0.013], [0.12, -0.05], [0.15, -0.05], [0.15, 0.05], [0.12, 0.05]])
+OUTLINE = np.vstack([T_SHAPE, [[0.12, 0.013], [-0.15, 0.013]]])
+OBJECTS = "objects:\n  - {name: my tool, model: tool, surfaces: [workbench]}\n"
+
+
+def import_tool(folder: Path, name: str = "tool") -> Path:
+    """A T of 0.5 kg, 28 mm thick, as a hammer, in a folder whose name has a space."""
+    file = folder / "tool.stl"
+    trimesh.creation.extrude_triangulation(OUTLINE, np.array(triangles_of(OUTLINE)), 0.028).export(file)
+    out = folder / f"my {name}"
+    out.mkdir()
+    import_object(file, Wanted(name, 0.5, "hammer"), out)
+    return out
+
+
+@pytest.fixture
+def world_folder(tmp_path: Path) -> Path:
+    """The flat with one object, an imported one, and nobody in it."""
+    import_tool(tmp_path)
+    folder = tmp_path / "flat"
+    shutil.copytree(WORLDS_FOLDER / "flat", folder)
+    rules = (folder / "objects.yaml").read_text().partition("objects:\n")[0]
+    (folder / "objects.yaml").write_text(f"imports: [../my tool]\n{rules}{OBJECTS}")
+    return folder
+
+
+def test_an_imported_object_settles_on_a_table(world_folder):
+    simulation = Simulation(load_world(world_folder), seed=1, visuals=False)
+    plant = simulation.engine.world.plant
+    (index,) = plant.GetBodyIndices(plant.GetModelInstanceByName("my tool"))
+    body, (placed,) = plant.get_body(index), place_objects(simulation.world, 1)
+    assert body.default_mass() == pytest.approx(0.5)
+    simulation.clock.advance(0.5)
+    early = plant.EvalBodyPoseInWorld(simulation.engine.context, body)
+    simulation.clock.advance(1.0)
+    late = plant.EvalBodyPoseInWorld(simulation.engine.context, body)
+    np.testing.assert_allclose(late.translation(), early.translation(), atol=2e-4)
+    surface = simulation.world.surfaces["workbench"]
+    assert late.translation()[2] == pytest.approx(surface.height_m + 0.014, abs=5e-4)
+    np.testing.assert_allclose(late.rotation().matrix(), placed.X_WO.rotation().matrix(), atol=2e-3)
+    assert "my tool" in simulation.engine.asleep
+
+
+def test_it_is_of_the_class_that_it_was_imported_with(world_folder):
+    (placed,) = place_objects(load_world(world_folder), 1)
+    assert (placed.name, placed.class_name) == ("my tool", "hammer")
+
+
+def test_a_folder_that_is_none_is_named_with_the_file(world_folder):
+    path = world_folder / "objects.yaml"
+    path.write_text(path.read_text().replace("../my tool", "../no tool"))
+    with pytest.raises(WorldError, match=r"objects\.yaml: .*no tool: there is no imported object"):
+        load_world(world_folder)
+
+
+def test_two_models_of_one_name_are_refused(world_folder, tmp_path):
+    world = load_world(world_folder)
+    assert world.with_imports([tmp_path / "my tool"]).imports == world.imports
+    shutil.copytree(tmp_path / "my tool", tmp_path / "other")
+    with pytest.raises(WorldError, match="are both called 'tool'"):
+        world.with_imports([tmp_path / "other"])
+
+
+def test_a_name_is_that_of_one_object(world_folder):
+    with pytest.raises(WorldError, match="'my tool' names two objects or people"):
+        load_world(world_folder).with_objects([ObjectRule(name="my tool", model="coke", surfaces=("workbench",))])

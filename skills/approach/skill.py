@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, ObjectObservation, Succeeded, Surface
+from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
 from skills.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.kinematics import ArmModel
@@ -97,7 +97,8 @@ class Approach(ArmSkill[ApproachInputs]):
     def _look_again(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         seen = inputs.observation
         surfaces = tuple(s for s in inputs.surfaces if s.name == seen.surface) or inputs.surfaces
-        again = DetectInputs((seen.thing.name,), surfaces, seen.thing.attributes, seen.position_W)
+        on_floor = seen.surface == FLOOR
+        again = DetectInputs((seen.thing.name,), surfaces, seen.thing.attributes, seen.position_W, floor=on_floor)
         found = yield from self.perform(Detect(self.context), again)
         return Succeeded(f"standing before the {seen.thing}", found.outputs)
 

@@ -1,0 +1,71 @@
+"""Where an object lies that fell out of the gripper on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from py_trees.common import Status
+
+from executive.mission.geometry import distance_m
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.explained import ExplainedLeaf
+from executive.tree.node import NodeKind
+from skills.api import FLOOR, Surface
+from skills.geometry import compose
+from skills.robot import Pose2D
+
+_CORNERS: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Fallen(ExplainedLeaf):
+    """Notes where the robot has lost what it carried, and says what happened. Always SUCCESS.
+
+    Writes to the blackboard: the robot's pose (`pose_key`); the square of floor, `half_m` to each side of a point
+    `ahead_m` before the body, on which it is looked for (`floor_key`); that square with those of `surfaces` that lie
+    within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the gripper still holds
+    has slipped, and is not yet lost.
+    """
+
+    thing: str
+    to: str
+    pose_key: str
+    floor_key: str
+    around_key: str
+    surfaces: Sequence[Surface]
+    context: RunContext
+    within_m: float = 2.0
+    ahead_m: float = 0.7
+    half_m: float = 1.2
+
+    def update(self) -> Status:
+        """Write where it is looked for."""
+        pose, board = self.context.pose(), self.context.board
+        here = (pose.x_m, pose.y_m)
+        near = (surface for surface in self.surfaces if distance_m(surface.polygon_W, here) <= self.within_m)
+        floor = self._floor(pose)
+        board.put(self.pose_key, pose)
+        board.put(self.floor_key, (floor,))
+        board.put(self.around_key, (floor, *near))
+        slipped = self.context.robot.gripper().holding
+        happened = "slips in the gripper" if slipped else "fell"
+        then = "is set down and gripped anew" if slipped else "is picked up again"
+        self.cause, self.message = None, f"the {self.thing} {happened} on the way {self.to}; it {then}"
+        return Status.SUCCESS
+
+    def _floor(self, pose: Pose2D) -> Surface:
+        """The square of floor about where it fell."""
+        middle = compose(pose, Pose2D(self.ahead_m, 0.0, 0.0))
+        corners = tuple((middle.x_m + x * self.half_m, middle.y_m + y * self.half_m) for x, y in _CORNERS)
+        return Surface(FLOOR, corners, 0.0)
+
+
+def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The keys of the pose and of the surfaces."""
+    surfaces = {options[key]: tuple[Surface, ...] for key in ("floor_key", "around_key")}
+    return {options["pose_key"]: Pose2D, **surfaces}
+
+
+KINDS: Final[Mapping[str, NodeKind]] = {"fallen": NodeKind(Fallen, ("context",), writes=_written)}

@@ -17,7 +17,7 @@ class Grip(enum.Enum):
     """What becomes of the object in the gripper."""
 
     EMPTY = "empty"  # nothing has been held since the watch began
-    HELD = "held"  # it stays where it is
+    HELD = "held"  # it stays where it is, as far as can be told
     SLIPPING = "slipping"  # it has begun to slip: grip it again, more firmly
     SLIPS_ON = "slips on"  # it slips although it was gripped again
     LOST = "lost"  # it is out of the gripper, which did not open
@@ -30,8 +30,8 @@ class HoldWatch:
 
     The robot's belief to hold nothing counts once it has lasted for `patience_s`. An object slips when the gripper has
     closed by more than `slip_rad` about it, or when its force has been below `slip_force` of what it was for `slip_s`.
-    After the first slip the next readings count from `settle_s` later on. A gripper that has opened by `released_rad`
-    lets go on purpose.
+    What was gripped again is judged anew from `settle_s` later on; until then it is lost only when the gripper closes.
+    A gripper that has opened by `released_rad` lets go on purpose.
     """
 
     patience_s: float = 0.05
@@ -58,13 +58,17 @@ class HoldWatch:
         if self._released:
             return Grip.RELEASED
         if not reading.holding:
-            return self._missed(now_s)
+            return self._missed(reading, now_s)
         self._empty_since_s = None
         return self._held(reading, now_s)
 
-    def _missed(self, now_s: float) -> Grip:
-        """A reading of an empty gripper."""
+    def _missed(self, reading: Gripper, now_s: float) -> Grip:
+        """A reading of a gripper that feels nothing; fingers that stay apart may still have something between them."""
         self._empty_since_s = now_s if self._empty_since_s is None else self._empty_since_s
+        assert self._opening_rad is not None
+        apart = reading.opening_rad > self._opening_rad - self.slip_rad
+        if apart and self._settled_s is not None and now_s < self._settled_s:
+            return Grip.HELD
         return Grip.LOST if now_s - self._empty_since_s >= self.patience_s - _TOLERANCE_S else Grip.HELD
 
     def _held(self, reading: Gripper, now_s: float) -> Grip:

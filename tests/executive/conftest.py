@@ -84,7 +84,7 @@ class ScriptedRobot:
         return Odometry(self.clock.now(), self.standing.transform(), (0.0, 0.0, 0.0))
 
     def gripper(self) -> Gripper:
-        return Gripper(self.clock.now(), 0.3, 10.0 if self.holding else 0.0, self.holding)
+        return Gripper(self.clock.now(), 0.3 * self.holding, 10.0 * self.holding, self.holding)
 
     def battery(self) -> Battery:
         return Battery(self.clock.now(), self.charge)

@@ -21,12 +21,12 @@ _CORNERS: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Fallen(ExplainedLeaf):
-    """Notes where the robot has lost what it carried, and says what happened. Always SUCCESS.
+    """Notes where the robot has lost what it carried, and says what happened. SUCCESS after `settle_s`.
 
     Writes to the blackboard: the robot's pose (`pose_key`); the square of floor, `half_m` to each side of a point
     `ahead_m` before the body, on which it is looked for (`floor_key`); that square with those of `surfaces` that lie
     within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the gripper still holds
-    has slipped, and is not yet lost.
+    by then has slipped, and is not yet lost.
     """
 
     thing: str
@@ -39,9 +39,12 @@ class Fallen(ExplainedLeaf):
     within_m: float = 2.0
     ahead_m: float = 0.7
     half_m: float = 1.2
+    settle_s: float = 0.3
 
-    def update(self) -> Status:
-        """Write where it is looked for."""
+    def initialise(self) -> None:
+        """Write where it is looked for: where the robot stands just now."""
+        self.clear_explanation()
+        self._end_s = self.context.clock.now() + self.settle_s
         pose, board = self.context.pose(), self.context.board
         here = (pose.x_m, pose.y_m)
         near = (surface for surface in self.surfaces if distance_m(surface.polygon_W, here) <= self.within_m)
@@ -49,6 +52,12 @@ class Fallen(ExplainedLeaf):
         board.put(self.pose_key, pose)
         board.put(self.floor_key, (floor,))
         board.put(self.around_key, (floor, *near))
+
+    def update(self) -> Status:
+        """Feel for a moment whether the gripper still holds something."""
+        if self.context.clock.now() < self._end_s:
+            self.message = f"feels whether the {self.thing} is still held"
+            return Status.RUNNING
         slipped = self.context.robot.gripper().holding
         happened = "slips in the gripper" if slipped else "fell"
         then = "is set down and gripped anew" if slipped else "is picked up again"

@@ -15,7 +15,7 @@ from executive.mission.command import Thing
 from executive.tree.behaviours.board import BesideBoard, FirstOf, FromBoard
 from executive.tree.behaviours.recovery import Recovery
 from executive.tree.compiling.builder import PlanBuilder, after
-from executive.tree.compiling.handling import LOOK_AGAIN_S, pick_up_plan
+from executive.tree.compiling.handling import LOOK_AGAIN_S, held_plan, pick_up_plan
 from executive.tree.compiling.search import detect_plan
 from executive.tree.node import NodeSpec
 from skills.api import FLOOR, Cause
@@ -60,17 +60,21 @@ def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
         half_m=HALF_M,
     )
     look = _look_plan(builder, item, keys)
+    take = builder.at("take").sequence(
+        f"take {item} from where it lies",
+        _stand_back_plan(builder.at("back")),
+        pick_up_plan(builder, item, look, keys["detection"], FromBoard(keys["around"])),
+    )
     return builder.sequence(
         f"pick {item} up again",
         fell,
         _free_gripper_plan(builder.at("first"), item, keys["floor"]),
-        _stand_back_plan(builder.at("back")),
-        pick_up_plan(builder, item, look, keys["detection"], FromBoard(keys["around"])),
+        builder.node("selector", f"have {item} again", held_plan(builder, item), take, part="have"),
     )
 
 
 def _free_gripper_plan(builder: PlanBuilder, item: Thing, floor_key: str) -> NodeSpec:
-    """Set down what is still held; else the empty arm is stowed."""
+    """Set down what is still held; where that fails, draw it in. An empty arm is stowed."""
     below = builder.at("set-down")
     set_down = below.skill("place", {"surface": FirstOf(floor_key)})
     held = below.node("only if holding", f"set the {item} down", set_down)

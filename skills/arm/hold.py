@@ -30,22 +30,24 @@ class HoldWatch:
 
     The robot's belief to hold nothing counts once it has lasted for `patience_s`. An object slips when the gripper has
     closed by more than `slip_rad` about it, or when its force has been below `slip_force` of what it was for `slip_s`.
-    What was gripped again is judged anew from `settle_s` later on; until then it is lost only when the gripper closes.
-    A gripper that has opened by `released_rad` lets go on purpose.
+    What was gripped again slips on when the gripper closes about it, judged anew from `settle_s` later on; fingers that
+    stay apart have `regrip_s` to feel it again before it counts as lost. A gripper that has opened by `released_rad`
+    lets go on purpose.
     """
 
     patience_s: float = 0.05
     slip_rad: float = 0.05
     slip_force: float = 0.5
-    slip_s: float = 0.1
+    slip_s: float = 0.05
+    regrip_s: float = 0.2
     settle_s: float = 0.5
     released_rad: float = 0.08
     force_n: float = field(default=0.0, init=False)
     _opening_rad: float | None = field(default=None, init=False)
     _empty_since_s: float | None = field(default=None, init=False)
     _weak_since_s: float | None = field(default=None, init=False)
-    _settled_s: float | None = field(default=None, init=False)
-    _gripped_again: bool = field(default=False, init=False)
+    _gripped_again_s: float | None = field(default=None, init=False)
+    _settling: bool = field(default=False, init=False)
     _released: bool = field(default=False, init=False)
 
     def judge(self, reading: Gripper, now_s: float) -> Grip:
@@ -67,25 +69,26 @@ class HoldWatch:
         self._empty_since_s = now_s if self._empty_since_s is None else self._empty_since_s
         assert self._opening_rad is not None
         apart = reading.opening_rad > self._opening_rad - self.slip_rad
-        if apart and self._settled_s is not None and now_s < self._settled_s:
+        if apart and self._gripped_again_s is not None and now_s < self._gripped_again_s + self.regrip_s:
             return Grip.HELD
         return Grip.LOST if now_s - self._empty_since_s >= self.patience_s - _TOLERANCE_S else Grip.HELD
 
     def _held(self, reading: Gripper, now_s: float) -> Grip:
         """A reading with the object between the fingers: as firmly as before?"""
-        if self._settled_s is not None:
-            if now_s < self._settled_s:
+        if self._settling and self._gripped_again_s is not None:
+            if now_s < self._gripped_again_s + self.settle_s:
                 return Grip.HELD
-            self._settled_s, self._opening_rad, self.force_n = None, reading.opening_rad, reading.force_n
+            self._settling, self._opening_rad, self.force_n = False, reading.opening_rad, reading.force_n
         assert self._opening_rad is not None
+        closes = reading.opening_rad <= self._opening_rad - self.slip_rad
+        if self._gripped_again_s is not None:
+            return Grip.SLIPS_ON if closes else Grip.HELD
         weak = reading.force_n < self.slip_force * self.force_n
         self._weak_since_s = (now_s if self._weak_since_s is None else self._weak_since_s) if weak else None
         weakened = self._weak_since_s is not None and now_s - self._weak_since_s >= self.slip_s - _TOLERANCE_S
-        if not weakened and reading.opening_rad > self._opening_rad - self.slip_rad:
+        if not (closes or weakened):
             return Grip.HELD
-        if self._gripped_again:
-            return Grip.SLIPS_ON
-        self._gripped_again, self._settled_s, self._weak_since_s = True, now_s + self.settle_s, None
+        self._gripped_again_s, self._settling = now_s, True
         return Grip.SLIPPING
 
 

@@ -19,6 +19,7 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.geometry import wrap
 from skills.grasp.candidates import hand_rotation
+from skills.grasp.planning import body_height_m
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
@@ -92,6 +93,7 @@ class Place(ArmSkill[PlaceInputs]):
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
         carried = self._carried()
         yield from self._go_near(surface)
+        yield from self.stand_at(self._height_m(surface), f"standing down to the {surface.name}")
         view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
         held = self._held(carried)
         q_above_rad = yield from self._go_above(surface, view, held)
@@ -101,6 +103,7 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self._let_go()
         yield from self._check(surface, spot_W)
         yield from self.stow()
+        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
         return Succeeded(f"put the object down on the {surface.name}")
 
     def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
@@ -121,6 +124,11 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self._check(surface, spot_W[:2])
         yield from self.stow()
         return Succeeded(f"the object stood on the {surface.name} already")
+
+    def _height_m(self, surface: Surface) -> float:
+        """Height of the body to put something on a surface: lower for the floor, else as usual."""
+        capabilities = self.context.robot.capabilities()
+        return min(capabilities.standing_height_m, body_height_m(surface.height_m, capabilities))
 
     def _carried(self) -> RotationMatrix:
         """How the hand was turned as the object was brought, which an attempt that was broken off has noted."""

@@ -83,8 +83,8 @@ class ScriptedRobot:
     """Moves exactly as commanded, and skips a real robot's precautions; `calls` records the verbs used.
 
     It stands in a world of `blocks`; it drives through them, but takes loose ones between its fingers and puts them
-    down, or lets them fall where it grips them with less than 2 N. Odometry is the truth unless `odometry_scale` and `yaw_drift_rad_per_m` say otherwise. Time passes by its
-    clock. Implements `skills.robot.Robot`.
+    down. What it grips with less than 2 N falls. Odometry is the truth unless `odometry_scale` and
+    `yaw_drift_rad_per_m` say otherwise. Time passes by its clock. Implements `skills.robot.Robot`.
     """
 
     def __init__(

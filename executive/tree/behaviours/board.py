@@ -110,18 +110,6 @@ class SurfaceOfDetection(FromBoard):
         return tuple(surface for surface in self.surfaces if surface.name == seen.surface) or self.surfaces
 
 
-@dataclass(frozen=True)
-class FirstOf(FromBoard):
-    """A port bound to the first of the surfaces under a blackboard key."""
-
-    gives: ClassVar[Any] = Surface
-
-    def read(self, board: Board) -> Surface:
-        """The surface. Raises KeyError when nothing wrote it yet."""
-        surfaces: tuple[Surface, ...] = board.get(self.key)
-        return surfaces[0]
-
-
 def beside(pose: Pose2D, forward_m: float, left_m: float) -> Pose2D:
     """The pose shifted along its own axes, turned the same way."""
     return compose(pose, Pose2D(forward_m, left_m, 0.0))

@@ -26,7 +26,7 @@ class Fallen(ExplainedLeaf):
     Writes to the blackboard: the robot's pose (`pose_key`); the square of floor, `half_m` to each side of a point
     `ahead_m` before the body, on which it is looked for (`floor_key`); that square with those of `surfaces` that lie
     within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the gripper still holds
-    by then has slipped, and is not yet lost.
+    by then has slipped, and is not yet lost: the middle of that square is where to set it down (`set_down_key`).
     """
 
     thing: str
@@ -34,11 +34,13 @@ class Fallen(ExplainedLeaf):
     pose_key: str
     floor_key: str
     around_key: str
+    set_down_key: str
     surfaces: Sequence[Surface]
     context: RunContext
     within_m: float = 2.0
-    ahead_m: float = 0.7
+    ahead_m: float = 0.9
     half_m: float = 1.2
+    set_down_half_m: float = 0.2
     settle_s: float = 0.3
 
     def initialise(self) -> None:
@@ -48,10 +50,11 @@ class Fallen(ExplainedLeaf):
         pose, board = self.context.pose(), self.context.board
         here = (pose.x_m, pose.y_m)
         near = (surface for surface in self.surfaces if distance_m(surface.polygon_W, here) <= self.within_m)
-        floor = self._floor(pose)
+        floor = self._floor(pose, self.half_m)
         board.put(self.pose_key, pose)
         board.put(self.floor_key, (floor,))
         board.put(self.around_key, (floor, *near))
+        board.put(self.set_down_key, self._floor(pose, self.set_down_half_m))
 
     def update(self) -> Status:
         """Feel for a moment whether the gripper still holds something."""
@@ -64,17 +67,17 @@ class Fallen(ExplainedLeaf):
         self.cause, self.message = None, f"the {self.thing} {happened} on the way {self.to}; it {then}"
         return Status.SUCCESS
 
-    def _floor(self, pose: Pose2D) -> Surface:
-        """The square of floor about where it fell."""
+    def _floor(self, pose: Pose2D, half_m: float) -> Surface:
+        """A square of floor about where it fell."""
         middle = compose(pose, Pose2D(self.ahead_m, 0.0, 0.0))
-        corners = tuple((middle.x_m + x * self.half_m, middle.y_m + y * self.half_m) for x, y in _CORNERS)
+        corners = tuple((middle.x_m + x * half_m, middle.y_m + y * half_m) for x, y in _CORNERS)
         return Surface(FLOOR, corners, 0.0)
 
 
 def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The keys of the pose and of the surfaces."""
+    """The keys of the pose and of the pieces of floor."""
     surfaces = {options[key]: tuple[Surface, ...] for key in ("floor_key", "around_key")}
-    return {options["pose_key"]: Pose2D, **surfaces}
+    return {options["pose_key"]: Pose2D, options["set_down_key"]: Surface, **surfaces}
 
 
 KINDS: Final[Mapping[str, NodeKind]] = {"fallen": NodeKind(Fallen, ("context",), writes=_written)}

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Final
 
 from executive.mission.command import Thing
-from executive.tree.behaviours.board import BesideBoard, FirstOf, FromBoard
+from executive.tree.behaviours.board import BesideBoard, FromBoard
 from executive.tree.behaviours.recovery import Recovery
 from executive.tree.compiling.builder import PlanBuilder, after
 from executive.tree.compiling.handling import LOOK_AGAIN_S, held_plan, pick_up_plan
@@ -22,8 +22,8 @@ from skills.api import FLOOR, Cause
 
 LOST_WITHIN_M: Final = 2.0
 BACK_M: Final = 1.0
-AHEAD_M: Final = 0.7
-"""So far before the middle of the body an object is carried, and falls."""
+AHEAD_M: Final = 0.9
+"""So far before the middle of the body an object falls that is carried, and one that slips is set down."""
 HALF_M: Final = 1.2
 ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
 """Where else the floor is looked at from: forward and left of where the object was lost (m)."""
@@ -44,7 +44,7 @@ def unless_fallen(
 
 
 def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
-    keys = {name: f"{builder.path_id}/{name}" for name in ("pose", "floor", "around", "detection")}
+    keys = {name: f"{builder.path_id}/{name}" for name in ("pose", "floor", "around", "set-down", "detection")}
     fell = builder.node(
         "fallen",
         f"where is the {item}?",
@@ -54,6 +54,7 @@ def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
         pose_key=keys["pose"],
         floor_key=keys["floor"],
         around_key=keys["around"],
+        set_down_key=keys["set-down"],
         surfaces=tuple(map(builder.surface, builder.knowledge.surfaces)),
         within_m=LOST_WITHIN_M,
         ahead_m=AHEAD_M,
@@ -68,15 +69,15 @@ def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
     return builder.sequence(
         f"pick {item} up again",
         fell,
-        _free_gripper_plan(builder.at("first"), item, keys["floor"]),
+        _free_gripper_plan(builder.at("first"), item, keys["set-down"]),
         builder.node("selector", f"have {item} again", held_plan(builder, item), take, part="have"),
     )
 
 
-def _free_gripper_plan(builder: PlanBuilder, item: Thing, floor_key: str) -> NodeSpec:
+def _free_gripper_plan(builder: PlanBuilder, item: Thing, set_down_key: str) -> NodeSpec:
     """Set down what is still held; where that fails, draw it in. An empty arm is stowed."""
     below = builder.at("set-down")
-    set_down = below.skill("place", {"surface": FirstOf(floor_key)})
+    set_down = below.skill("place", {"surface": FromBoard(set_down_key)})
     held = below.node("only if holding", f"set the {item} down", set_down)
     return builder.node("selector", "free the gripper", held, builder.skill("stow"))
 

@@ -36,7 +36,17 @@ def test_a_gripper_that_closes_about_the_object_slips():
 
 def test_a_force_that_falls_is_a_slip_unless_it_comes_back_at_once():
     weak = (0.5, 30.0, True)
-    assert judged(HELD, weak, HELD, weak, weak, weak)[2:] == [Grip.HELD, Grip.HELD, Grip.HELD, Grip.SLIPPING]
+    assert judged(HELD, weak, HELD, weak, weak)[1:] == [Grip.HELD, Grip.HELD, Grip.HELD, Grip.SLIPPING]
+
+
+def test_fingers_that_stay_apart_have_a_moment_to_feel_it_again():
+    weak, unfelt = (0.5, 1.0, True), (0.5, 1.0, False)
+    assert judged(HELD, weak, weak, unfelt, unfelt, HELD)[2:] == [Grip.SLIPPING, Grip.HELD, Grip.HELD, Grip.HELD]
+    assert judged(HELD, weak, weak, *[unfelt] * 4)[3:] == [Grip.HELD, Grip.HELD, Grip.HELD, Grip.LOST]
+
+
+def test_fingers_that_close_after_it_was_gripped_again_have_lost_it():
+    assert judged(HELD, (0.5, 1.0, True), (0.5, 1.0, True), GONE, GONE)[2:] == [Grip.SLIPPING, Grip.HELD, Grip.LOST]
 
 
 def test_after_it_was_gripped_again_the_next_slip_counts_from_how_it_is_held_then():

@@ -241,7 +241,7 @@ def test_it_is_looked_for_where_the_robot_was_when_it_fell(carrying, script, fai
     (floor,) = detect.inputs[0].surfaces
     assert (floor.name, floor.height_m) == ("floor", 0.0)
     xs, ys = zip(*floor.polygon_W, strict=True)
-    assert (min(xs), max(xs), min(ys), max(ys)) == pytest.approx((-2.5, -0.1, -1.2, 1.2))
+    assert (min(xs), max(xs), min(ys), max(ys)) == pytest.approx((-2.3, 0.1, -1.2, 1.2))
 
 
 def test_it_is_picked_up_twice_and_then_given_up(carrying, script):
@@ -249,7 +249,7 @@ def test_it_is_picked_up_twice_and_then_given_up(carrying, script):
     worst = carrying(0.5, 15.0, 30.0)
     assert (worst.outcome, worst.cause) == (Outcome.FAILURE, Cause.EXECUTION)
     assert worst.message == "the coke was lost on the way to the bedroom (after 3 attempts)"
-    assert (script.begun.count("grasp"), script.begun.count("place")) == (2, 0)
+    assert script.begun.count("grasp") == 2
 
 
 def test_lost_twice_it_is_picked_up_twice(carrying, script):
@@ -279,13 +279,6 @@ def test_without_room_to_back_off_it_looks_from_where_it_stands(carrying, script
     assert script.begun[2:4] == ["back_off", "detect"]
 
 
-def test_what_is_not_seen_on_the_floor_may_lie_on_a_surface_near_there(carrying, script):
-    script.seen_on = ("shelf", "counter", "bedside table")
-    assert carrying(0.5).cause is Cause.EXECUTION
-    script.begun.clear()
-    script.seen_on = ("bedside table",)
-
-
 def test_what_fell_onto_a_surface_is_found_there(compiled, run_tree, script, robot):
     script.steps, robot.holding, script.seen_on = 40, True, ("bedside table",)
     robot.standing = Pose2D(-4.5, 0.5, 0.0)
@@ -303,18 +296,50 @@ def test_what_is_not_found_again_is_a_failure_that_says_so(carrying, script):
     assert script.begun[3:] == ["detect", "navigate", "detect", "navigate", "detect", "stow"]
 
 
-def test_what_slips_on_is_set_down_and_gripped_anew(carrying, script, robot, fails):
-    """The robot feels it still after the guard broke: it hangs by a corner."""
+@pytest.fixture
+def slipping(compiled, run_tree, script, robot):
+    """Carry the coke to the bedroom while the gripper closes about it at some times; the robot's result."""
+
+    def go(*at_s):
+        left = list(at_s)
+
+        def slip(progress):
+            if left and progress.now_s > left[0]:
+                robot.opening_rad -= 0.06
+                left.pop(0)
+
+        script.steps, robot.holding = 40, True
+        return run_tree(compiled(PUT), observer=slip).worst
+
+    return go
+
+
+def test_what_begins_to_slip_is_gripped_again_and_carried_on(slipping, script, robot, published):
+    assert slipping(0.5).outcome is Outcome.SUCCESS
+    assert (script.begun, robot.calls.count("set_gripper")) == (["navigate", "place"], 1)
+    told = [message["message"] for topic, message in published if topic == "control"]
+    assert told == ["the coke began to slip and is gripped again, more firmly"]
+
+
+def test_what_slips_on_is_set_down_on_the_floor_and_gripped_anew(slipping, script, robot, fails, published):
     script.seen_on = ("floor",)
     place = fails("place", then=lambda skill: (setattr(robot, "holding", False), Succeeded("down"))[1])
-    assert carrying(1.0, 1.0).outcome is Outcome.FAILURE if False else True
-    assert place is not None
+    worst = slipping(0.3, 1.2)
+    assert worst.outcome is Outcome.SUCCESS, worst.message
+    assert script.begun == ["navigate", "place", "back_off", "detect", *TAKEN, "navigate", "place"]
+    assert [inputs.surface.name for inputs in place.inputs] == ["floor", "bedside table"]
+    told = [message["message"] for topic, message in published if topic == "transitions"]
+    assert "the coke slips in the gripper on the way to the bedroom; it is set down and gripped anew" in told
+
+
+def test_what_slips_on_and_cannot_be_set_down_is_carried_on_as_it_is(slipping, script, fails):
+    fails("place", Cause.PLANNING)
+    assert slipping(0.3, 1.2).outcome is Outcome.SUCCESS
+    assert script.begun == ["navigate", "place", "stow", "navigate", "place"]
 
 
 @pytest.mark.parametrize("step", ["stow", "back_off", "detect", "approach", "grasp", "stow "])
-def test_cancelled_at_any_step_of_it_the_skill_ends_and_nothing_more_begins(
-    compiled, run_tree, script, robot, step
-):
+def test_cancelled_at_any_step_of_it_the_skill_ends_and_nothing_more_begins(compiled, run_tree, script, robot, step):
     control, lose = Control(pace=None), Loses(robot, 0.5)
     script.seen_on, script.steps, robot.holding = ("floor",), 40, True
     index = {"stow": 2, "back_off": 3, "detect": 4, "approach": 5, "grasp": 6, "stow ": 7}[step]

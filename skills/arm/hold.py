@@ -83,7 +83,8 @@ class HoldWatch:
         closes = reading.opening_rad <= self._opening_rad - self.slip_rad
         if self._gripped_again_s is not None:
             return Grip.SLIPS_ON if closes else Grip.HELD
-        weak = reading.force_n < self.slip_force * self.force_n
+        opens = reading.opening_rad > self._opening_rad + 0.5 * self.released_rad
+        weak = reading.force_n < self.slip_force * self.force_n and not opens
         self._weak_since_s = (now_s if self._weak_since_s is None else self._weak_since_s) if weak else None
         weakened = self._weak_since_s is not None and now_s - self._weak_since_s >= self.slip_s - _TOLERANCE_S
         if not (closes or weakened):

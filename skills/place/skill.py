@@ -161,7 +161,10 @@ class Place(ArmSkill[PlaceInputs]):
         low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return look_configuration(scene, X_HC, overview_viewpoints(self.model, low_BT), low_BT, q)
+            try:
+                return look_configuration(scene, X_HC, overview_viewpoints(self.model, low_BT), low_BT, q)
+            except PlanningError:  # the floor before the feet is too steeply below
+                return look_configuration(scene, X_HC, overview_viewpoints(self.model, p_BT), p_BT, q)
 
         yield from self.move_to(goal, message, speed_rad_s=0.9)
         yield from self.clear_view(message)

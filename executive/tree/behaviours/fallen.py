@@ -38,7 +38,7 @@ class Fallen(ExplainedLeaf):
     surfaces: Sequence[Surface]
     context: RunContext
     within_m: float = 2.0
-    ahead_m: float = 0.9
+    ahead_m: float = 0.95
     half_m: float = 1.2
     set_down_half_m: float = 0.2
     settle_s: float = 0.3

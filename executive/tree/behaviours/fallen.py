@@ -26,7 +26,7 @@ class Fallen(ExplainedLeaf):
     Writes to the blackboard: the robot's pose (`pose_key`); the square of floor, `half_m` to each side of a point
     `ahead_m` before the body, on which it is looked for (`floor_key`); that square with those of `surfaces` that lie
     within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the gripper still holds
-    by then has slipped, and is not yet lost: the middle of that square is where to set it down (`set_down_key`).
+    by then has slipped, and is not yet lost: a smaller square says where to set it down (`set_down_key`).
     """
 
     thing: str
@@ -40,7 +40,8 @@ class Fallen(ExplainedLeaf):
     within_m: float = 2.0
     ahead_m: float = 0.95
     half_m: float = 1.2
-    set_down_half_m: float = 0.2
+    set_down_ahead_m: float = 1.15
+    set_down_half_m: float = 0.3
     settle_s: float = 0.3
 
     def initialise(self) -> None:
@@ -50,11 +51,11 @@ class Fallen(ExplainedLeaf):
         pose, board = self.context.pose(), self.context.board
         here = (pose.x_m, pose.y_m)
         near = (surface for surface in self.surfaces if distance_m(surface.polygon_W, here) <= self.within_m)
-        floor = self._floor(pose, self.half_m)
+        floor = _floor(pose, self.ahead_m, self.half_m)
         board.put(self.pose_key, pose)
         board.put(self.floor_key, (floor,))
         board.put(self.around_key, (floor, *near))
-        board.put(self.set_down_key, self._floor(pose, self.set_down_half_m))
+        board.put(self.set_down_key, _floor(pose, self.set_down_ahead_m, self.set_down_half_m))
 
     def update(self) -> Status:
         """Feel for a moment whether the gripper still holds something."""
@@ -67,11 +68,11 @@ class Fallen(ExplainedLeaf):
         self.cause, self.message = None, f"the {self.thing} {happened} on the way {self.to}; it {then}"
         return Status.SUCCESS
 
-    def _floor(self, pose: Pose2D, half_m: float) -> Surface:
-        """A square of floor about where it fell."""
-        middle = compose(pose, Pose2D(self.ahead_m, 0.0, 0.0))
-        corners = tuple((middle.x_m + x * half_m, middle.y_m + y * half_m) for x, y in _CORNERS)
-        return Surface(FLOOR, corners, 0.0)
+
+def _floor(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:
+    """A square of floor about a point before the body."""
+    corners = (compose(pose, Pose2D(ahead_m + x * half_m, y * half_m, 0.0)) for x, y in _CORNERS)
+    return Surface(FLOOR, tuple((corner.x_m, corner.y_m) for corner in corners), 0.0)
 
 
 def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -23,7 +23,7 @@ from skills.api import FLOOR, Cause
 LOST_WITHIN_M: Final = 2.0
 BACK_M: Final = 1.0
 AHEAD_M: Final = 0.95
-"""So far before the middle of the body an object falls that is carried, and one that slips is set down."""
+"""So far before the middle of the body an object falls that is carried."""
 HALF_M: Final = 1.2
 ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
 """Where else the floor is looked at from: forward and left of where the object was lost (m)."""

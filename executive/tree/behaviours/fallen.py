@@ -55,13 +55,14 @@ class Fallen(ExplainedLeaf):
         board.put(self.pose_key, pose)
         board.put(self.floor_key, (floor,))
         board.put(self.around_key, (floor, *near))
-        board.put(self.set_down_key, _floor(pose, self.set_down_ahead_m, self.set_down_half_m))
 
     def update(self) -> Status:
         """Feel for a moment whether the gripper still holds something."""
         if self.context.clock.now() < self._end_s:
             self.message = f"feels whether the {self.thing} is still held"
             return Status.RUNNING
+        here = _floor(self.context.pose(), self.set_down_ahead_m, self.set_down_half_m)
+        self.context.board.put(self.set_down_key, here)
         slipped = self.context.robot.gripper().holding
         happened = "slips in the gripper" if slipped else "fell"
         then = "is set down and gripped anew" if slipped else "is picked up again"

@@ -66,7 +66,7 @@ class ScriptedRobot:
         self.name = name
         self.clock = clock
         self.holding = False
-        self.opening_rad = 0.3
+        self.opening_rad, self.empty_rad = 0.3, 0.0
         self.clamps_n: list[float] = []
         self.driving = False
         self.charge = 0.9
@@ -88,7 +88,12 @@ class ScriptedRobot:
         return Odometry(self.clock.now(), self.standing.transform(), (0.0, 0.0, 0.0))
 
     def gripper(self) -> Gripper:
-        return Gripper(self.clock.now(), self.opening_rad * self.holding, 10.0 * self.holding, self.holding)
+        opening_rad = self.opening_rad if self.holding else self.empty_rad
+        return Gripper(self.clock.now(), opening_rad, 10.0 * self.holding, self.holding)
+
+    def let_go(self) -> None:
+        """Open the gripper, as a skill that puts something down does."""
+        self.holding, self.empty_rad = False, 1.0
 
     def capabilities(self) -> Capabilities:
         return BASE_ONLY

@@ -13,11 +13,12 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 from executive.mission.file.model import StaleData
-from executive.record.schemas import CONTROL
 from executive.tree.behaviours.context import RunContext
 from skills.api import Cause, Failed
 from skills.arm.hold import Grip, HoldWatch, grip_again
 from skills.robot import Pose2D
+
+CONTROL_TOPIC = "control"
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ class Holds(Condition):
         if grip is Grip.SLIPPING:
             grip_again(context.robot, watch.force_n, clock=context.clock, lease=context.lease)
             sentence = f"the {self.thing} began to slip and is gripped again, more firmly"
-            context.publish(CONTROL, {"t": round(context.clock.now(), 6), "what": "slip", "message": sentence})
+            context.publish(CONTROL_TOPIC, {"t": round(context.clock.now(), 6), "what": "slip", "message": sentence})
         if grip is Grip.EMPTY:
             why = f"there is no {self.thing} in the gripper"
             return None if self.until_put_down else Failed(Cause.PRECONDITION, why)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import COMFORTABLE_M, free_places
-from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
+from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.poses import look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
@@ -37,6 +38,7 @@ _LEAST_BACK_M = 0.08
 _LEVEL = 0.5
 _RELAX_M = 0.003
 _FEEL_S = 0.4
+_FLOOR_M = 0.06
 _OVER_SPOT_M = 0.45
 _RELEASE_RAD = 0.4
 """The finger opens so far to let go, and no farther: wide open it would reach what stands beside."""
@@ -94,7 +96,9 @@ class Place(ArmSkill[PlaceInputs]):
         carried = self._carried()
         yield from self._go_near(surface)
         yield from self.stand_at(self._height_m(surface), f"standing down to the {surface.name}")
-        view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
+        on_floor = surface.height_m < _FLOOR_M
+        seen = self._look_at_floor(surface) if on_floor else self._look(surface, _nearest_spot(surface, self.X_WB()))
+        view = yield from seen
         held = self._held(carried)
         q_above_rad = yield from self._go_above(surface, view, held)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
@@ -161,10 +165,7 @@ class Place(ArmSkill[PlaceInputs]):
         low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            try:
-                return look_configuration(scene, X_HC, overview_viewpoints(self.model, low_BT), low_BT, q)
-            except PlanningError:  # the floor before the feet is too steeply below
-                return look_configuration(scene, X_HC, overview_viewpoints(self.model, p_BT), p_BT, q)
+            return look_configuration(scene, X_HC, overview_viewpoints(self.model, low_BT), low_BT, q)
 
         yield from self.move_to(goal, message, speed_rad_s=0.9)
         yield from self.clear_view(message)
@@ -176,6 +177,22 @@ class Place(ArmSkill[PlaceInputs]):
         if view is None:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         return view
+
+    def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView]:
+        """What the cameras at the body's front see of the floor: the object hides it from the hand camera."""
+        message, robot = f"looking for a free spot on the {surface.name}", self.context.robot
+        X_WO, views = self.context.localiser.estimate().X_WO, list[SurfaceView]()
+        for camera in robot.capabilities().body_cameras:
+            if not camera.looks_towards(0.0):
+                continue
+            take = partial(robot.image, camera.source, visual=False)
+            image = yield from self.sense(take, latency_s=PICTURE_LATENCY_S, name="floor picture", message=message)
+            segment = partial(view_surface, image, X_WO, surface)
+            view = yield from self.compute(segment, latency_s=0.15, name="segment", message=message)
+            views += [] if view is None else [view]
+        if not views:
+            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
+        return max(views, key=lambda view: len(view.plane_points))
 
     def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
         """Bring the object above the best free spot; gives the joint angles that the arm is to have there."""

@@ -185,7 +185,7 @@ class Place(ArmSkill[PlaceInputs]):
         for camera in robot.capabilities().body_cameras:
             if not camera.looks_towards(0.0):
                 continue
-            take = partial(robot.image, camera.source, visual=False)
+            take = partial(robot.image, camera.source)
             image = yield from self.sense(take, latency_s=PICTURE_LATENCY_S, name="floor picture", message=message)
             segment = partial(view_surface, image, X_WO, surface)
             view = yield from self.compute(segment, latency_s=0.15, name="segment", message=message)

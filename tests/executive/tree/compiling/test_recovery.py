@@ -361,11 +361,14 @@ def test_failing_to_get_there_with_the_thing_still_held_is_not_a_fall(compiled, 
     assert "detect" not in script.begun
 
 
-def test_what_falls_while_the_arm_is_tucked_in_is_looked_for_again(compiled, run_tree, script, robot):
+def test_what_falls_while_the_arm_is_tucked_in_is_looked_for_again_on_the_floor_too(
+    compiled, run_tree, script, robot, fails, make
+):
     script.steps = 40
-    lose = Loses(robot, 0.0)
-    assert run_tree(compiled(GRASP), observer=lose).outcome is Outcome.SUCCESS
+    detect = fails("detect", then=lambda skill: Succeeded("seen", {"observation": make.COKE, "observations": ()}))
+    assert run_tree(compiled(GRASP), observer=Loses(robot, 0.0)).outcome is Outcome.SUCCESS
     assert script.begun == ["navigate", "detect", *TAKEN, "detect", *TAKEN]
+    assert [inputs.floor for inputs in detect.inputs] == [False, True]
 
 
 # ---- interrupts

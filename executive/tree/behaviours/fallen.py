@@ -14,6 +14,7 @@ from executive.tree.behaviours.explained import ExplainedLeaf
 from executive.tree.node import NodeKind
 from skills.api import FLOOR, Surface
 from skills.geometry import compose
+from skills.quantities import Coordinate, Height
 from skills.robot import Pose2D
 
 _CORNERS: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
@@ -23,22 +24,24 @@ _CORNERS: Final = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 class Fallen(ExplainedLeaf):
     """Notes where the robot has lost what it carried, and says what happened. SUCCESS after `settle_s`.
 
-    Writes to the blackboard: the robot's pose (`pose_key`); the square of floor, `half_m` to each side of a point
-    `ahead_m` before the body, on which it is looked for (`floor_key`); that square with those of `surfaces` that lie
-    within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the gripper still holds
-    by then has slipped, and is not yet lost: a smaller square says where to set it down (`set_down_key`).
+    Writes to the blackboard: the robot's pose (`pose_key`); the point of the floor `ahead_m` before the body, where it
+    fell (`spot_key`); the square of floor about it, `half_m` to each side (`floor_key`); that square with those of
+    `surfaces` that lie within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the
+    gripper still holds by then has slipped, and is not yet lost: a smaller square says where to set it down
+    (`set_down_key`).
     """
 
     thing: str
     to: str
     pose_key: str
+    spot_key: str
     floor_key: str
     around_key: str
     set_down_key: str
     surfaces: Sequence[Surface]
     context: RunContext
     within_m: float = 2.0
-    ahead_m: float = 0.95
+    ahead_m: float = 0.6
     half_m: float = 1.2
     set_down_ahead_m: float = 1.15
     set_down_half_m: float = 0.3
@@ -53,6 +56,8 @@ class Fallen(ExplainedLeaf):
         near = (surface for surface in self.surfaces if distance_m(surface.polygon_W, here) <= self.within_m)
         floor = _floor(pose, self.ahead_m, self.half_m)
         board.put(self.pose_key, pose)
+        spot = compose(pose, Pose2D(self.ahead_m, 0.0, 0.0))
+        board.put(self.spot_key, (spot.x_m, spot.y_m, 0.0))
         board.put(self.floor_key, (floor,))
         board.put(self.around_key, (floor, *near))
 
@@ -77,9 +82,10 @@ def _floor(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:
 
 
 def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The keys of the pose and of the pieces of floor."""
+    """The keys of the pose, of the point and of the pieces of floor."""
     surfaces = {options[key]: tuple[Surface, ...] for key in ("floor_key", "around_key")}
-    return {options["pose_key"]: Pose2D, options["set_down_key"]: Surface, **surfaces}
+    spot = tuple[Coordinate, Coordinate, Height]
+    return {options["pose_key"]: Pose2D, options["spot_key"]: spot, options["set_down_key"]: Surface, **surfaces}
 
 
 KINDS: Final[Mapping[str, NodeKind]] = {"fallen": NodeKind(Fallen, ("context",), writes=_written)}

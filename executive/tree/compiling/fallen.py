@@ -21,8 +21,9 @@ from executive.tree.node import NodeSpec
 from skills.api import FLOOR, Cause
 
 LOST_WITHIN_M: Final = 2.0
-BACK_M: Final = 1.0
-AHEAD_M: Final = 0.95
+BACK_M: Final = 0.5
+"""What fell before the feet is then about as far ahead as it is grasped from; farther off it is hard to tell."""
+AHEAD_M: Final = 0.6
 """So far before the middle of the body an object falls that is carried."""
 HALF_M: Final = 1.2
 ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
@@ -44,7 +45,7 @@ def unless_fallen(
 
 
 def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
-    keys = {name: f"{builder.path_id}/{name}" for name in ("pose", "floor", "around", "set-down", "detection")}
+    keys = {name: f"{builder.path_id}/{name}" for name in ("pose", "spot", "floor", "around", "set-down", "detection")}
     fell = builder.node(
         "fallen",
         f"where is the {item}?",
@@ -52,6 +53,7 @@ def _pick_up_again_plan(builder: PlanBuilder, item: Thing, to: str) -> NodeSpec:
         thing=str(item),
         to=to,
         pose_key=keys["pose"],
+        spot_key=keys["spot"],
         floor_key=keys["floor"],
         around_key=keys["around"],
         set_down_key=keys["set-down"],
@@ -90,7 +92,7 @@ def _stand_back_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeSpec:
-    """Look at the floor from here, at the surfaces near, and at the floor from either side."""
+    """Look from here where it fell and about there, then at the surfaces near, then at the floor from either side."""
     floor, detection = FromBoard(keys["floor"]), keys["detection"]
     aside = [
         below.sequence(
@@ -100,9 +102,12 @@ def _look_plan(builder: PlanBuilder, item: Thing, keys: dict[str, str]) -> NodeS
         )
         for below, offset in zip((builder.at("left"), builder.at("right")), ASIDE_M, strict=True)
     ]
+    knows_spot = builder.has_ports("detect", ("expected_W",))
+    spot = [detect_plan(builder.at("spot"), item, floor, detection, {"expected_W": FromBoard(keys["spot"])})]
     return builder.node(
         "selector",
         f"find {item} where it fell",
+        *(spot if knows_spot else []),
         detect_plan(builder, item, floor, detection),
         _near_plan(builder.at("near"), item, detection),
         *aside,

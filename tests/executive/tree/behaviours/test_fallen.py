@@ -15,7 +15,7 @@ FAR = Surface("shelf", ((4.0, 0.0), (5.0, 0.0), (5.0, 1.0)), 0.8)
 
 @pytest.fixture
 def leaf(context):
-    keys = {f"{name}_key": f"alice/{name}" for name in ("pose", "floor", "around", "set_down")}
+    keys = {f"{name}_key": f"alice/{name}" for name in ("pose", "spot", "floor", "around", "set_down")}
     return Fallen(
         path_id="alice/fell", name="fell", thing="hammer", to="to the kitchen", surfaces=(NEAR, FAR), context=context,
         **keys,
@@ -48,7 +48,8 @@ def test_the_floor_is_that_about_the_point_where_it_fell_and_the_surfaces_are_th
     ended(leaf, clock)
     (floor,) = context.board.get("alice/floor")
     middle = [sum(axis) / 4 for axis in zip(*floor.polygon_W, strict=True)]
-    assert middle == pytest.approx([1.0, 0.95])
+    assert middle == pytest.approx([1.0, 0.6])
+    assert context.board.get("alice/spot") == pytest.approx((1.0, 0.6, 0.0))
     assert [surface.name for surface in context.board.get("alice/around")] == ["floor", "bench"]
     assert context.board.get("alice/pose") == Pose2D(1.0, 0.0, math.pi / 2)
 

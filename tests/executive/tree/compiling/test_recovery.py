@@ -241,7 +241,7 @@ def test_it_is_looked_for_where_the_robot_was_when_it_fell(carrying, script, fai
     (floor,) = detect.inputs[0].surfaces
     assert (floor.name, floor.height_m) == ("floor", 0.0)
     xs, ys = zip(*floor.polygon_W, strict=True)
-    assert (min(xs), max(xs), min(ys), max(ys)) == pytest.approx((-2.25, 0.15, -1.2, 1.2))
+    assert (min(xs), max(xs), min(ys), max(ys)) == pytest.approx((-2.6, -0.2, -1.2, 1.2))
 
 
 def test_it_is_picked_up_twice_and_then_given_up(carrying, script):

@@ -4,11 +4,16 @@ from pathlib import Path
 
 import pytest
 
+from executive.mission.command import parse_command
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
 from executive.mission.knowledge import load_knowledge
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.run.runner import RunSettings
+from executive.tree.behaviours.board import FromBoard
+from executive.tree.compiler import compile_mission
 from executive.tree.compiling.search import surfaces_elsewhere
+from executive.tree.registry import built_in_skills
 from skills.api import Cause, Failed, Succeeded
 from skills.robot import Pose2D
 
@@ -270,6 +275,17 @@ def test_what_falls_while_it_is_handed_over_is_picked_up_as_well(carrying, scrip
     text = "Take [coke] to [Robin] and do [Nothing] to [Nothing]"
     assert carrying(3.0, text=text).outcome is Outcome.SUCCESS
     assert script.begun == ["navigate", "hand_over", "stow", "back_off", "detect", *TAKEN, "navigate", "hand_over"]
+
+
+def test_where_the_skill_can_be_told_it_looks_first_at_the_spot_where_it_must_lie(knowledge):
+    mission = Mission("m", DEFAULT_WORLD, "Alice", (MissionStep((parse_command(PUT),)),))
+    tree = compile_mission(mission, knowledge=knowledge, registry=built_in_skills())
+    (find,) = [node for node in tree.mission.walk() if node.path_id.endswith("carry-on/again/find")]
+    looks = [node.options["inputs"] for node in find.walk() if node.name == "detect"]
+    assert [inputs.get("expected_W") for inputs in looks[:2]] == [
+        FromBoard("alice/m/1-bedroom/carry-on/again/spot"),
+        None,
+    ]
 
 
 def test_without_room_to_back_off_it_looks_from_where_it_stands(carrying, script, fails):

@@ -101,6 +101,10 @@ class Surface:
     height_m: Height
 
 
+FLOOR: Final = "floor"
+"""The name of the surface on which an object rests that lies on the floor."""
+
+
 @dataclass(frozen=True)
 class ObjectObservation:
     """An object that was seen: position, size and score.

@@ -23,6 +23,7 @@ from executive.view.text import printable, to_rich
 REFRESH_S = 0.2
 BAR_CELLS = 20
 FEWEST_ROWS = 5
+_TOLD = frozenset({"skill", "fallen"})
 _UNDER_WAY = (Styles.IDLE.value, Styles.RUNNING.value)
 PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 
@@ -123,7 +124,7 @@ class _Lines:
 
 def _skill_titles(node: NodeView, above: NodeView | None = None) -> dict[str, str]:
     """What the skills below do, by path id."""
-    if node.kind == "skill":
+    if node.kind in _TOLD:
         return {node.path_id: node.title(above)}
     return {path_id: title for child in node.children for path_id, title in _skill_titles(child, node).items()}
 

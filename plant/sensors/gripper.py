@@ -9,6 +9,8 @@ import numpy as np
 from plant.sensors.noisy import NoisySensor
 from skills.robot import Gripper
 
+_TOLERANCE_S = 1e-6
+
 
 @dataclass(frozen=True)
 class GripperNoise:
@@ -57,5 +59,5 @@ class GripperModel(NoisySensor):
             return
         if self._changing_since_s is None:
             self._changing_since_s = stamp_s
-        if stamp_s - self._changing_since_s >= self._noise.holding_after_s:
+        if stamp_s - self._changing_since_s >= self._noise.holding_after_s - _TOLERANCE_S:
             self._holding, self._changing_since_s = gripped, None

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
-from skills.api import Cause, ObjectObservation, Succeeded, Surface
+from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
 from skills.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.routine import Routine, SkillFailure
@@ -99,7 +99,8 @@ class Approach(ArmSkill[ApproachInputs]):
 
     def _look_again(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         seen = inputs.observation
-        again = DetectInputs((seen.thing.name,), own_surfaces(inputs), seen.thing.attributes, seen.position_W)
+        surfaces, on_floor = own_surfaces(inputs), seen.surface == FLOOR
+        again = DetectInputs((seen.thing.name,), surfaces, seen.thing.attributes, seen.position_W, floor=on_floor)
         found = yield from self.perform(Detect(self.context), again)
         return Succeeded(f"standing before the {seen.thing}", found.outputs)
 

@@ -122,12 +122,17 @@ class RoutineSkill(Skill[InputsT]):
             self.context.clock.now(), robot.odometry().pose, q, gripper is not None and robot.gripper().holding
         )
 
+    def trouble(self) -> SkillFailure | None:
+        """What the routine must learn of at once, asked for before each step: it is raised where the routine waits."""
+        return None
+
     def step(self) -> Step:
         """Go on to the routine's next yield. Raises RuntimeError before `begin`."""
         if self._routine is None:
             raise RuntimeError(f"skill {self.name}: step before begin")
+        trouble = self.trouble()
         try:
-            return next(self._routine)
+            return next(self._routine) if trouble is None else self._routine.throw(trouble)
         except StopIteration as finished:
             assert isinstance(finished.value, Succeeded)
             return finished.value

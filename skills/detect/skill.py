@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, Detection, LocalisationEstimate, ObjectObservation, Running, Succeeded, Surface
+from skills.api import FLOOR, Cause, Detection, LocalisationEstimate, ObjectObservation, Running, Succeeded, Surface
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene
 from skills.arm.poses import close_viewpoints, look_configuration, overview_viewpoints, viewpoints_beside
@@ -29,7 +29,7 @@ from skills.geometry import wrap
 from skills.perception.attributes import known_attributes, shows
 from skills.perception.class_forms import class_forms
 from skills.perception.coverage import Coverage
-from skills.perception.detection_3d import FLOOR, Detection3D, detections_3d, observation
+from skills.perception.detection_3d import Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in, is_dark
 from skills.perception.surface_segmentation import Cluster, view_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker

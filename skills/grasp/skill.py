@@ -13,6 +13,7 @@ from pydrake.math import RigidTransform
 from skills.api import Cause, LocalisationEstimate, ObjectObservation, PlanningError, Succeeded, Surface
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box, box_corners
+from skills.arm.hold import Grip, HoldWatch, grip_again
 from skills.arm.poses import carry_configuration, close_viewpoints, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
@@ -114,9 +115,9 @@ class Grasp(ArmSkill[GraspInputs]):
             raise self._telling(failure) from failure
         try:
             yield from self._carry(plan.candidate, str(thing), view.target.height_m < THIN_M)
+            yield from self.stand_at(self.context.robot.capabilities().standing_height_m, f"carrying the {thing}")
         except SkillFailure as failure:
             raise self._telling(failure) from failure
-        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, f"carrying the {thing}")
         return Succeeded(f"holding the {thing}", {"tried": self._tried})
 
     def _plan_from_a_height(
@@ -157,15 +158,30 @@ class Grasp(ArmSkill[GraspInputs]):
         )
         return chosen or [heights_m[0]]
 
+    _watch: HoldWatch | None = None
+
     def begin(self, inputs: GraspInputs) -> None:
         """Forget an earlier attempt, but not the grasps that `inputs` names."""
-        self._tried = inputs.avoid
+        self._tried, self._watch = inputs.avoid, None
         super().begin(inputs)
 
     def resume(self, inputs: GraspInputs) -> None:
-        """Go on after a pause or a restart."""
-        self._tried = inputs.avoid
+        """Go on after a pause or a restart; what happened meanwhile is no slip."""
+        self._tried, self._watch = inputs.avoid, None if self._watch is None else HoldWatch()
         super().resume(inputs)
+
+    def trouble(self) -> SkillFailure | None:
+        """That the object fell while it is lifted and drawn back; what begins to slip is gripped again."""
+        if self._watch is None:
+            return None
+        context = self.context
+        grip = self._watch.judge(context.robot.gripper(), context.clock.now())
+        if grip is Grip.SLIPPING:
+            self.issue(grip_again(context.robot, self._watch.force_n, clock=context.clock, lease=context.lease))
+        if grip is not Grip.LOST:
+            return None
+        self._watch = None
+        return SkillFailure(Cause.POSTCONDITION, "the object fell out of the gripper while it was lifted")
 
     def _telling(self, failure: SkillFailure) -> SkillFailure:
         """A failure that says which grasps were tried."""
@@ -173,7 +189,7 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def run_again(self, inputs: GraspInputs) -> Routine[Succeeded]:
         """An object in the gripper is taken along; with an empty gripper all begins anew."""
-        seen = inputs.observation
+        seen, self._watch = inputs.observation, None
         yield from self.pause(_FEEL_S, "feeling what the gripper holds")
         at_thing = self.hand_near(np.array(seen.position_W), _AT_THING_M)
         if not self.context.robot.gripper().holding:
@@ -295,7 +311,9 @@ class Grasp(ArmSkill[GraspInputs]):
         self.held = [_held_box(X_BH.inverse(), view.target_box)]
         self.context.payload.corners_H = box_corners(self.held[0])
         self.context.payload.R_BH = X_BH.rotation()
+        self._watch = HoldWatch()
         yield from self._lift(plan.lift_B, f"lifting the {thing}")
+        self._watch = None
         p_HO = self.held[0].X_FG.translation()
         mass_kg = yield from self.weigh(p_HO, f"lifting the {thing}")
         self._check_held(thing, opening)
@@ -351,7 +369,7 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _carry(self, grasp: GraspCandidate, thing: str, gently: bool) -> Routine[None]:
         """Draw back from the surface, hold the object near the body, and check once more."""
-        opening = self._check_held(thing, None)
+        opening, self._watch = self._check_held(thing, None), HoldWatch()
         message = f"carrying the {thing}"
         for up_m in _PULL_BACK_UP_M:
             way_B = self.options.pull_back_m * self._back_B(grasp) + up_m * self._up_B()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from skills.api import Detection, LocalisationEstimate, ObjectObservation, Surface, Thing
+from skills.api import FLOOR, Detection, LocalisationEstimate, ObjectObservation, Surface, Thing
 from skills.geometry import inside_polygon
 from skills.perception.class_forms import class_forms
 from skills.perception.point_cloud import camera_pose_W
@@ -18,7 +18,6 @@ from skills.robot import FloatArray, Image
 
 _SURFACE_MARGIN_M = 0.05
 _SURFACE_HEIGHT_M = 0.10
-FLOOR = "floor"
 _FLOOR_HEIGHT_M = 0.08
 _FAR_TOO_LARGE = 1.5
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import COMFORTABLE_M, free_places
-from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
+from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.poses import look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
@@ -37,6 +38,7 @@ _LEAST_BACK_M = 0.08
 _LEVEL = 0.5
 _RELAX_M = 0.003
 _FEEL_S = 0.4
+_FLOOR_M = 0.06
 _OVER_SPOT_M = 0.45
 _RELEASE_RAD = 0.4
 """The finger opens so far to let go, and no farther: wide open it would reach what stands beside."""
@@ -93,7 +95,11 @@ class Place(ArmSkill[PlaceInputs]):
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
         carried = self._carried()
         yield from self._go_near(surface)
-        view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
+        first_height_m, *_ = body_heights_m(surface.height_m, self.context.robot.capabilities())
+        yield from self.stand_at(first_height_m, f"standing up to the {surface.name}")
+        on_floor = surface.height_m < _FLOOR_M
+        seen = self._look_at_floor(surface) if on_floor else self._look(surface, _nearest_spot(surface, self.X_WB()))
+        view = yield from seen
         held = self._held(carried)
         q_above_rad = yield from self._go_above_from_a_height(surface, view, held)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
@@ -167,6 +173,22 @@ class Place(ArmSkill[PlaceInputs]):
         if view is None:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         return view
+
+    def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView]:
+        """What the cameras at the body's front see of the floor: the object hides it from the hand camera."""
+        message, robot = f"looking for a free spot on the {surface.name}", self.context.robot
+        X_WO, views = self.context.localiser.estimate().X_WO, list[SurfaceView]()
+        for camera in robot.capabilities().body_cameras:
+            if not camera.looks_towards(0.0):
+                continue
+            take = partial(robot.image, camera.source)
+            image = yield from self.sense(take, latency_s=PICTURE_LATENCY_S, name="floor picture", message=message)
+            segment = partial(view_surface, image, X_WO, surface)
+            view = yield from self.compute(segment, latency_s=0.15, name="segment", message=message)
+            views += [] if view is None else [view]
+        if not views:
+            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
+        return max(views, key=lambda view: len(view.plane_points))
 
     def _go_above_from_a_height(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
         """As `_go_above`, with the body at the first height from which the arm gets there."""

@@ -220,6 +220,23 @@ def _lease(_: re.Match[str]) -> Effect:
     return Effect(frozenset(VERBS) - {"take_lease"}, act)
 
 
+def _loses(_: re.Match[str]) -> Effect:
+    """What the gripper holds falls, once: for a while the gripper closes too weakly for anything."""
+
+    def act(call: Call) -> Any:
+        reading, lease, memory = call.robot.gripper(), call.robot.lease_holder(), call.memory
+        if reading.holding and lease is not None and "until_s" not in memory:
+            memory["until_s"] = reading.stamp_s + _WEAK_S
+            call.robot.set_gripper(0.0, _WEAK_N, until_s=memory["until_s"], lease=lease)
+        if call.verb == "set_gripper" and reading.stamp_s < memory.get("until_s", 0.0):
+            opening_rad, _, until_s, owned = call.arguments
+            return call.robot.set_gripper(opening_rad, _WEAK_N, until_s=until_s, lease=owned)
+        return call.proceed()
+
+    return Effect(frozenset(("gripper", "set_gripper")), act)
+
+
+_WEAK_N, _WEAK_S = 0.5, 1.0
 _NO_COMMAND: Final[Any] = -1
 
 STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
@@ -238,6 +255,12 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         "gripper reports holding nothing",
         "the gripper says so, whatever there is",
         _gripper,
+    ),
+    FaultKind(
+        r"gripper loses it",
+        "gripper loses it at 20 s",
+        "what the gripper holds then, or takes next, falls out of it, once",
+        _loses,
     ),
     FaultKind(
         r"(?:image|camera) returns (?P<what>NaN|nan|no) depth",

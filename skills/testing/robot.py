@@ -46,6 +46,7 @@ _TRAJECTORY_START_RAD = 0.25
 _BATTERY_RUNTIME_S = 5400.0
 _CHARGING_S = 600.0
 _FINGER_M = 0.03
+_LEAST_CLAMP_N = 2.0
 
 BASE_ONLY = Capabilities(
     footprint_m=((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25)),
@@ -82,8 +83,8 @@ class ScriptedRobot:
     """Moves exactly as commanded, and skips a real robot's precautions; `calls` records the verbs used.
 
     It stands in a world of `blocks`; it drives through them, but takes loose ones between its fingers and puts them
-    down. Odometry is the truth unless `odometry_scale` and `yaw_drift_rad_per_m` say otherwise. Time passes by its
-    clock. Implements `skills.robot.Robot`.
+    down. What it grips with less than 2 N falls. Odometry is the truth unless `odometry_scale` and
+    `yaw_drift_rad_per_m` say otherwise. Time passes by its clock. Implements `skills.robot.Robot`.
     """
 
     def __init__(
@@ -355,8 +356,10 @@ class ScriptedRobot:
         if active is None:
             return
         opening_rad, self.clamp_force_n = active.goal
-        if opening_rad < self.opening_rad and self.in_gripper_rad is None:
+        if opening_rad < self.opening_rad and self.in_gripper_rad is None and self.clamp_force_n >= _LEAST_CLAMP_N:
             self._feel()
+        if self.held is not None and self.clamp_force_n < _LEAST_CLAMP_N:
+            self._let_go(self.held)
         if self.held is not None and self.in_gripper_rad is not None and opening_rad > self.in_gripper_rad + 0.02:
             self._let_go(self.held)
         before, least = self.opening_rad, self.in_gripper_rad
@@ -386,7 +389,7 @@ class ScriptedRobot:
         self.blocks.remove(taken)
 
     def _let_go(self, held: Block) -> None:
-        """An opening gripper lets what it held stand on whatever is below."""
+        """What was held stands on whatever is below."""
         x, y, z = (float(v) for v in self._between_fingers_W())
         self.blocks.append(held.standing_at(x, y, z - self._below_fingers_m()))
         self.held = self.in_gripper_rad = None

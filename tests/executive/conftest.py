@@ -33,6 +33,7 @@ from skills.api import (
 from skills.api import Step as SkillStep
 from skills.robot import (
     Battery,
+    Capabilities,
     CommandId,
     CommandState,
     CommandStatus,
@@ -42,6 +43,7 @@ from skills.robot import (
     Odometry,
     Pose2D,
 )
+from skills.testing.robot import BASE_ONLY
 
 
 class ManualClock:
@@ -64,6 +66,8 @@ class ScriptedRobot:
         self.name = name
         self.clock = clock
         self.holding = False
+        self.opening_rad, self.empty_rad = 0.3, 0.0
+        self.clamps_n: list[float] = []
         self.driving = False
         self.charge = 0.9
         self.standing = Pose2D(0.0, 0.0, 0.0)
@@ -84,7 +88,19 @@ class ScriptedRobot:
         return Odometry(self.clock.now(), self.standing.transform(), (0.0, 0.0, 0.0))
 
     def gripper(self) -> Gripper:
-        return Gripper(self.clock.now(), 0.3, 10.0 if self.holding else 0.0, self.holding)
+        opening_rad = self.opening_rad if self.holding else self.empty_rad
+        return Gripper(self.clock.now(), opening_rad, 10.0 * self.holding, self.holding)
+
+    def let_go(self) -> None:
+        """Open the gripper, as a skill that puts something down does."""
+        self.holding, self.empty_rad = False, 1.0
+
+    def capabilities(self) -> Capabilities:
+        return BASE_ONLY
+
+    def set_gripper(self, opening_rad: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+        self.clamps_n.append(force_n)
+        return self._called("set_gripper")
 
     def battery(self) -> Battery:
         return Battery(self.clock.now(), self.charge)

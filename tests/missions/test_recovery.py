@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
+from py_trees.common import Status
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from executive.cli.assembly import judge, run_entry
@@ -19,10 +21,16 @@ from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from plant.diagram import LooseModel
 from plant.simulation import Simulation
+from plant.spot.sensing import HAND_LINK
+from skills.testing.faults import with_faults
 
 FETCH = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
     "Take [drink] to [start] and do [Nothing] to [Nothing]",
+)
+BEER = (
+    "Take [Nothing] to [kitchen] and do [grasp] to [beer]",
+    "Take [beer] to [start] and do [Nothing] to [Nothing]",
 )
 BOX = """<sdf version="1.9"><model name="box"><link name="box"><inertial><mass>20</mass></inertial>{parts}</link>
 </model></sdf>"""
@@ -120,6 +128,48 @@ def test_a_thing_that_slips_is_taken_again():
     honest(result, verdict)
     assert mission.ended("1-kitchen/grasp") == ["FAILURE", "SUCCESS"]
     assert result.outcome is Outcome.SUCCESS, result.message
+
+
+class LosesHalfway:
+    """A robot whose gripper loses what it holds, once it has brought it for 3 s; `lost_s` is when that was by truth."""
+
+    BRINGS_S, OUT_M = 3.0, 0.03
+
+    def __init__(self, mission, thing):
+        engine = mission.simulation.engine
+        self._robot, self._clock, self._context = mission.entry.robot, engine, engine.context
+        self._hand = engine.world.plant.GetBodyByName(HAND_LINK, engine.world.robots["Alice"].instance)
+        self._thing = engine.world.plant.GetBodyByName(thing)
+        self._begun_s = self._apart_m = self.lost_s = None
+
+    def __getattr__(self, name):
+        value = getattr(self._robot, name)
+        return (lambda *given, **options: getattr(self._robot, name)(*given, **options)) if callable(value) else value
+
+    def observe(self, progress):
+        """Look how far the mission is, and where the object is."""
+        hand, thing = (body.EvalPoseInWorld(self._context).translation() for body in (self._hand, self._thing))
+        apart_m = float(np.linalg.norm(thing - hand))
+        if self._apart_m is not None and self.lost_s is None and apart_m > self._apart_m + self.OUT_M:
+            self.lost_s = progress.now_s
+        if progress.states["Alice"]["alice/m/2-start/navigate"].status is not Status.RUNNING:
+            return
+        self._begun_s = progress.now_s if self._begun_s is None else self._begun_s
+        if self._apart_m is None and progress.now_s > self._begun_s + self.BRINGS_S:
+            self._apart_m, self._robot = apart_m, with_faults(self._robot, self._clock, ["gripper loses it"])
+
+
+def test_what_falls_on_the_way_is_noticed_at_once_picked_up_from_the_floor_and_brought():
+    mission = FlatMission(BEER)
+    robot = LosesHalfway(mission, "beer")
+    result, verdict = mission.run(robot, observer=robot.observe)
+    assert result.outcome is Outcome.SUCCESS, result.message
+    assert verdict.success, verdict.why
+    assert verdict.drops >= 1
+    noticed_s = next(t["t"] for t in mission.transitions if "lost on the way" in t["message"])
+    assert noticed_s - robot.lost_s <= 0.3
+    told = [t["message"] for t in mission.transitions]
+    assert "the beer fell on the way to the start; it is picked up again" in told
 
 
 def test_a_low_battery_is_charged_in_between_and_the_mission_goes_on():

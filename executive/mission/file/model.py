@@ -73,13 +73,17 @@ class StepGuards:
 
 @dataclass(frozen=True)
 class StepPolicy:
-    """How a step or a mission runs: a limit for each attempt, further attempts, guards, and what if it fails."""
+    """How a step or a mission runs: a limit for each attempt, further attempts, guards, and what if it fails.
+
+    `pick_ups` is how often an object that falls on the way is picked up again; None: as the mission says, else twice.
+    """
 
     timeout_s: float | None = None
     retries: int = 0
     on_failure: OnFailure = OnFailure.STOP
     question: OperatorQuestion = OperatorQuestion()
     guards: StepGuards = StepGuards()
+    pick_ups: int | None = None
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ __all__ = ["AskFile", "GuardsFile", "MissionFile", "PolicyFile", "StepFile", "mi
 Seconds = Annotated[Duration, Field(strict=True)]
 Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
 Attempts = Annotated[StrictInt, Field(ge=0, le=100)]
+PickUps = Annotated[StrictInt, Field(ge=0, le=10)]
 Scalar = str | StrictBool | StrictInt | Annotated[float, Field(strict=True)] | None
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
 FORMS: Final = "'say', some of 'take', 'to', 'do' and 'object', 'skill', or 'use'"
@@ -79,6 +80,9 @@ class PolicyFile(_Strict):
     )
     ask: AskFile | None = Field(None, description="The question for `on_failure: ask`.")
     guards: GuardsFile | None = Field(None, description="What must hold while it runs.")
+    pick_ups: PickUps | None = Field(
+        None, description="How often an object that falls on the way is picked up again; by default, twice."
+    )
 
     @model_validator(mode="after")
     def _asks_where_it_says_so(self) -> PolicyFile:
@@ -100,6 +104,7 @@ class PolicyFile(_Strict):
             guards=StepGuards()
             if guards is None
             else StepGuards(guards.battery, bool(guards.localised), guards.time, guards.stale),
+            pick_ups=self._own_or(below, "pick_ups"),
         )
 
     def _own_or(self, below: PolicyFile | None, key: str) -> Any:

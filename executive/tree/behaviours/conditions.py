@@ -15,7 +15,10 @@ from typing import ClassVar, Self
 from executive.mission.file.model import StaleData
 from executive.tree.behaviours.context import RunContext
 from skills.api import Cause, Failed
+from skills.arm.hold import Grip, HoldWatch, grip_again
 from skills.robot import Pose2D
+
+CONTROL_TOPIC = "control"
 
 
 @dataclass(frozen=True)
@@ -84,30 +87,54 @@ class Condition(ABC):
 
 @dataclass
 class Holds(Condition):
-    """The gripper holds `thing`. A loss shorter than `patience_s` on the robot's clock is let pass.
+    """The gripper holds `thing`, which is brought `to` somewhere ("to the kitchen").
 
-    PRECONDITION when nothing is held at the start, EXECUTION when it is lost on the way.
+    PRECONDITION when nothing is held at the start, EXECUTION when it is lost on the way, within 0.3 s. What begins to
+    slip is gripped again more firmly, once; EXECUTION when it slips on. With `until_put_down` the gripper may open to
+    let go, what slips on is left to the skill that puts it down, and so is an empty gripper at the start.
     """
 
     reading = "the gripper"
     thing: str
-    patience_s: float = 0.5
+    to: str = ""
+    until_put_down: bool = False
+    _watch: HoldWatch = field(default_factory=HoldWatch, init=False, repr=False, compare=False)
 
     def stamp_s(self, context: RunContext) -> float:
         """The gripper's stamp."""
         return context.robot.gripper().stamp_s
 
+    def for_run(self, context: RunContext) -> Self:
+        """A copy with a watch of its own."""
+        mine = copy.copy(self)
+        mine._watch = HoldWatch()
+        return mine
+
+    def begin(self, context: RunContext) -> None:
+        """The subtree starts anew: nothing has been held yet."""
+        super().begin(context)
+        self._watch = HoldWatch()
+
     def judged(self, context: RunContext) -> Verdict:
-        """A failure when the gripper has been empty for longer than the patience."""
-        now_s = context.clock.now()
-        if context.robot.gripper().holding:
-            self._since_s = now_s
-            return None
-        if self._since_s is None:
-            return Failed(Cause.PRECONDITION, f"there is no {self.thing} in the gripper")
-        if now_s - self._since_s <= self.patience_s:
-            return None
-        return Failed(Cause.EXECUTION, f"the {self.thing} was lost on the way")
+        """A failure when it is lost or slips on; grips again what slips."""
+        watch = self._watch
+        grip = watch.judge(context.robot.gripper(), context.clock.now())
+        if grip is Grip.SLIPPING:
+            grip_again(context.robot, watch.force_n, clock=context.clock, lease=context.lease)
+            sentence = f"the {self.thing} began to slip and is gripped again, more firmly"
+            context.publish(CONTROL_TOPIC, {"t": round(context.clock.now(), 6), "what": "slip", "message": sentence})
+        if grip is Grip.EMPTY:
+            why = f"there is no {self.thing} in the gripper"
+            return None if self.until_put_down else Failed(Cause.PRECONDITION, why)
+        if grip is Grip.LOST or (grip is Grip.RELEASED and not self.until_put_down):
+            return Failed(Cause.EXECUTION, f"the {self.thing} was lost on the way{self._to}")
+        if grip is Grip.SLIPS_ON and not self.until_put_down:
+            return Failed(Cause.EXECUTION, f"the {self.thing} slips out of the gripper on the way{self._to}")
+        return None
+
+    @property
+    def _to(self) -> str:
+        return f" {self.to}" if self.to else ""
 
 
 @dataclass

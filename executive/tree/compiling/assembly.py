@@ -15,7 +15,7 @@ from executive.mission.goal import GoalCondition, command_goal, drive_goal
 from executive.mission.gripper import UNNAMED, InGripper, after_command, is_same
 from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import Constant
-from executive.tree.compiling.builder import PlanBuilder, Registry, slug, start_key
+from executive.tree.compiling.builder import PICK_UPS, PlanBuilder, Registry, slug, start_key
 from executive.tree.compiling.policies import PolicyFrame, needs_way_back, under_policy
 from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.compiling.skill_steps import skill_plan
@@ -80,7 +80,8 @@ def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> t
     Raises InputError: unknown names, ports wired wrongly, commands that cannot be carried out; all in `others`.
     """
     base = f"{slug(mission.robot_name)}/{slug(mission.name)}"
-    assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name))
+    pick_ups = PICK_UPS if mission.policy.pick_ups is None else mission.policy.pick_ups
+    assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name), pick_ups)
     builder = assembler.builder(base, mission.source)
     steps = assembler.level(mission, base)
     remember = [builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)]
@@ -104,12 +105,16 @@ def step_name(command: Command) -> str:
 
 @dataclass
 class _Assembler:
-    """Makes the subtrees of one mission; `names` are the outputs of the skills so far, with their blackboard keys, and
-    `held` is what the gripper holds by then."""
+    """Makes the subtrees of one mission.
+
+    `pick_ups` counts for steps that do not say otherwise; `names` are the outputs of the skills so far, with their
+    blackboard keys, and `held` is what the gripper holds by then.
+    """
 
     knowledge: Knowledge
     registry: Registry
     start_key: str
+    pick_ups: int = PICK_UPS
     names: dict[str, str] = field(default_factory=dict)
     held: InGripper | None = None
 
@@ -199,7 +204,9 @@ class _Assembler:
         if command is None:
             raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
         builder = self.builder(f"{base}/{item.number}-{step_name(command)}", item.step.source)
-        return replace(builder, command=command, anywhere=item.step.elsewhere)
+        own = item.step.policy.pick_ups
+        pick_ups = self.pick_ups if own is None else own
+        return replace(builder, command=command, anywhere=item.step.elsewhere, pick_ups=pick_ups)
 
 
 def _groups(steps: Sequence[MissionStep]) -> Iterator[tuple[tuple[_Item, ...], StepPolicy]]:

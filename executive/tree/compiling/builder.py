@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 from executive.mission.command import Command
 from executive.mission.errors import InputError, SourceLine, suggestion
@@ -20,6 +20,8 @@ from skills.api import Cause, Skill, Surface
 from skills.robot import Pose2D
 
 Registry = Mapping[str, type[Skill[Any]]]
+PICK_UPS: Final = 2
+"""How often what falls on the way is picked up again, unless a mission says otherwise."""
 
 
 def slug(text: str) -> str:
@@ -48,6 +50,7 @@ class PlanBuilder:
 
     `anywhere` says whether an object that is not in its place is looked for elsewhere, too, but never on the surfaces
     in `avoided`: what lies there is where it is to go. With `in_gripper` an earlier step has grasped the object.
+    What falls on the way is picked up again `pick_ups` times at most.
     """
 
     knowledge: Knowledge
@@ -59,6 +62,7 @@ class PlanBuilder:
     anywhere: bool = True
     avoided: frozenset[str] = frozenset()
     in_gripper: bool = False
+    pick_ups: int = PICK_UPS
 
     def at(self, *parts: str) -> PlanBuilder:
         """The builder of a subtree below."""

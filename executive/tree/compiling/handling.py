@@ -9,7 +9,8 @@
 | grasping | POSTCONDITION (slipped) | look again, take another grasp |
 | grasping | PLANNING | look again; back off and stand anew |
 | grasping | PRECONDITION, EXECUTION | look again |
-| carrying | the object was lost | find it on the surfaces near there, pick it up again |
+| tucking the arm in | the object was lost | look again, on the floor as well |
+| carrying | the object was lost | see `executive.tree.compiling.fallen` |
 """
 
 from __future__ import annotations
@@ -19,16 +20,15 @@ from typing import Final
 from executive.mission.command import Thing
 from executive.mission.geometry import inside
 from executive.tree.behaviours.board import BesideBoard, FromBoard, FromBoardOr, beside
+from executive.tree.behaviours.conditions import Holds
 from executive.tree.behaviours.recovery import Recovery
 from executive.tree.compiling.builder import PlanBuilder, after
-from executive.tree.compiling.search import detect_plan
 from executive.tree.node import NodeSpec
 from skills.api import Cause, Surface
 from skills.robot import Pose2D
 
 ATTEMPTS: Final = 4
 LOOK_AGAIN_S: Final = 0.5
-LOST_WITHIN_M: Final = 2.0
 NEARBY_M: Final = ((-0.5, 0.0), (0.0, 0.6), (0.0, -0.6))
 """Poses near a goal that will do as well, forward and left of it (m)."""
 _NOT_PLANNING: Final = (Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION)
@@ -56,14 +56,19 @@ def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> list[Pose2D | Fro
 def pick_up_plan(
     builder: PlanBuilder, thing: Thing, search: NodeSpec, key: str, surfaces: tuple[Surface, ...] | FromBoard
 ) -> NodeSpec:
-    """Find (`search`, which writes `key`), approach and grasp, with recoveries; a failure ends with the arm stowed."""
+    """Find (`search`, which writes `key`), approach, grasp and tuck the arm in, with recoveries.
+
+    A failure ends with the arm stowed.
+    """
     near, tried = f"{builder.path_id}/near-detection", f"{builder.path_id}/tried-grasps"
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     grasp = _grasp_plan(builder, near, tried)
-    attempt = builder.at("pick-up").sequence(f"pick up {thing}", search, approach, grasp)
+    tuck = builder.node("guard", f"holding {thing}", tuck_plan(builder), part="held", condition=Holds(str(thing)))
+    attempt = builder.at("pick-up").sequence(f"pick up {thing}", search, approach, grasp, tuck)
     around = builder.at("around")
     unplanned, untaken = after(Cause.PLANNING, of=approach), after(Cause.PLANNING, of=grasp)
-    missed = (after(*_NOT_PLANNING, of=grasp), after(*_NOT_PLANNING, of=approach))
+    lost = after(Cause.PRECONDITION, Cause.EXECUTION, of=tuck, own=True)
+    missed = (after(*_NOT_PLANNING, of=grasp), after(*_NOT_PLANNING, of=approach), lost)
     attempts = builder.recover(
         f"up to {ATTEMPTS} attempts",
         attempt,
@@ -109,44 +114,3 @@ def tidied(builder: PlanBuilder, work: NodeSpec, *, only_after_failure: bool = F
     """Work after which the arm is stowed, whatever came of it."""
     name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
     return builder.node("afterwards", name, work, builder.skill("stow"), only_after_failure=only_after_failure)
-
-
-def unless_dropped(builder: PlanBuilder, item: Thing, carry: NodeSpec, guards: tuple[NodeSpec, ...]) -> NodeSpec:
-    """Carrying; when the object is lost on the way (one of the guards breaks) it is picked up again where it was lost.
-
-    Only surfaces can be looked at: what lies on the floor is not found, and the sentence says so.
-    """
-    lost = Recovery(tuple(after(Cause.EXECUTION, of=guard, own=True) for guard in guards))
-    return builder.recover(f"carry {item}", carry, (_pick_up_again_plan(builder, item), lost), attempts=2)
-
-
-def _pick_up_again_plan(builder: PlanBuilder, item: Thing) -> NodeSpec:
-    below = builder.at("again")
-    facts = builder.knowledge
-    near, key = f"{below.path_id}/surfaces", f"{below.path_id}/detection"
-    floor = f"the {item} lies on the floor by now, probably, where it cannot be looked for"
-    nearby = below.node(
-        "surfaces near",
-        "which surfaces are near?",
-        part="surfaces-near",
-        surfaces=tuple(map(builder.surface, facts.surfaces)),
-        rooms={name: facts.places[surface.place].polygon for name, surface in facts.surfaces.items()},
-        within_m=LOST_WITHIN_M,
-        key=near,
-        otherwise=floor,
-    )
-    look = below.node(
-        "selector",
-        f"find {item} near where it was lost",
-        detect_plan(below, item, FromBoard(near), key),
-        part="find",
-        exhausted_cause=Cause.POSTCONDITION,
-        exhausted_message=floor,
-    )
-    return below.sequence(
-        f"pick {item} up again",
-        below.at("first").skill("stow"),
-        nearby,
-        pick_up_plan(below, item, look, key, FromBoard(near)),
-        tuck_plan(below),
-    )

@@ -123,9 +123,10 @@ def detect_plan(
 
 
 def find_again_plan(builder: PlanBuilder, thing: Thing, surfaces: tuple[str, ...], key: str) -> NodeSpec:
-    """When it was seen before: look from here first, where it was seen. Else passed over."""
+    """When it was seen before: look from here first, where it was seen, and at the floor beside. Else passed over."""
     seen_on = SurfaceOfDetection(key, tuple(map(builder.surface, surfaces)))
-    look = detect_plan(builder, thing, seen_on, key)
+    floor = {"floor": True} if builder.has_ports("detect", ("floor",)) else NO_PORTS
+    look = detect_plan(builder, thing, seen_on, key, floor)
     return builder.node("only if known", "look from here, if seen before", look, key=key)
 
 

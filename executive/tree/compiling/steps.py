@@ -13,7 +13,8 @@ from executive.mission.knowledge import ANYBODY, ANYTHING
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.compiling.builder import PlanBuilder, pose_2d
-from executive.tree.compiling.handling import go_near_plan, held_plan, pick_up_plan, tidied, tuck_plan, unless_dropped
+from executive.tree.compiling.fallen import unless_fallen
+from executive.tree.compiling.handling import go_near_plan, held_plan, pick_up_plan, tidied
 from executive.tree.compiling.interrupts import dock_plan
 from executive.tree.compiling.search import (
     look_plans,
@@ -57,11 +58,11 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     around = tuple(builder.surface(name) for name in builder.knowledge.surfaces if name in surfaces)
     key = f"{builder.path_id}/detection"
     search = search_plan(builder.at("find"), thing, place, key, anywhere=anywhere)
-    get = (pick_up_plan(builder, thing, search, key, around), tuck_plan(builder))
+    get = pick_up_plan(builder, thing, search, key, around)
     if not builder.in_gripper:
-        return builder.sequence(f"get {thing} {where(builder.knowledge, place)}", *get)
+        return builder.sequence(f"get {thing} {where(builder.knowledge, place)}", get)
     return builder.node(
-        "selector", f"have {thing}", held_plan(builder, thing), builder.at("get").sequence("get it", *get)
+        "selector", f"have {thing}", held_plan(builder, thing), builder.at("get").sequence("get it", get)
     )
 
 
@@ -199,13 +200,14 @@ def _goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
 
 
 def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
+    to = "the start" if isinstance(pose, FromBoard) else person
     way = builder.at("bring").sequence(
         f"bring it to {person}",
-        go_near_plan(builder, pose, "the start" if isinstance(pose, FromBoard) else person),
+        go_near_plan(builder, pose, to),
         builder.skill("hand_over", {"person": person}),
     )
-    guard = _holding(builder, item, way)
-    return unless_dropped(builder.at("carry-on"), item, guard, (guard,))
+    guard = _holding(builder, item, f"to {to}", way)
+    return unless_fallen(builder.at("carry-on"), item, f"to {to}", guard, (guard,))
 
 
 def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
@@ -215,26 +217,27 @@ def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
         raise builder.error(
             f"'{place}' has no surface to put the {item} on", "add one under 'surfaces' in the knowledge"
         )
-    guards = tuple(_carry_to_plan(builder.at(name, "carry"), item, name) for name in surfaces)
-    ways = tuple(_put_on_plan(builder.at(name), name, guard) for name, guard in zip(surfaces, guards, strict=True))
+    to = f"to the {place}"
+    ways = tuple(_put_on_plan(builder.at(name), item, name, to) for name in surfaces)
     put = builder.node("selector", f"put {item} down {where(builder.knowledge, place)}", *ways)
-    return unless_dropped(builder.at("carry-on"), item, put, guards)
+    return unless_fallen(builder.at("carry-on"), item, to, put, tuple(guard for way in ways for guard in way.children))
 
 
-def _carry_to_plan(builder: PlanBuilder, item: Thing, surface: str) -> NodeSpec:
-    view = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0])
-    return _holding(builder, item, builder.navigate(view, f"the {surface}"))
-
-
-def _put_on_plan(builder: PlanBuilder, surface: str, carry: NodeSpec) -> NodeSpec:
+def _put_on_plan(builder: PlanBuilder, item: Thing, surface: str, to: str) -> NodeSpec:
+    """Carry it there and put it down; both under guards."""
+    view, carry = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0]), builder.at("carry")
+    place = builder.skill("place", {"surface": builder.surface(surface)})
     return builder.sequence(
-        f"put it on {surface}", carry, builder.skill("place", {"surface": builder.surface(surface)})
+        f"put it on {surface}",
+        _holding(carry, item, to, carry.navigate(view, f"the {surface}")),
+        _holding(builder.at("put"), item, to, place, until_put_down=True),
     )
 
 
-def _holding(builder: PlanBuilder, item: Thing, below: NodeSpec) -> NodeSpec:
-    """A guard: what is carried stays in the gripper."""
-    return builder.node("guard", f"holding {item}", below, condition=Holds(str(item)))
+def _holding(builder: PlanBuilder, item: Thing, to: str, below: NodeSpec, *, until_put_down: bool = False) -> NodeSpec:
+    """A guard: what is carried stays in the gripper, perhaps until it is put down."""
+    condition = Holds(str(item), to, until_put_down)
+    return builder.node("guard", f"holding {item}", below, condition=condition)
 
 
 def _person_at_start(builder: PlanBuilder) -> str:

@@ -82,8 +82,8 @@ def test_a_thing_lost_on_the_way_is_no_success(compiled, run_tree, make, robot, 
     assert (worst.outcome, worst.cause, worst.message) == (
         Outcome.FAILURE,
         Cause.EXECUTION,
-        "the coke was lost on the way; pick coke up again: there is no surface within 2 m of (0.00, 0.00) m; "
-        "the coke lies on the floor by now, probably, where it cannot be looked for",
+        "the coke was lost on the way to the start; pick coke up again: the coke is not found again where it fell: "
+        "not seen; there is no surface within 2 m of (0.00, 0.00) m; there is only the floor",
     )
 
 

@@ -84,7 +84,8 @@ def handling(world, robot, script, registry):
 
         def change(self):
             assert robot.holding, "put down what is not held"
-            robot.holding, world.places = False, world.places + 1
+            robot.let_go()
+            world.places += 1
 
         def step(self):
             step = super().step()

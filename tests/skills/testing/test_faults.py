@@ -10,7 +10,7 @@ from skills.testing.blocks import ROOM
 from skills.testing.clock import VirtualClock
 from skills.testing.fault_kinds import STANDARD_FAULTS, InjectedFault
 from skills.testing.faults import parse_fault, with_faults
-from skills.testing.robot import ScriptedRobot
+from skills.testing.robot import ScriptedRobot, Start
 
 
 @pytest.fixture
@@ -151,3 +151,40 @@ def test_several_faults_act_together(faulty):
 def test_words_that_are_no_fault_are_refused_with_the_mend(words, message):
     with pytest.raises(ValueError, match=message):
         parse_fault(words)
+
+
+@pytest.fixture
+def holding(clock, spot):
+    """A robot that holds a can and loses it at 1 s, and its lease."""
+    inner = ScriptedRobot(clock, capabilities=spot, blocks=ROOM, start=Start(holding=True))
+    robot = with_faults(inner, clock, ["gripper loses it at 1 s"])
+    return robot, inner, robot.acquire_lease("test")
+
+
+def polled(robot, clock, duration_s):
+    """Whether the robot believed to hold something at each tick."""
+    seen = []
+    for _ in range(round(duration_s / 0.05)):
+        clock.advance(0.05)
+        seen.append(robot.gripper().holding)
+    return seen
+
+
+def test_a_gripper_that_loses_it_lets_it_fall_and_closes(holding, clock):
+    robot, inner, _ = holding
+    assert all(polled(robot, clock, 0.95))
+    assert not any(polled(robot, clock, 1.0)[3:])
+    assert robot.gripper().opening_rad == pytest.approx(0.0)
+    assert any(block.loose and block.z0 == 0.0 for block in inner.blocks)
+
+
+def test_gripping_again_at_once_does_not_help_but_later_the_gripper_is_as_strong_as_ever(holding, clock):
+    robot, inner, lease = holding
+    polled(robot, clock, 1.05)
+    robot.set_gripper(0.0, 100.0, until_s=9.0, lease=lease)
+    clock.advance(0.1)
+    assert inner.clamp_force_n < 1.0
+    polled(robot, clock, 1.5)
+    robot.set_gripper(0.0, 100.0, until_s=9.0, lease=lease)
+    clock.advance(0.1)
+    assert inner.clamp_force_n == 100.0

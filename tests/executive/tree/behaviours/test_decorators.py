@@ -161,18 +161,17 @@ def test_interrupted_decorators_say_so(context, clock):
 
 
 def test_holding_lets_short_losses_pass_and_tells_long_ones(context, clock, robot):
-    # time  0.0   0.4        0.6        1.2
-    # held  yes   no         yes        no ... since 0.6
+    # time  0.0   0.05       0.1        0.7 0.75
+    # held  yes   no         yes        no  no
     condition = Holds("coke")
     condition.begin(context)
     robot.holding = True
     assert condition.violated(context) is None
-    for dt_s, held in ((0.4, False), (0.2, True)):
+    for dt_s, held in ((0.05, False), (0.05, True), (0.6, False)):
         clock.advance(dt_s)
         robot.holding = held
         assert condition.violated(context) is None
-    clock.advance(0.6)
-    robot.holding = False
+    clock.advance(0.05)
     failure = condition.violated(context)
     assert failure is not None
     assert (failure.cause, failure.message) == (Cause.EXECUTION, "the coke was lost on the way")

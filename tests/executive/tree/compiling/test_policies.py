@@ -43,6 +43,14 @@ def nowhere(script):
     return script
 
 
+@pytest.mark.parametrize(("mission", "own", "count"), [(None, None, 2), (None, 0, 0), (3, None, 3), (3, 1, 1)])
+def test_how_often_a_fallen_object_is_picked_up_is_the_steps_to_say_or_the_missions(compile_steps, mission, own, count):
+    carry = parse_command("Take [coke] to [bedroom] and do [Nothing] to [Nothing]")
+    tree = compile_steps(step(carry, pick_ups=own), policy=StepPolicy(pick_ups=mission))
+    recovered = [node for node in tree.mission.walk() if node.path_id.endswith("carry-on")]
+    assert [node.options["attempts"] for node in recovered] == ([count + 1] if count else [])
+
+
 def test_a_skipped_step_is_told_and_the_rest_is_done(play, nowhere):
     result = play(step(FIND, on_failure=OnFailure.SKIP), step(GO["hall"]))
     assert result.outcome is Outcome.SUCCESS

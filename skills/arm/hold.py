@@ -1,0 +1,105 @@
+"""Whether what the gripper holds stays in it: a loss and a slip are told from the gripper's readings, within 0.3 s."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import Final
+
+from skills.robot import Capabilities, Clock, CommandId, Gripper, Lease, Robot
+
+GRIP_AGAIN_S: Final = 4.0
+_FIRMER, _MOST_OF_FORCE = 1.5, 0.95
+_TOLERANCE_S = 1e-6
+
+
+class Grip(enum.Enum):
+    """What becomes of the object in the gripper."""
+
+    EMPTY = "empty"  # nothing has been held since the watch began
+    HELD = "held"  # it stays where it is, as far as can be told
+    SLIPPING = "slipping"  # it has begun to slip: grip it again, more firmly
+    SLIPS_ON = "slips on"  # it slips although it was gripped again
+    LOST = "lost"  # it is out of the gripper, which did not open
+    RELEASED = "released"  # the gripper has opened: somebody let go of it
+
+
+@dataclass
+class HoldWatch:
+    """Judges readings of a gripper that holds something.
+
+    The robot's belief to hold nothing counts once it has lasted for `patience_s`. An object slips when the gripper has
+    closed by more than `slip_rad` about it, or when its force has been below `slip_force` of what it was for `slip_s`.
+    What was gripped again slips on when the gripper closes about it, judged anew from `settle_s` later on; fingers that
+    stay apart have `regrip_s` to feel it again before it counts as lost. A gripper that has opened by `released_rad`
+    lets go on purpose.
+    """
+
+    patience_s: float = 0.05
+    slip_rad: float = 0.05
+    slip_force: float = 0.5
+    slip_s: float = 0.05
+    regrip_s: float = 0.2
+    settle_s: float = 0.5
+    released_rad: float = 0.08
+    force_n: float = field(default=0.0, init=False)
+    _opening_rad: float | None = field(default=None, init=False)
+    _empty_since_s: float | None = field(default=None, init=False)
+    _weak_since_s: float | None = field(default=None, init=False)
+    _gripped_again_s: float | None = field(default=None, init=False)
+    _settling: bool = field(default=False, init=False)
+    _released: bool = field(default=False, init=False)
+
+    def judge(self, reading: Gripper, now_s: float) -> Grip:
+        """What the newest reading means at a time on the robot's clock (s); `force_n` is the force when it held."""
+        if self._opening_rad is None:
+            if not reading.holding:
+                return Grip.EMPTY
+            self._opening_rad, self.force_n = reading.opening_rad, reading.force_n
+        self._released = self._released or reading.opening_rad > self._opening_rad + self.released_rad
+        if self._released:
+            return Grip.RELEASED
+        if not reading.holding:
+            return self._missed(reading, now_s)
+        self._empty_since_s = None
+        return self._held(reading, now_s)
+
+    def _missed(self, reading: Gripper, now_s: float) -> Grip:
+        """A reading of a gripper that feels nothing; fingers that stay apart may still have something between them."""
+        self._empty_since_s = now_s if self._empty_since_s is None else self._empty_since_s
+        assert self._opening_rad is not None
+        apart = reading.opening_rad > self._opening_rad - self.slip_rad
+        if apart and self._gripped_again_s is not None and now_s < self._gripped_again_s + self.regrip_s:
+            return Grip.HELD
+        return Grip.LOST if now_s - self._empty_since_s >= self.patience_s - _TOLERANCE_S else Grip.HELD
+
+    def _held(self, reading: Gripper, now_s: float) -> Grip:
+        """A reading with the object between the fingers: as firmly as before?"""
+        if self._settling and self._gripped_again_s is not None:
+            if now_s < self._gripped_again_s + self.settle_s:
+                return Grip.HELD
+            self._settling, self._opening_rad, self.force_n = False, reading.opening_rad, reading.force_n
+        assert self._opening_rad is not None
+        closes = reading.opening_rad <= self._opening_rad - self.slip_rad
+        if self._gripped_again_s is not None:
+            return Grip.SLIPS_ON if closes else Grip.HELD
+        opens = reading.opening_rad > self._opening_rad + 0.5 * self.released_rad
+        weak = reading.force_n < self.slip_force * self.force_n and not opens
+        self._weak_since_s = (now_s if self._weak_since_s is None else self._weak_since_s) if weak else None
+        weakened = self._weak_since_s is not None and now_s - self._weak_since_s >= self.slip_s - _TOLERANCE_S
+        if not (closes or weakened):
+            return Grip.HELD
+        self._gripped_again_s, self._settling = now_s, True
+        return Grip.SLIPPING
+
+
+def firmer_n(force_n: float, capabilities: Capabilities) -> float:
+    """The force (N) to grip what slips at force_n: half as much again, within what the gripper can."""
+    most_n = 0.0 if capabilities.gripper is None else _MOST_OF_FORCE * capabilities.gripper.max_force_n
+    return min(_FIRMER * force_n, most_n)
+
+
+def grip_again(robot: Robot, force_n: float, *, clock: Clock, lease: Lease) -> CommandId:
+    """Close the gripper about what slips at force_n, more firmly; other motion goes on meanwhile."""
+    firmly_n = firmer_n(force_n, robot.capabilities())
+    return robot.set_gripper(0.0, firmly_n, until_s=clock.now() + GRIP_AGAIN_S, lease=lease)

@@ -1,0 +1,69 @@
+"""Where an object is looked for that fell on the way, and what is said about it."""
+
+import math
+
+import pytest
+from py_trees.common import Status
+
+from executive.tree.behaviours.fallen import Fallen
+from skills.api import Surface
+from skills.robot import Pose2D
+
+NEAR = Surface("bench", ((1.0, 0.5), (2.0, 0.5), (2.0, 1.0)), 0.8)
+FAR = Surface("shelf", ((4.0, 0.0), (5.0, 0.0), (5.0, 1.0)), 0.8)
+
+
+@pytest.fixture
+def leaf(context):
+    keys = {f"{name}_key": f"alice/{name}" for name in ("pose", "spot", "floor", "around", "set_down")}
+    return Fallen(
+        path_id="alice/fell", name="fell", thing="hammer", to="to the kitchen", surfaces=(NEAR, FAR), context=context,
+        **keys,
+    )  # fmt: skip
+
+
+def ended(leaf, clock):
+    """Tick it to its end."""
+    while leaf.status is not Status.SUCCESS:
+        leaf.tick_once()
+        clock.advance(0.1)
+    return leaf
+
+
+def test_it_says_what_happened(leaf, clock):
+    assert ended(leaf, clock).message == "the hammer fell on the way to the kitchen; it is picked up again"
+
+
+def test_what_is_felt_after_all_has_slipped(leaf, clock, robot):
+    leaf.tick_once()
+    robot.holding = True
+    told = "the hammer slips in the gripper on the way to the kitchen; it is set down and gripped anew"
+    assert ended(leaf, clock).message == told
+
+
+def test_the_floor_is_that_about_the_point_where_it_fell_and_the_surfaces_are_those_near(leaf, clock, robot, context):
+    robot.standing = Pose2D(1.0, 0.0, math.pi / 2)
+    leaf.tick_once()
+    robot.standing = Pose2D(1.0, 0.5, math.pi / 2)
+    ended(leaf, clock)
+    (floor,) = context.board.get("alice/floor")
+    middle = [sum(axis) / 4 for axis in zip(*floor.polygon_W, strict=True)]
+    assert middle == pytest.approx([1.0, 0.6])
+    assert context.board.get("alice/spot") == pytest.approx((1.0, 0.6, 0.0))
+    assert [surface.name for surface in context.board.get("alice/around")] == ["floor", "bench"]
+    assert context.board.get("alice/pose") == Pose2D(1.0, 0.0, math.pi / 2)
+
+
+def test_it_is_set_down_before_where_the_robot_has_come_to_rest(leaf, clock, robot, context):
+    leaf.tick_once()
+    robot.standing = Pose2D(0.5, 0.0, 0.0)
+    ended(leaf, clock)
+    xs, _ = zip(*context.board.get("alice/set_down").polygon_W, strict=True)
+    assert (min(xs), max(xs)) == pytest.approx((1.35, 1.95))
+
+
+def test_it_begins_anew_with_where_the_robot_is_then(leaf, clock, robot, context):
+    ended(leaf, clock)
+    robot.standing = Pose2D(3.0, 0.0, 0.0)
+    leaf.tick_once()
+    assert (leaf.status, context.board.get("alice/pose")) == (Status.RUNNING, Pose2D(3.0, 0.0, 0.0))

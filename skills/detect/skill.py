@@ -38,13 +38,15 @@ from skills.robot import FloatArray, Image
 
 _LEAST_SEEN = 0.02
 _LOOKED_AT_M = 0.08
+_AVOIDED_M = 0.08
 
 
 @dataclass(frozen=True)
 class DetectInputs:
     """What to look for (any of `classes`, with all `attributes`) and on which surfaces.
 
-    The class "thing" is any object that stands there, whether the detector has a class for it or not.
+    The class "thing" is any object that stands there, whether the detector has a class for it or not; those where
+    one of `avoid` was seen are the last choice.
 
     The search ends with the first `count` objects; a count of 0 searches all surfaces and counts all objects. With
     `expected_W` it searches that place only, and only objects within 0.35 m of it count. With `floor`, objects on the
@@ -57,6 +59,7 @@ class DetectInputs:
     expected_W: tuple[Coordinate, Coordinate, Height] | None = None
     count: Tries = 1
     floor: bool = False
+    avoid: tuple[ObjectObservation, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -280,7 +283,9 @@ class Detect(ArmSkill[DetectInputs]):
         tracks = [t for t in self._tracker.snapshot() if _is_wanted(inputs, t) and self._in_place(inputs, t)]
         fitting = [t for t in tracks if all(shows(t.best, word) for word in inputs.attributes)]
         if inputs.expected_W is None and THING in inputs.classes:
-            return most_free_first(fitting, self.X_WB().translation())
+            free = most_free_first(fitting, self.X_WB().translation())
+            places = [np.array(each.position_W) for each in inputs.avoid]
+            return sorted(free, key=lambda t: any(_apart(t.position_W, p) < _AVOIDED_M for p in places))
         if inputs.expected_W is None:
             return sorted(fitting, key=lambda t: -t.belief * t.best.detection.score)
         off = {t.number: _apart(t.position_W, inputs.expected_W) for t in fitting}

@@ -54,26 +54,39 @@ def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> list[Pose2D | Fro
 
 
 def pick_up_plan(
-    builder: PlanBuilder, thing: Thing, search: NodeSpec, key: str, surfaces: tuple[Surface, ...] | FromBoard
+    builder: PlanBuilder,
+    thing: Thing,
+    search: NodeSpec,
+    key: str,
+    surfaces: tuple[Surface, ...] | FromBoard,
+    *,
+    seen: bool = False,
 ) -> NodeSpec:
-    """Find (`search`, which writes `key`), approach and grasp, with recoveries; a failure ends with the arm stowed."""
+    """Find (`search`, which writes `key`), approach and grasp, with recoveries; a failure ends with the arm stowed.
+
+    With `seen`, an earlier node has just written `key`: only further attempts begin with the search.
+    """
     near, tried = f"{builder.path_id}/near-detection", f"{builder.path_id}/tried-grasps"
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     grasp = _grasp_plan(builder, near, tried)
-    attempt = builder.at("pick-up").sequence(f"pick up {thing}", search, approach, grasp)
+    steps = (approach, grasp) if seen else (search, approach, grasp)
+    attempt = builder.at("pick-up").sequence(f"pick up {thing}", *steps)
     around = builder.at("around")
     unplanned, untaken = after(Cause.PLANNING, of=approach), after(Cause.PLANNING, of=grasp)
     missed = (after(*_NOT_PLANNING, of=grasp), after(*_NOT_PLANNING, of=approach))
+    look_again = (
+        (builder.pause("look-again", "look again", LOOK_AGAIN_S), Recovery(missed, uses=2)),
+        (builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S), Recovery((untaken,))),
+    )
     attempts = builder.recover(
         f"up to {ATTEMPTS} attempts",
         attempt,
-        (builder.pause("look-again", "look again", LOOK_AGAIN_S), Recovery(missed, uses=2)),
-        (builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S), Recovery((untaken,))),
+        *(((search, Recovery((*missed, untaken), uses=3)),) if seen else look_again),
         (around.skill("clear_costmap"), Recovery((unplanned,))),
         (around.skill("back_off"), Recovery((untaken, unplanned))),
         attempts=ATTEMPTS,
         part="attempts",
-        forgets=(key, near, tried),
+        forgets=(near, tried) if seen else (key, near, tried),
     )
     return tidied(builder.at("tidy"), attempts, only_after_failure=True)
 

@@ -209,7 +209,16 @@ def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard,
 
 
 def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
-    """Any surface of the place will do: the next one is tried when one does not work."""
+    """Put down in a place; what is dropped on the way is picked up again."""
+    put, guards = put_down_plan(builder, item, place)
+    return unless_dropped(builder.at("carry-on"), item, put, guards)
+
+
+def put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:
+    """Any surface of the place will do: the next one is tried when one does not work. With it, the guards of the ways.
+
+    Raises InputError: the place has no surfaces.
+    """
     surfaces = builder.knowledge.surfaces_in(place)
     if not surfaces:
         raise builder.error(
@@ -217,8 +226,7 @@ def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
         )
     guards = tuple(_carry_to_plan(builder.at(name, "carry"), item, name) for name in surfaces)
     ways = tuple(_put_on_plan(builder.at(name), name, guard) for name, guard in zip(surfaces, guards, strict=True))
-    put = builder.node("selector", f"put {item} down {where(builder.knowledge, place)}", *ways)
-    return unless_dropped(builder.at("carry-on"), item, put, guards)
+    return builder.node("selector", f"put {item} down {where(builder.knowledge, place)}", *ways), guards
 
 
 def _carry_to_plan(builder: PlanBuilder, item: Thing, surface: str) -> NodeSpec:

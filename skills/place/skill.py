@@ -14,7 +14,7 @@ from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.approach.standing import COMFORTABLE_M, free_places
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
-from skills.arm.poses import look_configuration, overview_viewpoints
+from skills.arm.poses import carry_configuration, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.geometry import wrap
@@ -22,8 +22,8 @@ from skills.grasp.candidates import hand_rotation
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
-from skills.place.free_spot import free_spots, spots
-from skills.quantities import Length, TurnRate
+from skills.place.free_spot import free_spots, roomiest_first, spots
+from skills.quantities import Length, Tries, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 from skills.stack import ArmPlanner
 
@@ -55,11 +55,12 @@ class PlaceOptions:
     """How an object is put down.
 
     No joint is faster than `lower_rad_s` while it is lowered until it stands. It must be seen again within
-    `seen_again_m`.
+    `seen_again_m`. Where no free spot is in reach, the robot moves along the surface `moves` times at most.
     """
 
     lower_rad_s: TurnRate = 0.2
     seen_again_m: Length = 0.12
+    moves: Tries = 2
 
 
 class Place(ArmSkill[PlaceInputs]):
@@ -91,10 +92,9 @@ class Place(ArmSkill[PlaceInputs]):
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
         carried = self._carried()
-        yield from self._go_near(surface)
-        view = yield from self._look(surface, _nearest_spot(surface, self.X_WB()))
         held = self._held(carried)
-        q_above_rad = yield from self._go_above(surface, view, held)
+        yield from self._go_near(_nearest_spot(surface, self.X_WB()), surface)
+        q_above_rad = yield from self._find_spot(surface, held, carried)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
         yield from self._lower(surface, q_above_rad)
@@ -129,15 +129,38 @@ class Place(ArmSkill[PlaceInputs]):
         self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
         return rotation
 
-    def _go_near(self, surface: Surface) -> Routine[None]:
-        """Drive nearer when the surface is out of the arm's reach."""
-        spot = _nearest_spot(surface, self.X_WB())
+    def _find_spot(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[FloatArray]:
+        """Look, and bring the object over a free spot; where none is in reach, from before another one that was seen.
+
+        Gives the joint angles that the arm is to have there.
+        """
+        spot_W, gone_to = _nearest_spot(surface, self.X_WB()), list[FloatArray]()
+        while True:
+            view = yield from self._look(surface, spot_W)
+            try:
+                return (yield from self._go_above(surface, view, held))
+            except SkillFailure as failure:
+                others = roomiest_first(free_spots(view, spots(surface)), view, [*gone_to, spot_W])
+                if failure.cause is not Cause.PLANNING or len(others) == 0 or len(gone_to) >= self.options.moves:
+                    raise
+            gone_to.append(spot_W)
+            spot_W = others[0]
+            message = "carrying the object on along the surface"
+            yield from self.move_to(lambda scene, q: carry_configuration(scene, carried, q), message, speed_rad_s=0.9)
+            yield from self._go_before(spot_W, surface)
+
+    def _go_near(self, spot: FloatArray, surface: Surface) -> Routine[None]:
+        """Drive nearer when a spot is out of the arm's reach."""
         pose = self.context.pose()
         offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
         bearing = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
         if np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6:
             return
-        context = self.context
+        yield from self._go_before(spot, surface)
+
+    def _go_before(self, spot: FloatArray, surface: Surface) -> Routine[None]:
+        """Drive to where a spot is within the arm's reach."""
+        context, pose = self.context, self.context.pose()
         places = free_places((spot[0], spot[1]), pose, context.costmap, ArmFootprint(context).now())
         if not places:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")

@@ -59,6 +59,8 @@ class ForEachFound(MemoryComposite):
             self._restart()
         look, action = self.children
         if self._index == 0:
+            if look.status != Status.RUNNING:
+                self._reset_children()
             self.current_child = look
             yield from look.tick()
             if look.status == Status.SUCCESS and len(self._noted(self.done)) < self.limit:
@@ -105,9 +107,12 @@ class ForEachFound(MemoryComposite):
         else:
             self._next_round(f"looks again, since {why}")
 
-    def _next_round(self, said: str) -> None:
+    def _reset_children(self) -> None:
+        """Not in the tick in which the round before ended: its results are to be seen."""
         for child in self.children:
             child.stop(Status.INVALID)
+
+    def _next_round(self, said: str) -> None:
         self._index, self.status, self.cause, self.message = 0, Status.RUNNING, None, said
 
     def _nothing_left(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,14 +11,16 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
-from skills.approach.standing import COMFORTABLE_M, free_places
+from skills.approach.standing import COMFORTABLE_M, DISTANCES_M, free_places, reachable
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
+from skills.arm.kinematics import ArmModel
 from skills.arm.poses import carry_configuration, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.geometry import wrap
 from skills.grasp.candidates import hand_rotation
+from skills.grasp.planning import body_height_m
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
@@ -33,6 +35,9 @@ _SURELY_FREE_M = 0.03
 _PRESS_M = 0.03
 _SIDE_DROP_M, _LIFT_AGAIN_M = 0.12, 0.135
 _LEAST_BACK_M = 0.08
+_MARGIN_RAD = 0.05
+_DISTANCES_M = (DISTANCES_M, (0.76, 0.72, 0.68, 0.64))
+"""How far from a spot to stand; nearer than to grasp where what is held from above is put down high."""
 _LEVEL = 0.5
 _RELAX_M = 0.003
 _FEEL_S = 0.4
@@ -93,7 +98,17 @@ class Place(ArmSkill[PlaceInputs]):
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
         carried = self._carried()
         held = self._held(carried)
-        yield from self._go_near(_nearest_spot(surface, self.X_WB()), surface)
+        yield from self._go_near(_nearest_spot(surface, self.X_WB()), surface, held)
+        try:
+            yield from self._put_down(surface, held, carried)
+        except SkillFailure:
+            yield from self._stand_as_usual()
+            raise
+        yield from self._stand_as_usual()
+        return Succeeded(f"put the object down on the {surface.name}")
+
+    def _put_down(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[None]:
+        """Find a spot, lower the object, let go, check, stow."""
         q_above_rad = yield from self._find_spot(surface, held, carried)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
@@ -101,7 +116,9 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self._let_go()
         yield from self._check(surface, spot_W)
         yield from self.stow()
-        return Succeeded(f"put the object down on the {surface.name}")
+
+    def _stand_as_usual(self) -> Routine[None]:
+        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
 
     def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
         """With an empty gripper: draw the hand back, and look whether the object stands where it was to be put."""
@@ -120,6 +137,7 @@ class Place(ArmSkill[PlaceInputs]):
             yield from self._let_go()
         yield from self._check(surface, spot_W[:2])
         yield from self.stow()
+        yield from self._stand_as_usual()
         return Succeeded(f"the object stood on the {surface.name} already")
 
     def _carried(self) -> RotationMatrix:
@@ -136,6 +154,7 @@ class Place(ArmSkill[PlaceInputs]):
         """
         spot_W, gone_to = _nearest_spot(surface, self.X_WB()), list[FloatArray]()
         while True:
+            yield from self.stand_at(self._height_m(surface), f"standing up to the {surface.name}")
             view = yield from self._look(surface, spot_W)
             try:
                 return (yield from self._go_above(surface, view, held))
@@ -147,24 +166,43 @@ class Place(ArmSkill[PlaceInputs]):
             spot_W = others[0]
             message = "carrying the object on along the surface"
             yield from self.move_to(lambda scene, q: carry_configuration(scene, carried, q), message, speed_rad_s=0.9)
-            yield from self._go_before(spot_W, surface)
+            yield from self._stand_as_usual()
+            yield from self._go_before(spot_W, surface, held)
 
-    def _go_near(self, spot: FloatArray, surface: Surface) -> Routine[None]:
+    def _height_m(self, surface: Surface) -> float:
+        """How high the body stands to put something down."""
+        return body_height_m(surface.height_m, self.context.robot.capabilities())
+
+    def _go_near(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Routine[None]:
         """Drive nearer when a spot is out of the arm's reach."""
         pose = self.context.pose()
         offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
         bearing = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
-        if np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6:
+        comfortable = np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6
+        if comfortable and self._reach_cost(spot, surface, held)(pose) is not None:
             return
-        yield from self._go_before(spot, surface)
+        yield from self._go_before(spot, surface, held)
 
-    def _go_before(self, spot: FloatArray, surface: Surface) -> Routine[None]:
-        """Drive to where a spot is within the arm's reach."""
-        context, pose = self.context, self.context.pose()
-        places = free_places((spot[0], spot[1]), pose, context.costmap, ArmFootprint(context).now())
+    def _go_before(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Routine[None]:
+        """Drive to where a spot is within the arm's reach, or as near as may be."""
+        context, pose, point_W = self.context, self.context.pose(), (float(spot[0]), float(spot[1]))
+        footprint, reach_cost = ArmFootprint(context).now(), self._reach_cost(spot, surface, held)
+        free = [free_places(point_W, pose, context.costmap, footprint, each) for each in _DISTANCES_M]
+        places = next((near for each in free if (near := reachable(each, reach_cost))), free[0])
         if not places:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
         yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))
+
+    def _reach_cost(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Callable[[Pose2D], float | None]:
+        """Of a pose of the body: 0 where the arm brings the object over a spot and down, None where it does not."""
+        model, height_m = self.model, self._height_m(surface)
+        p_WT = np.array([spot[0], spot[1], surface.height_m])
+
+        def cost(pose: Pose2D) -> float | None:
+            p_BT = pose.transform(height_m).inverse() @ p_WT
+            return 0.0 if any(_reaches(model, X_BH) for X_BH in held.above(p_BT, model.p_BS)) else None
+
+        return cost
 
     def _look(self, surface: Surface, spot_W: FloatArray) -> Routine[SurfaceView]:
         """A picture of the surface; the object in the gripper hides its lower half, so the camera looks low."""
@@ -301,6 +339,15 @@ class HeldObject:
         return [RotationMatrix.MakeZRotation(ahead + turn) @ self.R_BH for turn in turns]
 
 
+    def above(self, p_BT: FloatArray, p_BS: FloatArray) -> Iterator[RigidTransform]:
+        """Poses of the hand with the object over a point of a surface, as it stood; p_BS is the shoulder."""
+        azimuth = math.atan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0])
+        for rotation in self.rotations(azimuth):
+            middle = rotation @ self.p_HO
+            p_BH = np.array([*(p_BT - middle)[:2], p_BT[2] + ABOVE_M + self.drop_m(rotation)])
+            yield RigidTransform(rotation, p_BH)
+
+
 @dataclass(frozen=True)
 class Release:
     """How the hand lets go: what stands beside, as boxes (B), and how far the gripper is open then (rad)."""
@@ -320,16 +367,19 @@ def above_goal(
     def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
         """Arm angles above the first spot that can be reached and gone down to. Raises PlanningError."""
         for p_BT in on_top_B:
-            azimuth = math.atan2(p_BT[1] - scene.model.p_BS[1], p_BT[0] - scene.model.p_BS[0])
-            for rotation in held.rotations(azimuth):
-                middle = rotation @ held.p_HO
-                p_BH = np.array([*(p_BT - middle)[:2], p_BT[2] + ABOVE_M + held.drop_m(rotation)])
-                for q_above in scene.model.inverse(RigidTransform(rotation, p_BH), margin_rad=0.05):
+            for X_BH in held.above(p_BT, scene.model.p_BS):
+                for q_above in scene.model.inverse(X_BH, margin_rad=_MARGIN_RAD):
                     if scene.free(q_above) and _can_put_down(scene, q_above, planner, release):
                         return q_above
         raise PlanningError("no free spot is within the arm's reach")
 
     return goal
+
+
+def _reaches(model: ArmModel, X_BH: RigidTransform) -> bool:
+    """Whether the arm reaches a pose of the hand and the one below at which the object stands."""
+    lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M])
+    return bool(model.inverse(X_BH, margin_rad=_MARGIN_RAD) and model.inverse(lowered, margin_rad=_MARGIN_RAD))
 
 
 def _can_put_down(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner, release: Release) -> bool:

@@ -63,7 +63,7 @@ def _unlabelled(view: SurfaceView, labelled: Sequence[Detection3D], p_WC: FloatA
     return (cluster for cluster in view.clusters if id(cluster) not in named)
 
 
-def _stands_on(cluster: Cluster, outline_W: Sequence[tuple[float, float]]) -> bool:
+def _stands_on(cluster: Cluster, outline_W: tuple[tuple[float, float], ...]) -> bool:
     centre = np.array([cluster.shape.centre])
     return cluster.shape.length_m < _LONGEST_M and bool(inside_polygon(centre, outline_W, -_RIM_M)[0])
 

@@ -26,7 +26,7 @@ _CONVEX, _MORE_CONVEX = 0.87, 0.03
 
 
 def touching_parts(xy: FloatArray) -> tuple[Labels, int]:
-    """The objects among points (N, 2) that hang together, seen from above: the label of each point, and their number."""
+    """The objects among points (N, 2) that hang together from above: the label of each point, and their number."""
     cells = np.floor((xy - xy.min(axis=0)) / _CELL_M).astype(np.int64) + _BORDER
     outline = np.zeros(cells.max(axis=0) + _BORDER + 1, dtype=np.uint8)
     outline[cells[:, 0], cells[:, 1]] = 1

@@ -2,8 +2,8 @@
 
 A detection belongs to the track that it fits by place (Mahalanobis distance) and class; places are fused as information
 (inverse covariances add). A track that a picture should show and that is not detected there loses belief. What is seen
-faintly begins no track, but supports a little one that a surer one began. A segment without a label (`THING`) says where
-an object is and nothing about its class.
+faintly begins no track, but supports a little one that a surer one began. A segment without a label (`THING`) says
+where an object is, and nothing about its class.
 """
 
 from __future__ import annotations

@@ -338,7 +338,6 @@ class HeldObject:
         turns = (0.0, 0.4, -0.4) if level else tuple(k * math.pi / 4 for k in range(8))
         return [RotationMatrix.MakeZRotation(ahead + turn) @ self.R_BH for turn in turns]
 
-
     def above(self, p_BT: FloatArray, p_BS: FloatArray) -> Iterator[RigidTransform]:
         """Poses of the hand with the object over a point of a surface, as it stood; p_BS is the shoulder."""
         azimuth = math.atan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0])

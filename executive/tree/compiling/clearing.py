@@ -1,4 +1,4 @@
-"""Clearing a place: everything that stands there is taken elsewhere, one object after the other, until nothing is left."""
+"""Clearing a place: all that stands there is taken elsewhere, one object after the other, until nothing is left."""
 
 from __future__ import annotations
 

@@ -36,6 +36,7 @@ _PRESS_M = 0.03
 _SIDE_DROP_M, _LIFT_AGAIN_M = 0.12, 0.135
 _LEAST_BACK_M = 0.08
 _MARGIN_RAD = 0.05
+_MOST_SPOTS = 80
 _DISTANCES_M = (DISTANCES_M, (0.76, 0.72, 0.68, 0.64))
 """How far from a spot to stand; nearer than to grasp where what is held from above is put down high."""
 _LEVEL = 0.5
@@ -188,7 +189,12 @@ class Place(ArmSkill[PlaceInputs]):
         context, pose, point_W = self.context, self.context.pose(), (float(spot[0]), float(spot[1]))
         footprint, reach_cost = ArmFootprint(context).now(), self._reach_cost(spot, surface, held)
         free = [free_places(point_W, pose, context.costmap, footprint, each) for each in _DISTANCES_M]
-        places = next((near for each in free if (near := reachable(each, reach_cost))), free[0])
+        places = yield from self.compute(
+            lambda: next((near for each in free if (near := reachable(each, reach_cost))), free[0]),
+            latency_s=0.2,
+            name="choose a place",
+            message=f"choosing where to stand at the {surface.name}",
+        )
         if not places:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
         yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))
@@ -234,7 +240,8 @@ class Place(ArmSkill[PlaceInputs]):
         if len(free) == 0:
             raise SkillFailure(Cause.PLANNING, f"no free spot is seen on the {surface.name}")
         X_BW = X_WB.inverse()
-        on_top = [X_BW @ np.array([x, y, view.plane.height_m]) for x, y in _by_distance(free, X_WB)]
+        near = _by_distance(free, X_WB)[:_MOST_SPOTS]
+        on_top = [X_BW @ np.array([x, y, view.plane.height_m]) for x, y in near]
         beside = cluster_boxes(view.clusters, X_WB)
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
         letting_go = Release(beside, self._release_rad())

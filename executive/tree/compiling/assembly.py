@@ -135,7 +135,7 @@ class _Assembler:
         return made
 
     def _group(self, items: Sequence[_Item], base: str) -> Assembled:
-        """The subtrees of items in a row; commands to get and bring several objects become trips, all of them rounds."""
+        """The subtrees of items in a row; those that get and bring several objects are trips, all of them rounds."""
         made, problems, done = Assembled(), Problems(), 0
         for item, after in zip(items, (*items[1:], None), strict=True):
             if item.number <= done:

@@ -34,7 +34,8 @@ ABOVE_M = 0.10
 _SURELY_FREE_M = 0.03
 _PRESS_M = 0.03
 _SIDE_DROP_M, _LIFT_AGAIN_M = 0.12, 0.135
-_LEAST_BACK_M = 0.08
+_LEAST_BACK_M, _BACK_M = 0.08, (0.16, 0.12, 0.08, 0.05)
+"""How far the hand is drawn back, the best first; a spot counts only where the hand gets back by the former."""
 _MARGIN_RAD = 0.05
 _MOST_SPOTS = 80
 _DISTANCES_M = (DISTANCES_M, (0.76, 0.72, 0.68, 0.64))
@@ -286,8 +287,11 @@ class Place(ArmSkill[PlaceInputs]):
         if abs(closing[2]) < _LEVEL:
             aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
             yield from self.try_shift_hand(aside, "letting go")
-        if not (yield from self.try_shift_hand(-0.16 * fingers, "drawing the hand back")):
-            yield from self.shift_hand(-_LEAST_BACK_M * fingers, "drawing the hand back")
+        up_B = np.array([0.0, 0.0, 1.0])
+        for way_B in (*(-back_m * fingers for back_m in _BACK_M), *(back_m * up_B for back_m in _BACK_M)):
+            if (yield from self.try_shift_hand(way_B, "drawing the hand back")):
+                return
+        raise SkillFailure(Cause.PLANNING, "the hand cannot be drawn back from the object")
 
     def _release_rad(self) -> float:
         """How far the gripper opens to let go of what it holds."""

@@ -142,27 +142,23 @@ class _Assembler:
                 continue
             following = None if after is None else after.command
             with problems:
-                pair = None if following is None else self._pair(item, following, base)
-                done = done if pair is None else item.number + 1
-                made += pair or self._item(item, following, base)
+                if item.command is not None and following is not None and _go_together(item.command, following):
+                    done = item.number + 1
+                    made += self._pair(item, item.command, following, base)
+                else:
+                    made += self._item(item, following, base)
         problems.raise_any()
         return made
 
-    def _pair(self, item: _Item, bring: Command, base: str) -> Assembled | None:
-        """The one subtree of two commands that get and bring several objects, or all; None for others."""
-        get = item.command
-        if get is None:
-            return None
+    def _pair(self, item: _Item, get: Command, bring: Command, base: str) -> Assembled:
+        """The one subtree of two commands that get and bring several objects, or all."""
         builder = self._command_builder(item, base)
         goals: tuple[GoalCondition | None, ...]
-        if are_trips(get, bring):
+        if is_clearing(get, bring):
+            node, goals = clear_plan(builder, bring), clearing_goals(get, bring, self.knowledge)
+        else:
             node = trips_plan(builder, bring)
             goals = (command_goal(get, self.knowledge), command_goal(bring, self.knowledge))
-        elif is_clearing(get, bring):
-            node = clear_plan(builder, bring)
-            goals = clearing_goals(get, bring, self.knowledge)
-        else:
-            return None
         self.held = None
         parts = (StepPart(node.path_id, each, goal=goal) for each, goal in zip((get, bring), goals, strict=True))
         return Assembled((node,), tuple(parts))
@@ -211,6 +207,11 @@ class _Assembler:
             raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
         builder = self.builder(f"{base}/{item.number}-{step_name(command)}", item.step.source)
         return replace(builder, command=command, anywhere=item.step.elsewhere)
+
+
+def _go_together(get: Command, bring: Command) -> bool:
+    """Whether two commands in a row are one: trips for several objects, or rounds for all."""
+    return are_trips(get, bring) or is_clearing(get, bring)
 
 
 def _groups(steps: Sequence[MissionStep]) -> Iterator[tuple[tuple[_Item, ...], StepPolicy]]:

@@ -9,7 +9,7 @@ from executive.mission.command import START, Command, Task, Thing
 from executive.mission.knowledge import EVERYTHING
 from executive.tree.behaviours.board import FromBoardOr
 from executive.tree.compiling.builder import PlanBuilder
-from executive.tree.compiling.handling import pick_up_plan, tuck_plan
+from executive.tree.compiling.handling import pick_up_plan, tidied, tuck_plan
 from executive.tree.compiling.search import detect_plan, look_plans, required_surfaces, where
 from executive.tree.compiling.steps import put_down_plan
 from executive.tree.node import NodeSpec
@@ -51,7 +51,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     again = detect_plan(builder.at("find"), thing, surfaces, key, extra)
     around = tuple(map(builder.surface, surfaces))
     carry = replace(builder.at("bring"), command=bring)
-    put, _ = put_down_plan(carry, thing, to)
+    put = tidied(carry.at("tidy"), put_down_plan(carry, thing, to)[0], only_after_failure=True)
     move = builder.at("move").sequence(
         "move it", pick_up_plan(builder, thing, again, key, around, seen=True), tuck_plan(builder), put
     )

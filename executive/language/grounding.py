@@ -21,7 +21,7 @@ from executive.language.roles import HERE, Location
 from executive.language.similar import WordFacts, look_alikes, synonyms_of, words_for
 from executive.mission.command import Command, Task, Thing
 from executive.mission.errors import known_names, listing
-from executive.mission.knowledge import ANYBODY, ANYTHING, Knowledge
+from executive.mission.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
 
 __all__ = ["ABLE", "Grounded", "check_unwanted", "ground", "ground_noted", "known_line"]
 
@@ -104,12 +104,14 @@ class _Grounder:
 
     def command(self, frame: CommandFrame) -> Command:
         """One frame as a command."""
-        item = None if frame.item is None else self.thing(frame.item)
+        item = None if frame.item is None else self.taken(frame.item)
         target = None if frame.object is None else self.target(frame.object, frame.task)
         if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
             raise RefusalError(f"which object? Known are {listing(self.knowledge.thing_names())}", [target.name])
         people = target is not None and frame.task is Task.FIND and self.knowledge.somebody(target.name) is not None
         goal, goal_at = (None, None) if frame.goal is None else self._kept_goal(frame, frame.goal, people)
+        if goal is None and target is not None and target.name == EVERYTHING:
+            raise RefusalError("everything from where? Name the surface or the room", [target.name])
         if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
             goal = self.knowledge.default_place(frame.task, target.name)
         return Command(
@@ -118,8 +120,8 @@ class _Grounder:
             goal_at=goal_at,
             task=frame.task,
             object=target,
-            item_count=1 if frame.item is None else frame.item.count,
-            object_count=1 if frame.object is None else frame.object.count,
+            item_count=_count(frame.item, item),
+            object_count=_count(frame.object, target),
             verb=frame.verb,
         )
 
@@ -127,7 +129,14 @@ class _Grounder:
         """What a task is done to: a known thing, or a time."""
         if task is Task.FIND and (person := self._sought(phrase)) is not None:
             return Thing(person)
-        return Thing(phrase.head.lemma) if task is Task.WAIT else self.thing(phrase)
+        if task is Task.WAIT:
+            return Thing(phrase.head.lemma)
+        return self.thing(phrase) if task is Task.FIND else self.taken(phrase)
+
+    def taken(self, phrase: Phrase) -> Thing:
+        """The known thing or category; "all the things", whatever they are, is everything."""
+        thing = self.thing(phrase)
+        return replace(thing, name=EVERYTHING) if thing.name == ANYTHING and phrase.count == 0 else thing
 
     def _sought(self, phrase: Phrase) -> str | None:
         """Who is looked for, a known person or anybody; None where it is a thing.
@@ -282,6 +291,11 @@ class _Grounder:
         if candidates:
             return _asking(perhaps(slot, heard, candidates))
         return RefusalError(f"I know no {slot.value} {heard!r}; {known_names(heard, known.values())}", [heard])
+
+
+def _count(phrase: Phrase | None, thing: Thing | None) -> int:
+    """How many are meant; everything is one thing to take."""
+    return 1 if phrase is None or thing is None or thing.name == EVERYTHING else phrase.count
 
 
 def _asking(question: ClarifyingQuestion) -> RefusalError:

@@ -11,7 +11,16 @@ from typing import Final
 from executive.mission.command import START, Command, Task, Thing
 from executive.mission.knowledge import ANYBODY, Knowledge, Pose
 
-__all__ = ["Area", "GoalCondition", "GoalKind", "command_goal", "drive_goal", "surface_area", "surfaces_to_search"]
+__all__ = [
+    "Area",
+    "GoalCondition",
+    "GoalKind",
+    "clearing_goals",
+    "command_goal",
+    "drive_goal",
+    "surface_area",
+    "surfaces_to_search",
+]
 
 BELOW_TOP_M: Final = 0.05
 ABOVE_TOP_M: Final = 0.30
@@ -27,6 +36,7 @@ class GoalKind(enum.Enum):
     PLACED = "placed"  # resting in a goal area, let go
     WENT = "went"  # the robot in a goal area
     ANSWERED = "answered"  # the answer is what is true of the source areas
+    CLEARED = "cleared"  # nothing rests in the source areas; with goal areas, all that did rests there
 
 
 @dataclass(frozen=True)
@@ -59,6 +69,15 @@ def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str
     Waiting where the robot stands has none.
     """
     return _GOALS[command.task](command, knowledge, tuple(elsewhere))
+
+
+def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[GoalCondition, GoalCondition]:
+    """The conditions of two commands to take everything from a place to another: nothing is left, and all is there."""
+    source = _areas(get, knowledge, ())
+    place = None if bring.goal is None else knowledge.place(bring.goal)
+    assert place is not None
+    goal = tuple(surface_area(knowledge, name) for name in knowledge.surfaces_in(place))
+    return GoalCondition(GoalKind.CLEARED, source=source), GoalCondition(GoalKind.CLEARED, source=source, goal=goal)
 
 
 def drive_goal(pose: Pose) -> GoalCondition:

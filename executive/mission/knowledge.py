@@ -11,12 +11,13 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from executive.mission.command import Task
 from executive.mission.errors import InputError, suggestion
 from executive.mission.yaml_source import Name, YamlSource, read_yaml, validate
-from skills.perception.class_forms import PERSON, class_forms
+from skills.perception.class_forms import PERSON, THING, class_forms
 from skills.quantities import Angle, Coordinate
 
 __all__ = [
     "ANYBODY",
     "ANYTHING",
+    "EVERYTHING",
     "BatteryFacts",
     "Door",
     "Knowledge",
@@ -32,9 +33,14 @@ __all__ = [
 
 ANYTHING: Final = "object"
 """The name that stands for every class of objects."""
+EVERYTHING: Final = "everything"
+"""The name that stands for all objects at a place, whatever they are."""
 ANYBODY: Final = PERSON
 """The name that stands for any person at all."""
-_ANYTHING: Final = frozenset({ANYTHING, "thing", "item"})
+_UNNAMED: Final = {
+    **dict.fromkeys((ANYTHING, THING, "item", "anything", "something"), ANYTHING),
+    EVERYTHING: EVERYTHING,
+}
 Corner = tuple[Coordinate, Coordinate]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 
@@ -151,12 +157,12 @@ class Knowledge(_Facts):
     def thing(self, name: str) -> str | None:
         """The class or category that `name` means, by its own name; None when unknown."""
         own = _resolve(name, self.things) or next((c for c in self.categories() if c.lower() == name.lower()), None)
-        return own or (ANYTHING if name.lower() in _ANYTHING else None)
+        return own or _UNNAMED.get(name.lower())
 
     def classes(self, name: str) -> tuple[str, ...]:
         """The classes that a class, alias or category stands for, in the file's order; empty when unknown."""
         known = _resolve(name, self.things)
-        if known is None and self.thing(name) == ANYTHING:
+        if known is None and self.thing(name) in _UNNAMED:
             return tuple(self.things)
         return (known,) if known else tuple(c for c, facts in self.things.items() if name.lower() in facts.categories)
 

@@ -30,6 +30,7 @@ from skills.api import Cause, Failed, Running, Skill, SkillContext, Step
 
 BEFORE: Final = "before the restart"
 _CONDITIONAL: Final = frozenset({"only if known", "only if holding"})
+_FORGETTING: Final = frozenset({"recover", "for each found"})
 _DECLARED: Final = tuple(name for name, hint in Skill.__annotations__.items() if str(hint).startswith("ClassVar"))
 
 
@@ -85,7 +86,7 @@ class _Change:
             return self._skill(spec)
         if spec.kind in _CONDITIONAL and self._was_reached(path):
             self.made[path] = lambda node: _applies_as_before(node, self._begun(path))
-        elif spec.kind == "recover" and step is not None and step.status is Status.RUNNING:
+        elif spec.kind in _FORGETTING and step is not None and step.status is Status.RUNNING:
             return _with_options(spec, forgets=())
         elif step is None or not step.ended:
             return spec

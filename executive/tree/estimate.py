@@ -24,6 +24,8 @@ __all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "e
 Positive = Annotated[float, Field(gt=0.0)]
 NAVIGATE: Final = "navigate"
 CHARGE: Final = "charge"
+USUALLY_FOUND: Final = 3
+"""How many objects a look usually finds, one after the other; how many there are is not known before."""
 
 
 class _Data(BaseModel):
@@ -234,5 +236,6 @@ _EXPECTED: Final[Mapping[str, Callable[[NodeSpec], tuple[NodeSpec, ...]]]] = {
     "go back": lambda node: node.children[:1],
     "afterwards": lambda node: node.children[:1] if node.options["only_after_failure"] else node.children,
     "interrupts": lambda node: node.children[-1:],
+    "for each found": lambda node: node.children * USUALLY_FOUND,
     "only if holding": lambda node: (),
 }

@@ -17,6 +17,7 @@ from executive.tree.behaviours import (
     leaves,
     policies,
     recovery,
+    rounds,
     skill_leaf,
 )
 from executive.tree.behaviours.context import RunContext
@@ -27,7 +28,7 @@ __all__ = ["KINDS", "Changes", "build", "writes"]
 Changes = Mapping[str, Callable[[Any], object]]
 """By path id, what is done to a node once it is built."""
 
-_HOMES: Final = (answer, composites, decorators, fallen, interrupts, leaves, policies, recovery, skill_leaf)
+_HOMES: Final = (answer, composites, decorators, fallen, interrupts, leaves, policies, recovery, rounds, skill_leaf)
 KINDS: Final[Mapping[str, NodeKind]] = {name: k for home in _HOMES for name, k in home.KINDS.items()}
 _NO_CHANGES: Final[Changes] = MappingProxyType({})
 

@@ -179,12 +179,35 @@ def _judge_answered(condition: GoalCondition, truth: Truth, past: bool) -> Findi
     return Finding(condition.answer is fact, f"the answer was {said}, and {found}.")
 
 
+def _judge_cleared(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
+    """All that rested in the source rests in the goal; without a goal, no longer in the source."""
+    source, there = condition.source, [one for one in truth.histories if _began_in(one, condition.source)]
+    if not there:
+        return Finding(True, f"nothing stood on {_where(source)}.")
+    if not condition.goal:
+        left = [one for one in there if _region_at(source, one.last.p_WO) is not None and not (past and one.lifts)]
+        told = f"{_names(left)} {'is' if len(left) == 1 else 'are'}" if left else "nothing is"
+        return Finding(not left, f"{told} left on {_where(source)}.")
+    missing = [one for one in there if _rest_in(one, condition, past) is None]
+    if not missing:
+        return Finding(True, f"{_names(there)} {'stands' if len(there) == 1 else 'stand'} on {_where(condition.goal)}.")
+    return Finding(
+        False, f"{_names(missing)} {'does' if len(missing) == 1 else 'do'} not stand on {_where(condition.goal)}."
+    )
+
+
+def _began_in(history: ObjectHistory, regions: Sequence[Region]) -> bool:
+    """Whether it ever rested in one of the regions."""
+    return any(_region_at(regions, p) is not None for p in (*history.rests_W, history.last.p_WO))
+
+
 _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth, bool], Finding]] = {
     GoalKind.GRASPED: _judge_grasped,
     GoalKind.HANDED_OVER: _judge_handed_over,
     GoalKind.PLACED: _judge_placed,
     GoalKind.WENT: _judge_went,
     GoalKind.ANSWERED: _judge_answered,
+    GoalKind.CLEARED: _judge_cleared,
 }
 
 

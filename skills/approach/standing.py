@@ -41,10 +41,16 @@ def is_comfortable(pose: Pose2D, point_W: tuple[float, float]) -> bool:
     return COMFORTABLE_M[0] <= math.hypot(dx, dy) <= COMFORTABLE_M[1] and abs(bearing) < COMFORTABLE_BEARING_RAD
 
 
-def free_places(point_W: tuple[float, float], here: Pose2D, costmap: Costmap, footprint: Footprint) -> list[Standing]:
+def free_places(
+    point_W: tuple[float, float],
+    here: Pose2D,
+    costmap: Costmap,
+    footprint: Footprint,
+    distances_m: Sequence[float] = DISTANCES_M,
+) -> list[Standing]:
     """Free poses around point_W that face it, the cheapest first."""
     found = []
-    for k, distance in itertools.product(range(BEARINGS), DISTANCES_M):
+    for k, distance in itertools.product(range(BEARINGS), distances_m):
         yaw = 2 * math.pi * k / BEARINGS
         pose = Pose2D(point_W[0] - distance * math.cos(yaw), point_W[1] - distance * math.sin(yaw), yaw)
         if footprint_clear(costmap, footprint, pose):

@@ -94,7 +94,7 @@ def _track(track: Track) -> Message:
     return {
         "number": track.number,
         "class_name": track.class_name,
-        "class_belief": round(track.classes[track.class_name], 3),
+        "class_belief": round(track.class_belief, 3),
         "belief": round(track.belief, 3),
         "views": track.views,
         "missed": track.missed,

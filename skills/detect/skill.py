@@ -10,7 +10,17 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import FLOOR, Cause, Detection, LocalisationEstimate, ObjectObservation, Running, Succeeded, Surface
+from skills.api import (
+    FLOOR,
+    Cause,
+    Detection,
+    LocalisationEstimate,
+    ObjectObservation,
+    Running,
+    Succeeded,
+    Surface,
+    Thing,
+)
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene
 from skills.arm.poses import close_viewpoints, look_configuration, overview_viewpoints, viewpoints_beside
@@ -22,12 +32,12 @@ from skills.detect.messages import (
     object_to_detect_message,
     tracks_message,
 )
-from skills.detect.unidentified import unnamed
+from skills.detect.unidentified import most_free_first, segments_3d, unnamed
 from skills.detect.viewpoints import in_plain_view, look_targets, surface_boxes
 from skills.detect.words import counted, describe, surface_names, wanted
 from skills.geometry import wrap
 from skills.perception.attributes import known_attributes, shows
-from skills.perception.class_forms import class_forms
+from skills.perception.class_forms import THING, class_forms
 from skills.perception.coverage import Coverage
 from skills.perception.detection_3d import Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in, is_dark
@@ -38,11 +48,15 @@ from skills.robot import FloatArray, Image
 
 _LEAST_SEEN = 0.02
 _LOOKED_AT_M = 0.08
+_AVOIDED_M = 0.08
 
 
 @dataclass(frozen=True)
 class DetectInputs:
     """What to look for (any of `classes`, with all `attributes`) and on which surfaces.
+
+    The class "thing" is any object that stands there, whether the detector has a class for it or not; those where
+    one of `avoid` was seen are the last choice.
 
     The search ends with the first `count` objects; a count of 0 searches all surfaces and counts all objects. With
     `expected_W` it searches that place only, and only objects within 0.35 m of it count. With `floor`, objects on the
@@ -55,6 +69,7 @@ class DetectInputs:
     expected_W: tuple[Coordinate, Coordinate, Height] | None = None
     count: Tries = 1
     floor: bool = False
+    avoid: tuple[ObjectObservation, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -136,7 +151,7 @@ class Detect(ArmSkill[DetectInputs]):
 
     def _check(self, inputs: DetectInputs) -> None:
         """Raise SkillFailure with cause PRECONDITION for what cannot be looked for."""
-        knows = set(self.context.detector.class_names) & set(class_forms())
+        knows = set(self.context.detector.class_names) & set(class_forms()) | {THING}
         unknown = [name for name in inputs.classes if name not in knows]
         unknown += [word for word in inputs.attributes if word.lower() not in known_attributes()]
         if unknown:
@@ -160,6 +175,8 @@ class Detect(ArmSkill[DetectInputs]):
             if not self._has_enough(inputs):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
                 yield from self._look_and_confirm(inputs, p_BT, [], close=True)
+            return
+        if THING in inputs.classes:
             return
         for _ in range(self.options.closer_looks):
             left = unnamed(self._clusters, self._tracker.snapshot(), inputs.classes)
@@ -258,18 +275,27 @@ class Detect(ArmSkill[DetectInputs]):
         if self._has_enough(inputs) or len(self._tried) > self.options.candidates + inputs.count:
             return None
         shifts = len(self.options.confirm_shifts_rad)
-        open_ones = (t for t in self._matching(inputs) if not t.confirmed)
+        open_ones = (t for t in self._matching(inputs) if not _is_sure(inputs, t))
         return next((t for t in open_ones if self._tried.get(t.number, 0) < _tries_for(t, shifts)), None)
 
     def _found(self, inputs: DetectInputs) -> list[Track]:
-        """The confirmed ones, those seen last first."""
-        confirmed = [track for track in self._matching(inputs) if track.confirmed]
-        return sorted(confirmed, key=lambda track: -track.last_seen_s) if inputs.expected_W is None else confirmed
+        """The confirmed ones, those seen last first; of any objects, those first that are to be taken first."""
+        confirmed = [track for track in self._matching(inputs) if _is_sure(inputs, track)]
+        if inputs.expected_W is not None or THING in inputs.classes:
+            return confirmed
+        return sorted(confirmed, key=lambda track: -track.last_seen_s)
 
     def _matching(self, inputs: DetectInputs) -> list[Track]:
-        """The tracks that are of the classes, show the attributes and lie in the right place; the likeliest first."""
-        tracks = [t for t in self._tracker.snapshot() if t.class_name in inputs.classes and self._in_place(inputs, t)]
+        """The tracks that are of the classes, show the attributes and lie in the right place; the likeliest first.
+
+        Of any objects, the nearest and most free ones first.
+        """
+        tracks = [t for t in self._tracker.snapshot() if _is_wanted(inputs, t) and self._in_place(inputs, t)]
         fitting = [t for t in tracks if all(shows(t.best, word) for word in inputs.attributes)]
+        if inputs.expected_W is None and THING in inputs.classes:
+            free = most_free_first(fitting, self.X_WB().translation())
+            places = [np.array(each.position_W) for each in inputs.avoid]
+            return sorted(free, key=lambda t: any(_apart(t.position_W, p) < _AVOIDED_M for p in places))
         if inputs.expected_W is None:
             return sorted(fitting, key=lambda t: -t.belief * t.best.detection.score)
         off = {t.number: _apart(t.position_W, inputs.expected_W) for t in fitting}
@@ -302,9 +328,11 @@ class Detect(ArmSkill[DetectInputs]):
 
         def examine() -> Look:
             found = detections_in(detector, image, FAINT_SCORE)
-            views = view_surfaces(image, place.X_WO, inputs.surfaces)
-            clusters = tuple(cluster for view in views if view is not None for cluster in view.clusters)
-            return Look(image, place, found, detections_3d(image, place, found, inputs.surfaces), clusters)
+            placed = detections_3d(image, place, found, inputs.surfaces)
+            views = [view for view in view_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
+            if THING in inputs.classes:
+                placed += segments_3d(image, place, views, placed, inputs.surfaces)
+            return Look(image, place, found, placed, tuple(each for view in views for each in view.clusters))
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
         self._take_in(look)
@@ -323,7 +351,7 @@ class Detect(ArmSkill[DetectInputs]):
 
     def _ended(self, inputs: DetectInputs, blocked: Sequence[SkillFailure]) -> Routine[Succeeded]:
         """The answer. Raises SkillFailure when there is none, or not enough."""
-        found = [_observed(track, inputs.attributes) for track in self._found(inputs)]
+        found = [_observed(track, inputs.attributes) for track in self._answered(inputs)]
         if found and len(found) >= inputs.count:
             look = self._last
             for seen in found:
@@ -335,6 +363,13 @@ class Detect(ArmSkill[DetectInputs]):
         if blocked:
             raise blocked[0]
         raise self._nothing(inputs, found)
+
+    def _answered(self, inputs: DetectInputs) -> list[Track]:
+        """The confirmed ones; of any objects, those first that were seen just now, since an answer rests on that."""
+        now_s, found = self.context.clock.now(), self._found(inputs)
+        if inputs.expected_W is not None or THING not in inputs.classes:
+            return found
+        return sorted(found, key=lambda track: now_s - track.last_seen_s > self.options.fresh_s)
 
     def _nothing(self, inputs: DetectInputs, found: Sequence[ObjectObservation]) -> SkillFailure:
         """What to say when not enough was found: how much was seen of which surface."""
@@ -350,9 +385,19 @@ class Detect(ArmSkill[DetectInputs]):
         return SkillFailure(Cause.POSTCONDITION, f"no {what} seen on {names} from here ({seen})")
 
 
+def _is_wanted(inputs: DetectInputs, track: Track) -> bool:
+    return THING in inputs.classes or track.class_name in inputs.classes
+
+
+def _is_sure(inputs: DetectInputs, track: Track) -> bool:
+    """Whether nothing more is to be seen of a track: for any object, its class does not matter."""
+    return track.stands if THING in inputs.classes else track.confirmed
+
+
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
-    """A track as an observation: its fused place, the rest from its last detection."""
-    return observation(replace(track.latest, position_W=track.position_W), attributes)
+    """A track as an observation: its fused place, the rest from its last detection; a `THING` without a sure class."""
+    seen = observation(replace(track.latest, position_W=track.position_W), attributes)
+    return seen if track.confirmed else replace(seen, thing=Thing(THING, attributes))
 
 
 def _tries_for(track: Track, shifts: int) -> int:

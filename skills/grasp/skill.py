@@ -21,9 +21,11 @@ from skills.grasp.candidates import THIN_M, GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, space_about
+from skills.perception.class_forms import THING
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
-from skills.perception.surface_segmentation import Cluster, SurfaceView, cluster_of, parted, view_surface
+from skills.perception.point_cloud import camera_pose_W
+from skills.perception.surface_segmentation import Cluster, SurfaceView, apart, cluster_of, parted, view_surface
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import FloatArray, Image
 
@@ -263,8 +265,8 @@ class Grasp(ArmSkill[GraspInputs]):
 
         def examine() -> CloseView | None:
             found = detections_in(detector, image)
-            same_class = [each for each in found if each.class_name == seen.thing.name]
-            placed = detections_3d(image, place, same_class, [surface])
+            named = [each for each in found if seen.thing.name in (THING, each.class_name)]
+            placed = detections_3d(image, place, named, [surface])
             return _examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
 
         return (yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message))
@@ -442,6 +444,8 @@ def _examine(
     if view is None:
         return None
     view = reduce(parted, found, view)
+    if seen.thing.name == THING:
+        view, found = apart(view, camera_pose_W(image, place.X_WO).translation()), ()
     cluster = _same_thing(view, seen, found, within_m)
     if cluster is None:
         return None

@@ -65,11 +65,11 @@ def shows(detected: Detection3D, attribute: str) -> bool:
     """Whether an attribute fits. Raises KeyError for an unknown word."""
     word = attribute.lower()
     if word in _BIGGER:
-        return _is_big(detected) == _BIGGER[word]
+        return _is_big(detected) is _BIGGER[word]
     return len(detected.colours) > 0 and colour_words()[word].share(detected.colours) > _LEAST_SHARE
 
 
-def _is_big(detected: Detection3D) -> bool:
-    """Whether its longest side is beyond the middle of what is usual in its class."""
-    low, high = class_forms()[detected.class_name].length_m
-    return max(detected.size_m) > math.sqrt(low * high)
+def _is_big(detected: Detection3D) -> bool | None:
+    """Whether its longest side is beyond the middle of what is usual in its class; None for what has none."""
+    form = class_forms().get(detected.class_name)
+    return None if form is None else max(detected.size_m) > math.sqrt(form.length_m[0] * form.length_m[1])

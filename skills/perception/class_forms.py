@@ -13,6 +13,8 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 PERSON: Final = "person"
 """The class of people."""
+THING: Final = "thing"
+"""The class word for any object: what stands out from its surface, whether the detector has a class for it or not."""
 
 
 class ClassForm(BaseModel):

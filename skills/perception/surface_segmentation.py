@@ -17,6 +17,7 @@ from skills.perception.detection_3d import Detection3D
 from skills.perception.plane import LevelPlane
 from skills.perception.point_cloud import PointCloud, camera_pose_W, cloud_from_image, grid_labels
 from skills.perception.shape import SeenShape, measure
+from skills.perception.touching import touching_parts
 from skills.robot import FloatArray, Image
 
 _CELL_M = 0.008
@@ -134,6 +135,21 @@ def parted(view: SurfaceView, detected: Detection3D) -> SurfaceView:
     parts = tuple(_cluster(points, whole.surface, whole.plane, detected.eye_W) for points in halves)
     others = tuple(each for each in view.clusters if each is not whole)
     return SurfaceView(view.plane, view.plane_points, (*parts, *others))
+
+
+def apart(view: SurfaceView, p_WC: FloatArray) -> SurfaceView:
+    """The view, seen from p_WC, with objects that touch as clusters of their own, whatever they are."""
+    return SurfaceView(
+        view.plane, view.plane_points, tuple(one for each in view.clusters for one in _split(each, p_WC))
+    )
+
+
+def _split(cluster: Cluster, p_WC: FloatArray) -> tuple[Cluster, ...]:
+    labels, count = touching_parts(cluster.points.p_W[:, :2])
+    if count == 1:
+        return (cluster,)
+    parts = (cluster.points.where(labels == k) for k in range(count))
+    return tuple(_cluster(points, cluster.surface, cluster.plane, p_WC) for points in parts)
 
 
 def _own(pixels: NDArray[np.int64], of_thing: NDArray[np.int64]) -> NDArray[np.bool_]:

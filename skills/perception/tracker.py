@@ -2,7 +2,8 @@
 
 A detection belongs to the track that it fits by place (Mahalanobis distance) and class; places are fused as information
 (inverse covariances add). A track that a picture should show and that is not detected there loses belief. What is seen
-faintly begins no track, but supports a little one that a surer one began.
+faintly begins no track, but supports a little one that a surer one began. A segment without a label (`THING`) says
+where an object is, and nothing about its class.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from skills.perception.class_forms import THING
 from skills.perception.detection_3d import Detection3D
 from skills.robot import FloatArray
 
@@ -56,8 +58,13 @@ class Track:
 
     @property
     def class_name(self) -> str:
-        """The likeliest class."""
-        return max(self.classes, key=lambda name: self.classes[name])
+        """The likeliest class; `THING` where no view had a label for it."""
+        return THING if self.best.class_name == THING else max(self.classes, key=lambda name: self.classes[name])
+
+    @property
+    def class_belief(self) -> float:
+        """How likely it is of `class_name`; 1 for a `THING`, which everything is."""
+        return self.classes.get(self.class_name, 1.0)
 
     @property
     def views(self) -> int:
@@ -71,9 +78,13 @@ class Track:
 
     @property
     def confirmed(self) -> bool:
-        """Seen from two places, believed, and taken for the same when it was seen last."""
-        believed = self.belief >= CONFIRMED_BELIEF and self.classes[self.class_name] >= CONFIRMED_BELIEF
-        return self.views >= 2 and believed and self.latest.class_name == self.class_name
+        """An object for sure, believed to be of its class, and taken for the same when it was seen last."""
+        return self.stands and self.class_belief >= CONFIRMED_BELIEF and self.latest.class_name == self.class_name
+
+    @property
+    def stands(self) -> bool:
+        """Seen from two places and believed, whatever it is."""
+        return self.views >= 2 and self.belief >= CONFIRMED_BELIEF
 
 
 class Tracker:
@@ -104,7 +115,7 @@ class Tracker:
 
     def _begin(self, detected: Detection3D) -> None:
         self._count += 1
-        even = dict.fromkeys(self._names, 1.0 / len(self._names))
+        even = MappingProxyType(dict.fromkeys(self._names, 1.0 / max(len(self._names), 1)))
         eye = _point(detected.eye_W)
         self._tracks[self._count] = Track(
             number=self._count,
@@ -167,7 +178,7 @@ def fits(track: Track, detected: Detection3D) -> bool:
     What is within 3 cm is the same object, whatever its class.
     """
     apart_m = float(np.linalg.norm(track.position_W - detected.position_W))
-    possible = track.classes[detected.class_name] > _CONFUSED or apart_m < _NEAR_M
+    possible = track.classes.get(detected.class_name, 1.0) > _CONFUSED or apart_m < _NEAR_M
     return possible and distance2(track, detected) < GATE
 
 
@@ -195,20 +206,26 @@ def _fused(track: Track, detected: Detection3D, names: Sequence[str]) -> Track:
         covariance=covariance,
         eyes_W=_with_eye(track.eyes_W, _point(detected.eye_W)),
         latest=_latest(track, detected),
-        best=max(track.best, detected, key=lambda one: one.detection.score),
+        best=max(track.best, detected, key=lambda one: (one.class_name != THING, one.detection.score)),
     )
 
 
 def _latest(track: Track, detected: Detection3D) -> Detection3D:
-    """What was seen last. A faint detection tells no more than that it was still there, if it is of the same class."""
-    if detected.detection.score >= SURE_SCORE:
+    """What was seen last.
+
+    A faint detection tells no more than that it was still there, if it is of the same class; so does a segment.
+    """
+    unlabelled = detected.class_name == THING != track.latest.class_name
+    if detected.detection.score >= SURE_SCORE and not unlabelled:
         return detected
-    same = detected.class_name == track.latest.class_name
+    same = unlabelled or detected.class_name == track.latest.class_name
     return replace(track.latest, stamp_s=detected.stamp_s) if same else track.latest
 
 
 def _classes(before: Mapping[str, float], detected: Detection3D) -> Mapping[str, float]:
     """Class beliefs after a detection: its scores for its class and the alternatives, the rest spread over others."""
+    if detected.class_name == THING:
+        return before
     score = float(np.clip(detected.detection.score, 0.3, 0.97))
     others = (1.0 - score) / max(len(before) - 1, 1)
     scores = {name: max(alternative, others) for name, alternative in detected.detection.alternatives} | {

@@ -14,6 +14,9 @@ from skills.robot import FloatArray
 CLEARANCE_M = 0.12
 EDGE_M = 0.09
 _GRID_M = 0.04
+_ROOM_M = 0.3
+"""So much room around a spot is enough: more does not count."""
+_ANOTHER_M = 0.2
 
 
 def spots(surface: Surface) -> FloatArray:
@@ -39,3 +42,14 @@ def free_spots(view: SurfaceView, candidates: FloatArray, avoid_W: Sequence[Floa
         distance, _ = cKDTree(np.concatenate(things)).query(candidates)
         free &= distance > CLEARANCE_M
     return candidates[free]
+
+
+def roomiest_first(free: FloatArray, view: SurfaceView, but: Sequence[FloatArray]) -> FloatArray:
+    """Free spots (N, 2), those with the most room about them first, and none near the points `but`."""
+    for point in but:
+        free = free[np.linalg.norm(free - point[:2], axis=1) > _ANOTHER_M]
+    things = [cluster.points.p_W[:, :2] for cluster in view.clusters]
+    if len(free) == 0 or not things:
+        return free
+    room_m = [float(np.min(np.linalg.norm(np.concatenate(things) - spot, axis=1))) for spot in free]
+    return free[np.argsort(-np.minimum(room_m, _ROOM_M), kind="stable")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -12,10 +12,11 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Succeeded, Surface
-from skills.approach.standing import COMFORTABLE_M, free_places
+from skills.approach.standing import COMFORTABLE_M, DISTANCES_M, free_places, reachable
 from skills.arm.arm_skill import GRIPPER_FORCE_N, PICTURE_LATENCY_S, ArmSkill
 from skills.arm.collision import ArmScene, Box
-from skills.arm.poses import look_configuration, overview_viewpoints
+from skills.arm.kinematics import ArmModel
+from skills.arm.poses import carry_configuration, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.geometry import wrap
@@ -24,8 +25,8 @@ from skills.grasp.reach import body_heights_m
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
-from skills.place.free_spot import free_spots, spots
-from skills.quantities import Length, TurnRate
+from skills.place.free_spot import free_spots, roomiest_first, spots
+from skills.quantities import Length, Tries, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 from skills.stack import ArmPlanner
 
@@ -34,7 +35,13 @@ ABOVE_M = 0.10
 _SURELY_FREE_M = 0.03
 _PRESS_M = 0.03
 _SIDE_DROP_M, _LIFT_AGAIN_M = 0.12, 0.135
-_LEAST_BACK_M = 0.08
+_LEAST_BACK_M, _BACK_M = 0.08, (0.16, 0.12, 0.08, 0.05)
+"""How far the hand is drawn back, the best first; a spot counts only where the hand gets back by the former."""
+_MARGIN_RAD = 0.05
+_MOST_SPOTS = 80
+_OTHER_HEIGHT_COST = 0.05
+_DISTANCES_M = (DISTANCES_M, (0.76, 0.72, 0.68, 0.64))
+"""How far from a spot to stand; nearer than to grasp where what is held from above is put down high."""
 _LEVEL = 0.5
 _RELAX_M = 0.003
 _FEEL_S = 0.4
@@ -58,11 +65,12 @@ class PlaceOptions:
     """How an object is put down.
 
     No joint is faster than `lower_rad_s` while it is lowered until it stands. It must be seen again within
-    `seen_again_m`.
+    `seen_again_m`. Where no free spot is in reach, the robot moves along the surface `moves` times at most.
     """
 
     lower_rad_s: TurnRate = 0.2
     seen_again_m: Length = 0.12
+    moves: Tries = 2
 
 
 class Place(ArmSkill[PlaceInputs]):
@@ -94,22 +102,28 @@ class Place(ArmSkill[PlaceInputs]):
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
         carried = self._carried()
-        yield from self._go_near(surface)
-        first_height_m, *_ = body_heights_m(surface.height_m, self.context.robot.capabilities())
-        yield from self.stand_at(first_height_m, f"standing up to the {surface.name}")
-        on_floor = surface.height_m < _FLOOR_M
-        seen = self._look_at_floor(surface) if on_floor else self._look(surface, _nearest_spot(surface, self.X_WB()))
-        view = yield from seen
         held = self._held(carried)
-        q_above_rad = yield from self._go_above_from_a_height(surface, view, held)
+        yield from self._go_near(_nearest_spot(surface, self.X_WB()), surface, held)
+        try:
+            yield from self._put_down(surface, held, carried)
+        except SkillFailure:
+            yield from self._stand_as_usual()
+            raise
+        yield from self._stand_as_usual()
+        return Succeeded(f"put the object down on the {surface.name}")
+
+    def _put_down(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[None]:
+        """Find a spot, lower the object, let go, check, stow."""
+        q_above_rad = yield from self._find_spot(surface, held, carried)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
         yield from self._lower(surface, q_above_rad)
         yield from self._let_go()
         yield from self._check(surface, spot_W)
         yield from self.stow()
+
+    def _stand_as_usual(self) -> Routine[None]:
         yield from self.stand_at(self.context.robot.capabilities().standing_height_m, "standing as usual")
-        return Succeeded(f"put the object down on the {surface.name}")
 
     def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
         """With an empty gripper: draw the hand back, and look whether the object stands where it was to be put."""
@@ -128,6 +142,7 @@ class Place(ArmSkill[PlaceInputs]):
             yield from self._let_go()
         yield from self._check(surface, spot_W[:2])
         yield from self.stow()
+        yield from self._stand_as_usual()
         return Succeeded(f"the object stood on the {surface.name} already")
 
     def _carried(self) -> RotationMatrix:
@@ -137,19 +152,71 @@ class Place(ArmSkill[PlaceInputs]):
         self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
         return rotation
 
-    def _go_near(self, surface: Surface) -> Routine[None]:
-        """Drive nearer when the surface is out of the arm's reach."""
-        spot = _nearest_spot(surface, self.X_WB())
+    def _find_spot(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[FloatArray]:
+        """Look, and bring the object over a free spot; where none is in reach, from before another one that was seen.
+
+        Gives the joint angles that the arm is to have there.
+        """
+        spot_W, gone_to = _nearest_spot(surface, self.X_WB()), list[FloatArray]()
+        while True:
+            yield from self.stand_at(self._heights_m(surface)[0], f"standing up to the {surface.name}")
+            on_floor = surface.height_m < _FLOOR_M
+            view = yield from self._look_at_floor(surface) if on_floor else self._look(surface, spot_W)
+            try:
+                return (yield from self._go_above_from_a_height(surface, view, held))
+            except SkillFailure as failure:
+                others = roomiest_first(free_spots(view, spots(surface)), view, [*gone_to, spot_W])
+                if failure.cause is not Cause.PLANNING or len(others) == 0 or len(gone_to) >= self.options.moves:
+                    raise
+            gone_to.append(spot_W)
+            spot_W = others[0]
+            message = "carrying the object on along the surface"
+            yield from self.move_to(lambda scene, q: carry_configuration(scene, carried, q), message, speed_rad_s=0.9)
+            yield from self._stand_as_usual()
+            yield from self._go_before(spot_W, surface, held)
+
+    def _heights_m(self, surface: Surface) -> tuple[float, ...]:
+        """How high the body may stand to put something down, the usual height first."""
+        return body_heights_m(surface.height_m, self.context.robot.capabilities())
+
+    def _go_near(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Routine[None]:
+        """Drive nearer when a spot is out of the arm's reach."""
         pose = self.context.pose()
         offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
         bearing = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
-        if np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6:
+        comfortable = np.linalg.norm(offset) < COMFORTABLE_M[1] and abs(bearing) < 0.6
+        if comfortable and self._reach_cost(spot, surface, held)(pose) is not None:
             return
-        context = self.context
-        places = free_places((spot[0], spot[1]), pose, context.costmap, ArmFootprint(context).now())
+        yield from self._go_before(spot, surface, held)
+
+    def _go_before(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Routine[None]:
+        """Drive to where a spot is within the arm's reach, or as near as may be."""
+        context, pose, point_W = self.context, self.context.pose(), (float(spot[0]), float(spot[1]))
+        footprint, reach_cost = ArmFootprint(context).now(), self._reach_cost(spot, surface, held)
+        free = [free_places(point_W, pose, context.costmap, footprint, each) for each in _DISTANCES_M]
+        places = yield from self.compute(
+            lambda: next((near for each in free if (near := reachable(each, reach_cost))), free[0]),
+            latency_s=0.2,
+            name="choose a place",
+            message=f"choosing where to stand at the {surface.name}",
+        )
         if not places:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
         yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))
+
+    def _reach_cost(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Callable[[Pose2D], float | None]:
+        """How awkwardly the arm brings the object over a spot and down from a pose of the body; None where it does not."""
+        model, heights_m = self.model, self._heights_m(surface)
+        p_WT = np.array([spot[0], spot[1], surface.height_m])
+
+        def cost(pose: Pose2D) -> float | None:
+            for number, height_m in enumerate(heights_m):
+                p_BT = pose.transform(height_m).inverse() @ p_WT
+                if any(_reaches(model, X_BH) for X_BH in held.above(p_BT, model.p_BS)):
+                    return _OTHER_HEIGHT_COST * number
+            return None
+
+        return cost
 
     def _look(self, surface: Surface, spot_W: FloatArray) -> Routine[SurfaceView]:
         """A picture of the surface; the object in the gripper hides its lower half, so the camera looks low."""
@@ -192,7 +259,7 @@ class Place(ArmSkill[PlaceInputs]):
 
     def _go_above_from_a_height(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
         """As `_go_above`, with the body at the first height from which the arm gets there."""
-        heights_m = body_heights_m(surface.height_m, self.context.robot.capabilities())
+        heights_m = self._heights_m(surface)
         for number, height_m in enumerate(heights_m, start=1):
             yield from self.stand_at(height_m, f"standing up to the {surface.name}")
             try:
@@ -209,7 +276,8 @@ class Place(ArmSkill[PlaceInputs]):
         if len(free) == 0:
             raise SkillFailure(Cause.PLANNING, f"no free spot is seen on the {surface.name}")
         X_BW = X_WB.inverse()
-        on_top = [X_BW @ np.array([x, y, view.plane.height_m]) for x, y in _by_distance(free, X_WB)]
+        near = _by_distance(free, X_WB)[:_MOST_SPOTS]
+        on_top = [X_BW @ np.array([x, y, view.plane.height_m]) for x, y in near]
         beside = cluster_boxes(view.clusters, X_WB)
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
         letting_go = Release(beside, self._release_rad())
@@ -254,8 +322,11 @@ class Place(ArmSkill[PlaceInputs]):
         if abs(closing[2]) < _LEVEL:
             aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
             yield from self.try_shift_hand(aside, "letting go")
-        if not (yield from self.try_shift_hand(-0.16 * fingers, "drawing the hand back")):
-            yield from self.shift_hand(-_LEAST_BACK_M * fingers, "drawing the hand back")
+        up_B = np.array([0.0, 0.0, 1.0])
+        for way_B in (*(-back_m * fingers for back_m in _BACK_M), *(back_m * up_B for back_m in _BACK_M)):
+            if (yield from self.try_shift_hand(way_B, "drawing the hand back")):
+                return
+        raise SkillFailure(Cause.PLANNING, "the hand cannot be drawn back from the object")
 
     def _release_rad(self) -> float:
         """How far the gripper opens to let go of what it holds."""
@@ -313,6 +384,14 @@ class HeldObject:
         turns = (0.0, 0.4, -0.4) if level else tuple(k * math.pi / 4 for k in range(8))
         return [RotationMatrix.MakeZRotation(ahead + turn) @ self.R_BH for turn in turns]
 
+    def above(self, p_BT: FloatArray, p_BS: FloatArray) -> Iterator[RigidTransform]:
+        """Poses of the hand with the object over a point of a surface, as it stood; p_BS is the shoulder."""
+        azimuth = math.atan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0])
+        for rotation in self.rotations(azimuth):
+            middle = rotation @ self.p_HO
+            p_BH = np.array([*(p_BT - middle)[:2], p_BT[2] + ABOVE_M + self.drop_m(rotation)])
+            yield RigidTransform(rotation, p_BH)
+
 
 @dataclass(frozen=True)
 class Release:
@@ -333,16 +412,19 @@ def above_goal(
     def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
         """Arm angles above the first spot that can be reached and gone down to. Raises PlanningError."""
         for p_BT in on_top_B:
-            azimuth = math.atan2(p_BT[1] - scene.model.p_BS[1], p_BT[0] - scene.model.p_BS[0])
-            for rotation in held.rotations(azimuth):
-                middle = rotation @ held.p_HO
-                p_BH = np.array([*(p_BT - middle)[:2], p_BT[2] + ABOVE_M + held.drop_m(rotation)])
-                for q_above in scene.model.inverse(RigidTransform(rotation, p_BH), margin_rad=0.05):
+            for X_BH in held.above(p_BT, scene.model.p_BS):
+                for q_above in scene.model.inverse(X_BH, margin_rad=_MARGIN_RAD):
                     if scene.free(q_above) and _can_put_down(scene, q_above, planner, release):
                         return q_above
         raise PlanningError("no free spot is within the arm's reach")
 
     return goal
+
+
+def _reaches(model: ArmModel, X_BH: RigidTransform) -> bool:
+    """Whether the arm reaches a pose of the hand and the one below at which the object stands."""
+    lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, ABOVE_M])
+    return bool(model.inverse(X_BH, margin_rad=_MARGIN_RAD) and model.inverse(lowered, margin_rad=_MARGIN_RAD))
 
 
 def _can_put_down(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner, release: Release) -> bool:

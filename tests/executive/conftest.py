@@ -250,6 +250,7 @@ class DetectInputs:
     surfaces: tuple[Surface, ...]
     floor: bool = False
     count: int = 1
+    avoid: tuple[ObjectObservation, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -442,6 +443,7 @@ def run_tree(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> 
 def make() -> types.SimpleNamespace:
     """The scripted classes, for tests that build their own."""
     return types.SimpleNamespace(
+        default_end=default_end,
         FETCH=FETCH, COKE=COKE, ScriptedRobot=ScriptedRobot, StillLocaliser=StillLocaliser,
         EmptyCostmap=EmptyCostmap, scripted_skill=scripted_skill, Script=Script, PORTS=PORTS,
     )  # fmt: skip

@@ -478,3 +478,36 @@ def test_a_look_is_cheap():
         stage.watch(0.05)
         times.append(time.perf_counter() - start)
     assert min(times) < 0.001
+
+
+LEFT = GoalCondition(GoalKind.CLEARED, source=(TABLE,))
+THERE = GoalCondition(GoalKind.CLEARED, source=(TABLE,), goal=(SHELF,))
+
+
+def test_a_table_is_cleared_when_all_that_stood_there_rests_on_the_other():
+    verdict = placed_stage().let_go().watch().referee.judge([LEFT, THERE])
+    assert verdict.success
+    assert verdict.why == "Nothing is left on the table. The coke stands on the shelf."
+
+
+def test_what_is_left_is_named_and_so_is_what_is_missing():
+    verdict = Stage().referee.judge([LEFT, THERE])
+    assert not verdict.success
+    assert verdict.why == "The coke is left on the table. The coke does not stand on the shelf."
+
+
+def test_what_fell_off_is_not_left_but_missing():
+    stage = Stage().fall("coke", (1.5, 1.0, TABLE_Z), (1.5, 1.0, HALF - TOUCH))
+    assert stage.holds(LEFT)
+    assert not stage.holds(THERE)
+
+
+def test_what_is_still_in_the_gripper_does_not_stand_there():
+    assert not placed_stage().watch().holds(THERE)
+
+
+def test_a_table_on_which_nothing_stood_is_cleared():
+    empty = square("the bench", 6.0, 6.0)
+    verdict = Stage().referee.judge([dataclasses.replace(THERE, source=(empty,))])
+    assert verdict.success
+    assert verdict.why == "Nothing stood on the bench."

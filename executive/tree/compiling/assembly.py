@@ -11,11 +11,12 @@ from py_trees.common import Status
 from executive.mission.command import START, Command, Task
 from executive.mission.errors import InputError, Problems, SourceLine
 from executive.mission.file.model import Mission, MissionStep, StepPolicy
-from executive.mission.goal import GoalCondition, command_goal, drive_goal
+from executive.mission.goal import GoalCondition, clearing_goals, command_goal, drive_goal
 from executive.mission.gripper import UNNAMED, InGripper, after_command, is_same
 from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import Constant
 from executive.tree.compiling.builder import PICK_UPS, PlanBuilder, Registry, slug, start_key
+from executive.tree.compiling.clearing import clear_plan, is_clearing, refuse_everything
 from executive.tree.compiling.policies import PolicyFrame, needs_way_back, under_policy
 from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.compiling.skill_steps import skill_plan
@@ -139,28 +140,33 @@ class _Assembler:
         return made
 
     def _group(self, items: Sequence[_Item], base: str) -> Assembled:
-        """The subtrees of items in a row; commands to get and bring several objects become trips."""
+        """The subtrees of items in a row; those that get and bring several objects are trips, all of them rounds."""
         made, problems, done = Assembled(), Problems(), 0
         for item, after in zip(items, (*items[1:], None), strict=True):
             if item.number <= done:
                 continue
             following = None if after is None else after.command
             with problems:
-                if item.command is not None and following is not None and are_trips(item.command, following):
+                if item.command is not None and following is not None and _go_together(item.command, following):
                     done = item.number + 1
-                    trips = trips_plan(self._command_builder(item, base), following)
-                    commands = (item.command, following)
-                    goals = (command_goal(command, self.knowledge) for command in commands)
-                    parts = tuple(
-                        StepPart(trips.path_id, command, goal=goal)
-                        for command, goal in zip(commands, goals, strict=True)
-                    )
-                    self.held = None
-                    made += Assembled((trips,), parts)
+                    made += self._pair(item, item.command, following, base)
                 else:
                     made += self._item(item, following, base)
         problems.raise_any()
         return made
+
+    def _pair(self, item: _Item, get: Command, bring: Command, base: str) -> Assembled:
+        """The one subtree of two commands that get and bring several objects, or all."""
+        builder = self._command_builder(item, base)
+        goals: tuple[GoalCondition | None, ...]
+        if is_clearing(get, bring):
+            node, goals = clear_plan(builder, bring), clearing_goals(get, bring, self.knowledge)
+        else:
+            node = trips_plan(builder, bring)
+            goals = (command_goal(get, self.knowledge), command_goal(bring, self.knowledge))
+        self.held = None
+        parts = (StepPart(node.path_id, each, goal=goal) for each, goal in zip((get, bring), goals, strict=True))
+        return Assembled((node,), tuple(parts))
 
     def _item(self, item: _Item, following: Command | None, base: str) -> Assembled:
         """The subtree of one command, skill or used mission; `following` is the command right after it."""
@@ -182,6 +188,7 @@ class _Assembler:
             return Assembled((leaf,), (StepPart(path_id, skill=skill, goal=_drive_goal(leaf)),))
         builder = replace(self._command_builder(item, base), avoided=_goals(following, self.knowledge))
         refuse_several(builder)
+        refuse_everything(builder)
         command = builder.command
         builder = replace(builder, in_gripper=is_same(self.held, command.object, self.knowledge))
         node = step_plan(builder)
@@ -207,6 +214,11 @@ class _Assembler:
         own = item.step.policy.pick_ups
         pick_ups = self.pick_ups if own is None else own
         return replace(builder, command=command, anywhere=item.step.elsewhere, pick_ups=pick_ups)
+
+
+def _go_together(get: Command, bring: Command) -> bool:
+    """Whether two commands in a row are one: trips for several objects, or rounds for all."""
+    return are_trips(get, bring) or is_clearing(get, bring)
 
 
 def _groups(steps: Sequence[MissionStep]) -> Iterator[tuple[tuple[_Item, ...], StepPolicy]]:

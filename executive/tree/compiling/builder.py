@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.mission.command import Command
+from executive.mission.command import Command, Task
 from executive.mission.errors import InputError, SourceLine, suggestion
-from executive.mission.knowledge import Knowledge, Pose
+from executive.mission.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
 from executive.tree.behaviours.recovery import Recovery, Trigger
 from executive.tree.node import NodeSpec
 from executive.tree.registry import missing
 from skills.api import Cause, Skill, Surface
+from skills.perception.class_forms import THING
 from skills.robot import Pose2D
 
 Registry = Mapping[str, type[Skill[Any]]]
@@ -144,6 +145,15 @@ class PlanBuilder:
         if not classes:
             raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.thing_names()))
         return classes
+
+    def sought(self, name: str) -> tuple[str, ...]:
+        """What the robot looks for when it is to take an object of that name: its classes, or `THING` for any object.
+
+        A question names what it finds, and so is about the known classes. Raises InputError: the name is not known.
+        """
+        classes = self.classes(name)
+        unnamed = self.knowledge.thing(name) in (ANYTHING, EVERYTHING)
+        return (THING,) if unnamed and self.command.task is not Task.FIND else classes
 
     def error(self, message: str, hint: str) -> InputError:
         """An error at the step's line."""

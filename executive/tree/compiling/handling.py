@@ -54,31 +54,42 @@ def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> list[Pose2D | Fro
 
 
 def pick_up_plan(
-    builder: PlanBuilder, thing: Thing, search: NodeSpec, key: str, surfaces: tuple[Surface, ...] | FromBoard
+    builder: PlanBuilder,
+    thing: Thing,
+    search: NodeSpec,
+    key: str,
+    surfaces: tuple[Surface, ...] | FromBoard,
+    *,
+    seen: bool = False,
 ) -> NodeSpec:
     """Find (`search`, which writes `key`), approach, grasp and tuck the arm in, with recoveries.
 
-    A failure ends with the arm stowed.
+    A failure ends with the arm stowed. With `seen`, an earlier node has just written `key`: only further attempts begin
+    with the search.
     """
     near, tried = f"{builder.path_id}/near-detection", f"{builder.path_id}/tried-grasps"
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     grasp = _grasp_plan(builder, near, tried)
     tuck = builder.node("guard", f"holding {thing}", tuck_plan(builder), part="held", condition=Holds(str(thing)))
-    attempt = builder.at("pick-up").sequence(f"pick up {thing}", search, approach, grasp, tuck)
+    steps = (approach, grasp, tuck) if seen else (search, approach, grasp, tuck)
+    attempt = builder.at("pick-up").sequence(f"pick up {thing}", *steps)
     around = builder.at("around")
     unplanned, untaken = after(Cause.PLANNING, of=approach), after(Cause.PLANNING, of=grasp)
     lost = after(Cause.PRECONDITION, Cause.EXECUTION, of=tuck, own=True)
     missed = (after(*_NOT_PLANNING, of=grasp), after(*_NOT_PLANNING, of=approach), lost)
+    look_again = (
+        (builder.pause("look-again", "look again", LOOK_AGAIN_S), Recovery(missed, uses=2)),
+        (builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S), Recovery((untaken,))),
+    )
     attempts = builder.recover(
         f"up to {ATTEMPTS} attempts",
         attempt,
-        (builder.pause("look-again", "look again", LOOK_AGAIN_S), Recovery(missed, uses=2)),
-        (builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S), Recovery((untaken,))),
+        *(((search, Recovery((*missed, untaken), uses=3)),) if seen else look_again),
         (around.skill("clear_costmap"), Recovery((unplanned,))),
         (around.skill("back_off"), Recovery((untaken, unplanned))),
         attempts=ATTEMPTS,
         part="attempts",
-        forgets=(key, near, tried),
+        forgets=(near, tried) if seen else (key, near, tried),
     )
     return tidied(builder.at("tidy"), attempts, only_after_failure=True)
 

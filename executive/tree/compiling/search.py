@@ -117,7 +117,7 @@ def detect_plan(
 ) -> NodeSpec:
     """Look for the object on some surfaces, by name or from the blackboard, from where the robot stands."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(builder.surface, surfaces))
-    ports = {"classes": builder.classes(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
+    ports = {"classes": builder.sought(thing.name), "attributes": thing.attributes, "surfaces": where_to_look}
     tally = {"observations": tally_key(f"{builder.path_id}/detect")} if tallied else {}
     return builder.skill("detect", {**ports, **extra}, {"observation": key, **tally})
 

@@ -211,7 +211,16 @@ def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard,
 
 
 def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
-    """Any surface of the place will do: the next one is tried when one does not work."""
+    """Put down in a place; what is dropped on the way is picked up again."""
+    put, guards = put_down_plan(builder, item, place)
+    return unless_fallen(builder.at("carry-on"), item, f"to the {place}", put, guards)
+
+
+def put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:
+    """Any surface of the place will do: the next one is tried when one does not work. With it, the guards of the ways.
+
+    Raises InputError: the place has no surfaces.
+    """
     surfaces = builder.knowledge.surfaces_in(place)
     if not surfaces:
         raise builder.error(
@@ -220,7 +229,7 @@ def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:
     to = f"to the {place}"
     ways = tuple(_put_on_plan(builder.at(name), item, name, to) for name in surfaces)
     put = builder.node("selector", f"put {item} down {where(builder.knowledge, place)}", *ways)
-    return unless_fallen(builder.at("carry-on"), item, to, put, tuple(guard for way in ways for guard in way.children))
+    return put, tuple(guard for way in ways for guard in way.children)
 
 
 def _put_on_plan(builder: PlanBuilder, item: Thing, surface: str, to: str) -> NodeSpec:

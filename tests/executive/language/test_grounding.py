@@ -147,3 +147,29 @@ def test_what_is_needed_where_nothing_lies_is_brought_there(told):
 @pytest.mark.parametrize("sentence", ["bring me the hammer from the hall", "I need the hammer in the kitchen"])
 def test_what_is_to_come_from_a_room_is_looked_for_there(told, sentence):
     assert str(told(sentence).commands[1].goal) == "start"
+
+
+@pytest.mark.parametrize(
+    ("sentence", "task"),
+    [
+        ("clear the coffee table onto the workbench", "Nothing"),
+        ("Alice, please clear the coffee table onto the bench", "Nothing"),
+        ("move everything from the coffee table to the workbench", "Nothing"),
+        ("take everything off the coffee table to the workbench", "Nothing"),
+        ("move all the things from the coffee table to the workbench", "Nothing"),
+        ("put everything on the coffee table onto the workbench", "place"),
+    ],
+)
+def test_everything_on_a_surface_is_taken_to_another(told, sentence, task):
+    answer = told(sentence)
+    assert answer.status is Status.OK, answer.reason
+    get, bring = map(str, answer.commands)
+    assert get == "Take [Nothing] to [coffee table] and do [grasp] to [everything]"
+    target = "everything" if task == "place" else "Nothing"
+    assert bring == f"Take [everything] to [workbench] and do [{task}] to [{target}]"
+
+
+def test_everything_needs_a_place_to_be_taken_from(told):
+    answer = told("move all the things to the workbench")
+    assert answer.status is not Status.OK
+    assert "from where" in answer.reason

@@ -28,6 +28,10 @@ FETCH_AND_ASK = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
     "Take [drink] to [start] and do [Nothing] to [Nothing]",
 )
+CLEAR = (
+    "Take [Nothing] to [counter] and do [grasp] to [everything]",
+    "Take [everything] to [bedroom] and do [Nothing] to [Nothing]",
+)
 REQUEST = Request("fetch me a drink", seed=3, name="fetch drink", world_name="flat", robot="Alice", fingerprint="print")
 
 
@@ -183,6 +187,27 @@ def test_kills_one_after_another_lead_to_the_end_all_the_same(live, robot, world
         assert lives < 30
     assert (world.grasps, world.places) == (1, 1)
     assert lives >= 2
+
+
+@pytest.mark.parametrize("lag", [0, 3])
+def test_a_kill_in_any_round_moves_each_object_once(live, store, robot, world, script, make, lag):
+    def look(skill):
+        if world.places == 2:
+            return Failed(Cause.POSTCONDITION, "nothing is left")
+        seen = dataclasses.replace(make.COKE, position_W=(1.0 + world.places, 2.0, 0.9))
+        return Succeeded("seen", {"observation": seen, "observations": (seen,)})
+
+    script.ends["detect"] = look
+    result, ticks, _ = live(CLEAR)
+    for moment in range(1 + lag, ticks, 2):
+        store.remove(store.missions()[0].id)
+        robot.holding, world.grasps, world.places = False, 0, 0
+        assert live(CLEAR, kill_after=moment, lag=lag)[0] is None
+        result, _, recollection = live(CLEAR)
+        told = (moment, result.worst.message, recollection.told, world.work)
+        assert result.outcome is Outcome.SUCCESS, told
+        assert (world.grasps, world.places, robot.holding) == (2, 2, False), told
+        assert result.worst.message.startswith("moved two cokes"), told
 
 
 def test_what_was_finished_is_told_and_not_done_again(live, script, world):

@@ -196,3 +196,26 @@ def test_the_order_of_the_detections_of_a_picture_does_not_matter():
 
 def test_an_empty_book_has_no_tracks():
     assert tracker_of([], []).snapshot() == ()
+
+
+# pictures, one after the other      class     confirmed   something stands there
+@pytest.mark.parametrize(
+    ("names", "class_name", "confirmed"),
+    [
+        (("thing", "thing"), "thing", True),
+        (("coke", "thing"), "coke", True),
+        (("thing", "coke"), "coke", True),
+        (("coke", "beer"), "beer", False),
+    ],
+)
+def test_a_segment_says_where_something_is_and_nothing_about_its_class(names, class_name, confirmed):
+    scores = [0.7 if name == "thing" else 0.9 for name in names]
+    first, second = (detected_3d(name=n, score=s, eye=e) for n, s, e in zip(names, scores, (LEFT, RIGHT), strict=True))
+    (track,) = tracker_of([first], [second]).snapshot()
+    assert (track.class_name, track.confirmed, track.stands) == (class_name, confirmed, True)
+
+
+def test_a_label_keeps_its_size_when_a_segment_is_seen_after_it():
+    labelled = detected_3d(name="coke", eye=LEFT, stamp=1.0)
+    (track,) = tracker_of([labelled], [detected_3d(name="thing", score=0.7, eye=RIGHT, stamp=2.0)]).snapshot()
+    assert (track.latest.class_name, track.last_seen_s) == ("coke", 2.0)

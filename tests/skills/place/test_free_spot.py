@@ -8,7 +8,7 @@ from skills.perception.plane import LevelPlane
 from skills.perception.point_cloud import PointCloud
 from skills.perception.shape import SeenShape
 from skills.perception.surface_segmentation import Cluster, SurfaceView
-from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, spots
+from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, roomiest_first, spots
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)
 PLANE = LevelPlane((1.3, 0.0), 0.7, (0.0, 0.0), 0.002)
@@ -55,3 +55,11 @@ def test_what_is_not_seen_is_not_free():
 def test_a_full_table_has_no_free_spot():
     things = tuple((x, y) for x in np.arange(1.05, 1.6, 0.1) for y in np.arange(-0.45, 0.5, 0.1))
     assert len(free_spots(_view(things=things), spots(TABLE))) == 0
+
+
+def test_the_spot_with_the_most_room_comes_first_and_none_near_where_the_robot_was_before():
+    free = np.array([[1.2, -0.4], [1.2, 0.0], [1.2, 0.4]])
+    view = _view(things=[(1.4, -0.4)])
+    assert roomiest_first(free, view, [])[-1] == pytest.approx(free[0])
+    assert roomiest_first(free, view, [free[2]])[0] == pytest.approx(free[1])
+    assert len(roomiest_first(free[:1], view, [free[0]])) == 0

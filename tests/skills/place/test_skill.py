@@ -11,6 +11,7 @@ from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
 from skills.arm.motion import RrtConnect
 from skills.place.skill import HeldObject, Place, PlaceInputs, Release, above_goal
+from skills.robot import Pose2D
 
 MODEL = arm_model(spot_capabilities())
 LEVEL_FORWARD = RotationMatrix.MakeXRotation(np.pi / 2)
@@ -92,3 +93,24 @@ def test_a_spot_is_left_out_where_the_open_hand_would_touch_a_tall_thing_beside_
     goal = above_goal(spots_B, HeldObject(LEVEL_FORWARD, can_H), RrtConnect(), Release(beside, 0.7))
     above = MODEL.X_BH(goal(scene, CARRYING)).translation()
     assert int(np.argmin([abs(above[1] - spot[1]) for spot in spots_B])) == taken
+
+
+BENCH = Surface("bench", ((0.0, -0.5), (0.6, -0.5), (0.6, 0.5), (0.0, 0.5)), 0.82)
+FROM_ABOVE = HeldObject(RotationMatrix.MakeYRotation(np.pi / 2), np.array([[0.19, -0.02, -0.02], [0.24, 0.02, 0.02]]))
+FROM_THE_SIDE = HeldObject(LEVEL_FORWARD, np.array([[0.15, -0.05, -0.03], [0.22, 0.06, 0.03]]))
+
+
+# Held, and how far the body is from the spot (m) -> whether the arm can put it down there
+@pytest.mark.parametrize(
+    ("held", "off_m", "reached"),
+    [(FROM_ABOVE, 0.85, True), (FROM_ABOVE, 1.0, False), (FROM_THE_SIDE, 1.0, True), (FROM_THE_SIDE, 1.4, False)],
+)
+def test_what_is_held_from_above_is_put_down_nearer(held, off_m, reached):
+    skill = Place(context_of(ScriptedRobot(holding=True)))
+    cost = skill._reach_cost(np.array([0.1, 0.0]), BENCH, held)
+    assert (cost(Pose2D(0.1 - off_m, 0.0, 0.0)) is not None) is reached
+
+
+def test_before_a_high_surface_the_body_stands_up():
+    skill = Place(context_of(ScriptedRobot(holding=True)))
+    assert skill._height_m(BENCH) > spot_capabilities().standing_height_m == skill._height_m(TABLE)

@@ -9,9 +9,9 @@ from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Succeeded
 
 NAMES = (
-    "check_hammer", "deliver", "fetch_drink", "go_living_room", "go_to_pose", "guarded_delivery", "hammer_to_kitchen",
-    "look_and_approach", "patrol", "take_beer_to_bedroom", "tidy_cube", "tidy_table", "two_drinks", "visit_room",
-    "welcome",
+    "check_hammer", "clear_table", "deliver", "fetch_drink", "go_living_room", "go_to_pose", "guarded_delivery",
+    "hammer_to_kitchen", "look_and_approach", "patrol", "take_beer_to_bedroom", "tidy_cube", "tidy_table",
+    "two_drinks", "visit_room", "welcome",
 )  # fmt: skip
 SURFACES_WITH_THINGS = ("kitchen counter", "kitchen table", "workbench", "tool trolley")
 
@@ -32,8 +32,13 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
         skill.context.robot._robot.holding = True
         return Succeeded("held", dict.fromkeys(skills["grasp"].outputs, ()))
 
+    def look(skill):
+        if skill.inputs.classes == ("thing",) and script.begun.count("place") == 2:
+            return Failed(Cause.POSTCONDITION, "nothing is left")
+        return make.default_end(script, "detect")(skill)
+
     script.seen_on = SURFACES_WITH_THINGS
-    script.ends |= {"place": put_down, "grasp": hold}
+    script.ends |= {"place": put_down, "grasp": hold, "detect": look}
     registry = {name: make.scripted_skill(script, name, one.Inputs, one.outputs) for name, one in skills.items()}
 
     def run_file(name):
@@ -65,6 +70,14 @@ def test_a_raw_pose_is_driven_to(run_mission, script):
 def test_two_drinks_are_fetched_and_put_down_one_after_the_other(run_mission, script):
     run_mission("two_drinks")
     assert [name for name in script.begun if name in ("grasp", "place")] == ["grasp", "place"] * 2
+
+
+def test_a_table_is_cleared_object_by_object_until_nothing_is_left(run_mission, script):
+    run_mission("clear_table")
+    assert [name for name in script.begun if name in ("detect", "grasp", "place")] == [
+        *(["detect", "grasp", "place"] * 2),
+        "detect",
+    ]
 
 
 def test_a_table_that_is_tidy_already_is_told(run_mission, script):

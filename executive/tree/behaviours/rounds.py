@@ -1,0 +1,153 @@
+"""Rounds of the same work, each for one object that a look has found, until the look finds nothing any more."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.mission.errors import listing
+from executive.tree.behaviours.board import Board
+from executive.tree.behaviours.composites import MemoryComposite
+from executive.tree.behaviours.explained import cause_of, message_of
+from executive.tree.behaviours.policies import FINAL_CAUSES
+from executive.tree.node import NodeKind
+from skills.api import Cause, ObjectObservation
+from skills.detect.words import numbered
+from skills.robot import Robot
+
+SAME_PLACE_M: Final = 0.15
+"""What stands within this of where an object was missed is that object."""
+Seen = tuple[ObjectObservation, ...]
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class ForEachFound(MemoryComposite):
+    """A look (the first child, which writes what it found under `key`), and what is done with each object it finds.
+
+    Child RUNNING: RUNNING. Look SUCCESS: on to the second child in the same tick. Second child SUCCESS: the object is
+    `done`, and at the next tick the look starts anew. Second child FAILURE: the object is `missed`, and the look starts
+    anew too; but FAILURE with its cause when that is ERROR or CANCELLED, when the gripper holds something, or when as
+    many as `misses` failed. Look FAILURE with POSTCONDITION: nothing is left; SUCCESS with what was done, unless an
+    object is missed: then POSTCONDITION. Look FAILURE with another cause: FAILURE with it. Look SUCCESS after `limit`
+    objects: FAILURE with POSTCONDITION. What is done later where an object was missed is no longer missed.
+    `done` and `missed` are blackboard keys, empty when it starts anew unless they are not in `forgets`. `did` says what
+    was done ("moved", "to the bench"), `where` where nothing is left.
+    """
+
+    key: str
+    done: str
+    missed: str
+    did: tuple[str, str]
+    where: str
+    limit: int
+    misses: int
+    board: Board
+    robot: Robot
+    forgets: tuple[str, ...] = ()
+    _failures: int = field(default=0, init=False)
+    _why: str = field(default="", init=False)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Tick the look, or what is done with the object that it found."""
+        if self.status != Status.RUNNING:
+            self._restart()
+        look, action = self.children
+        if self._index == 0:
+            if look.status != Status.RUNNING:
+                self._reset_children()
+            self.current_child = look
+            yield from look.tick()
+            if look.status == Status.SUCCESS and len(self._noted(self.done)) < self.limit:
+                self._index = 1
+        if self._index == 1:
+            self.current_child = action
+            yield from action.tick()
+        self._judge(look, action)
+        yield self
+
+    def _restart(self) -> None:
+        super()._restart()
+        self._failures, self._why = 0, "before the restart"
+        self.board.forget(self.forgets)
+
+    def _judge(self, look: Behaviour, action: Behaviour) -> None:
+        child = self.children[self._index]
+        if child.status == Status.RUNNING:
+            self.status, self.cause, self.message = Status.RUNNING, None, message_of(child)
+        elif child is action:
+            self._action_ended(action)
+        elif look.status == Status.SUCCESS:
+            self._end(Cause.POSTCONDITION, f"{self._told()}, and something is left {self.where}")
+        elif cause_of(look) is Cause.POSTCONDITION:
+            self._nothing_left()
+        else:
+            self._end(cause_of(look), f"{self._told()}, then {message_of(look)}")
+
+    def _action_ended(self, action: Behaviour) -> None:
+        """Note what became of the object, and look anew."""
+        seen: ObjectObservation = self.board.get(self.key)
+        elsewhere = tuple(each for each in self._noted(self.missed) if _apart_m(each, seen) > SAME_PLACE_M)
+        if action.status == Status.SUCCESS:
+            self.board.put(self.missed, elsewhere)
+            self.board.put(self.done, (*(each for each in self._noted(self.done) if each != seen), seen))
+            self._next_round(self._told())
+            return
+        cause, why = cause_of(action), message_of(action)
+        self._failures += 1
+        self._why = f"the {seen.thing}: {why}"
+        self.board.put(self.missed, (*elsewhere, seen))
+        if cause in FINAL_CAUSES or self._failures >= self.misses or self.robot.gripper().holding:
+            self._end(cause, f"{self._told()}, then {why}")
+        else:
+            self._next_round(f"looks again, since {why}")
+
+    def _reset_children(self) -> None:
+        """Not in the tick in which the round before ended: its results are to be seen."""
+        for child in self.children:
+            child.stop(Status.INVALID)
+
+    def _next_round(self, said: str) -> None:
+        self._index, self.status, self.cause, self.message = 0, Status.RUNNING, None, said
+
+    def _nothing_left(self) -> None:
+        """The end: all that was found was done, unless an object is gone that was missed."""
+        if missed := self._noted(self.missed):
+            told = listing(f"the {each.thing}" for each in missed)
+            self._end(Cause.POSTCONDITION, f"{self._told()}, but {told} is gone from there ({self._why})")
+            return
+        done = self._noted(self.done)
+        self._end(None, f"{self._told()}; nothing is left {self.where}" if done else f"nothing is {self.where}")
+
+    def _told(self) -> str:
+        """ "moved one cube and two things to the bench"."""
+        verb, to = self.did
+        kinds = Counter(str(each.thing) for each in self._noted(self.done))
+        return f"{verb} {listing(numbered(count, kind) for kind, count in kinds.items())} {to}"
+
+    def _noted(self, key: str) -> Seen:
+        noted: Seen = self.board.get(key) if key in self.board else ()
+        return noted
+
+    def _end(self, cause: Cause | None, message: str) -> None:
+        self.cause, self.message = cause, message
+        self.stop(Status.SUCCESS if cause is None else Status.FAILURE)
+
+
+def _apart_m(one: ObjectObservation, other: ObjectObservation) -> float:
+    """Level distance."""
+    return math.dist(one.position_W[:2], other.position_W[:2])
+
+
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "for each found": NodeKind(
+        ForEachFound,
+        ("children", "board", "robot"),
+        writes=lambda options: {options["done"]: Seen, options["missed"]: Seen},
+    ),
+}

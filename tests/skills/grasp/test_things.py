@@ -1,0 +1,29 @@
+"""An object without a class, seen closely: its points alone say where it is."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+from table_scene import GREEN, TABLE, Can, scene
+
+from skills.api import LocalisationEstimate, ObjectObservation, Thing
+from skills.grasp.skill import _examine
+
+PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
+ONE, OTHER = Can(1.0, 0.0, 0.033, 0.115, GREEN), Can(1.0, 0.067, 0.033, 0.115, GREEN)
+
+
+def examined(things, at):
+    seen = ObjectObservation(0.0, Thing("thing"), (at.x, at.y, 0.81), (0.066, 0.066, 0.115), 0.0, 0.7, "table")
+    return _examine(scene(things), RigidTransform(), TABLE, seen, PLACE, (), 0.12)
+
+
+@pytest.mark.parametrize("at", [ONE, OTHER])
+def test_of_two_that_touch_the_one_that_was_seen_is_taken_and_the_other_is_in_the_way(at):
+    view = examined([ONE, OTHER], at)
+    assert view.target.centre_B == pytest.approx((at.x, at.y), abs=0.012)
+    assert view.target.width_m == pytest.approx(0.066, abs=0.012)
+    assert len(view.boxes) == 2  # the table and the other can
+
+
+def test_a_thing_that_is_gone_is_not_seen():
+    assert examined([], ONE) is None

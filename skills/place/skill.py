@@ -205,7 +205,7 @@ class Place(ArmSkill[PlaceInputs]):
         yield from self.perform(Navigate(context), NavigateInputs(places[0].pose, 0.08, 0.1, 0.5))
 
     def _reach_cost(self, spot: FloatArray, surface: Surface, held: HeldObject) -> Callable[[Pose2D], float | None]:
-        """How awkwardly the arm brings the object over a spot and down from a pose of the body; None where it does not."""
+        """How awkwardly the arm puts the object down on a spot from a pose of the body; None where it does not."""
         model, heights_m = self.model, self._heights_m(surface)
         p_WT = np.array([spot[0], spot[1], surface.height_m])
 

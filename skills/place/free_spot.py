@@ -8,6 +8,8 @@ import numpy as np
 
 from skills.api import Surface
 from skills.geometry import grid_inside
+from skills.perception.plane import LevelPlane
+from skills.perception.point_cloud import PointCloud
 from skills.perception.surface_segmentation import SurfaceView
 from skills.robot import FloatArray
 
@@ -17,6 +19,7 @@ _GRID_M = 0.04
 _ROOM_M = 0.3
 """So much room around a spot is enough: more does not count."""
 _ANOTHER_M = 0.2
+_SAMPLE_M, _SURVEYED_M = 0.01, 0.01
 
 
 def spots(surface: Surface) -> FloatArray:
@@ -42,6 +45,20 @@ def free_spots(view: SurfaceView, candidates: FloatArray, avoid_W: Sequence[Floa
         distance, _ = cKDTree(np.concatenate(things)).query(candidates)
         free &= distance > CLEARANCE_M
     return candidates[free]
+
+
+def unseen_view(surface: Surface, standing_W: FloatArray) -> SurfaceView:
+    """A surface that no picture shows, taken as level at its surveyed height; `standing_W` (N, 3) stands on it.
+
+    It counts as seen but for what is within CLEARANCE_M of those points.
+    """
+    inside = grid_inside(surface.polygon_W, _SAMPLE_M, margin_m=0.0)
+    if len(standing_W):
+        inside = inside[np.min(np.linalg.norm(inside[:, None] - standing_W[None, :, :2], axis=2), axis=1) > CLEARANCE_M]
+    points = np.column_stack([inside, np.full(len(inside), surface.height_m)])
+    plane = LevelPlane((0.0, 0.0), surface.height_m, (0.0, 0.0), _SURVEYED_M)
+    unseen = np.zeros((len(points), 2), dtype=np.int64), np.zeros((len(points), 3), dtype=np.uint8)
+    return SurfaceView(plane, PointCloud(points, *unseen), ())
 
 
 def roomiest_first(free: FloatArray, view: SurfaceView, but: Sequence[FloatArray]) -> FloatArray:

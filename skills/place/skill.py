@@ -18,14 +18,16 @@ from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
 from skills.arm.poses import carry_configuration, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
+from skills.arm.solid_cells import CELL_M
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
-from skills.geometry import wrap
+from skills.estimate.self_filter import SelfFilter
+from skills.geometry import inside_polygon, wrap
 from skills.grasp.candidates import hand_rotation
 from skills.grasp.reach import body_heights_m
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
-from skills.place.free_spot import free_spots, roomiest_first, spots
+from skills.place.free_spot import free_spots, roomiest_first, spots, unseen_view
 from skills.quantities import Length, Tries, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 from skills.stack import ArmPlanner
@@ -46,6 +48,7 @@ _LEVEL = 0.5
 _RELAX_M = 0.003
 _FEEL_S = 0.4
 _FLOOR_M = 0.06
+_STANDS_OUT_M, _HIGHEST_M = 0.03, 0.5
 _OVER_SPOT_M = 0.45
 _RELEASE_RAD = 0.4
 """The finger opens so far to let go, and no farther: wide open it would reach what stands beside."""
@@ -160,8 +163,9 @@ class Place(ArmSkill[PlaceInputs]):
         spot_W, gone_to = _nearest_spot(surface, self.X_WB()), list[FloatArray]()
         while True:
             yield from self.stand_at(self._heights_m(surface)[0], f"standing up to the {surface.name}")
-            on_floor = surface.height_m < _FLOOR_M
+            on_floor, standing_W = surface.height_m < _FLOOR_M, self._standing_W(surface)
             view = yield from self._look_at_floor(surface) if on_floor else self._look(surface, spot_W)
+            view = view or unseen_view(surface, standing_W)
             try:
                 return (yield from self._go_above_from_a_height(surface, view, held))
             except SkillFailure as failure:
@@ -174,6 +178,26 @@ class Place(ArmSkill[PlaceInputs]):
             yield from self.move_to(lambda scene, q: carry_configuration(scene, carried, q), message, speed_rad_s=0.9)
             yield from self._stand_as_usual()
             yield from self._go_before(spot_W, surface, held)
+
+    def _standing_W(self, surface: Surface) -> FloatArray:
+        """What the LiDAR and earlier pictures show above a surface, (N, 3) in the world.
+
+        Where a large object in the gripper hides all from the hand camera, nothing else tells what stands there.
+        """
+        scan, capabilities = self.context.robot.scan(), self.context.robot.capabilities()
+        seen = [(self.context.solid.cells + 0.5) * CELL_M]
+        if scan is not None:
+            (x0, y0), (x1, y1) = np.min(capabilities.footprint_m, axis=0), np.max(capabilities.footprint_m, axis=0)
+            q, tip_H = self.q_rad(), np.array([self.gripper.length_m, 0.0, 0.0])
+            arm_B = np.vstack([self.model.points_B(q), self.model.X_BH(q) @ tip_H])
+            points_B = scan.points_B()
+            foreign_B = points_B[SelfFilter((x0, x1, y0, y1)).foreign(points_B, arm_B, holding=True)]
+            X_WB = self.context.localiser.estimate().X_WO @ scan.X_OB
+            seen.append(foreign_B @ X_WB.rotation().matrix().T + X_WB.translation())
+        points_W = np.vstack(seen)
+        above_m = points_W[:, 2] - surface.height_m
+        points_W = points_W[(above_m > _STANDS_OUT_M) & (above_m < _HIGHEST_M)]
+        return points_W[inside_polygon(points_W[:, :2], surface.polygon_W, 0.0)]
 
     def _heights_m(self, surface: Surface) -> tuple[float, ...]:
         """How high the body may stand to put something down, the usual height first."""
@@ -218,8 +242,11 @@ class Place(ArmSkill[PlaceInputs]):
 
         return cost
 
-    def _look(self, surface: Surface, spot_W: FloatArray) -> Routine[SurfaceView]:
-        """A picture of the surface; the object in the gripper hides its lower half, so the camera looks low."""
+    def _look(self, surface: Surface, spot_W: FloatArray) -> Routine[SurfaceView | None]:
+        """What a picture shows of the surface, None when too little; the object in the gripper hides its lower half.
+
+        So the camera looks low.
+        """
         message = f"looking for a free spot on the {surface.name}"
         X_WB = self.X_WB()
         self.boxes = surface_boxes([surface], X_WB)
@@ -237,8 +264,6 @@ class Place(ArmSkill[PlaceInputs]):
         view = yield from self.compute(
             lambda: view_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
         )
-        if view is None:
-            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         return view
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView]:
@@ -338,6 +363,8 @@ class Place(ArmSkill[PlaceInputs]):
             raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
         self.boxes = surface_boxes([surface], self.X_WB())
         view = yield from self._look(surface, spot_W)
+        if view is None:
+            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         off = [float(np.min(np.linalg.norm(c.points.p_W[:, :2] - spot_W, axis=1))) for c in view.clusters]
         if not off or min(off) > self.options.seen_again_m:
             yield from self.try_stow()

@@ -11,7 +11,7 @@ URDF = """<robot name="r">
   <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/>
     <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
 </robot>"""
-HAND = GripperCapabilities("finger", 1.0, 0.1, 50.0, 0.05, 0.1, 0.2, 0.0, 0.02, 0.01, 0.15, 0.08, length_m=0.35)
+HAND = GripperCapabilities("finger", 1.0, 0.1, 50.0, 0.05, 0.1, 0.2, 0.2, 0.0, 0.02, 0.01, 0.15, 0.08, length_m=0.35)
 OUTLINE = ((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25))
 
 

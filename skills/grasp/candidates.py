@@ -104,7 +104,7 @@ def _attitudes(target: Target, width_m: float, gripper: GripperCapabilities) -> 
     With the first lean fingers of different length end level on both sides of something of a width.
     """
     if target.upright:
-        return [(float(np.radians(tilt)), 0.0) for tilt in (10.0, 0.0, 20.0, 32.0, 45.0, 60.0, 75.0, 90.0)]
+        return [(float(np.radians(tilt)), 0.0) for tilt in (0.0, 10.0, 20.0, 32.0, 45.0, 60.0, 75.0, 90.0)]
     down = [(90.0, 0.0), (78.0, 0.0), (66.0, 0.0), (54.0, 0.0), (44.0, 0.0)]
     ending_level = np.degrees(np.arctan2(_closed_tip_x_m(gripper) - gripper.fixed_tip_x_m, width_m + _ENDING_LEVEL_M))
     leaning = [(90.0, lean) for lean in (ending_level, -ending_level, 22.0, -22.0, 32.0, -32.0, 44.0, -44.0)]
@@ -179,11 +179,11 @@ def _candidate(
     if target.upright and tilt > _FROM_ABOVE_RAD:
         below_top, depth = _top_grip(placement.half_depth_m, tilt, gripper)
         height = max(target.height_m - below_top, (gripper.tip_x_m - depth) * np.sin(tilt) + _TIPS_UP_M)
-        cost = placement.cost + 0.4 * abs(tilt - np.radians(10.0))
+        cost = placement.cost + 0.4 * tilt
     elif target.upright:
         height = max(float(np.clip(0.56 * target.height_m, 0.05, 0.095)), 0.45 * target.height_m)
         depth = gripper.palm_x_m + placement.half_depth_m + 0.008
-        cost = placement.cost + 0.4 * abs(tilt - np.radians(10.0))
+        cost = placement.cost + 0.4 * tilt
     else:
         beside_m = min(beside_m, _BESIDE_THIN_M) if target.height_m < THIN_M else beside_m
         low = _low_grip(R_BH, target.height_m, placement.width_m, gripper, beside_m)

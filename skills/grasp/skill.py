@@ -8,7 +8,8 @@ from functools import partial, reduce
 from typing import ClassVar
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.common.eigen_geometry import AngleAxis
+from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, LocalisationEstimate, ObjectObservation, PlanningError, Succeeded, Surface
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
@@ -36,7 +37,7 @@ _RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.014, 0.1
 _SURFACE_AROUND_M, _SURFACE_YIELDS_M = 0.2, 0.003
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
-_AT_THING_M = 0.4
+_AT_THING_M, _TURNS_BELOW_RAD = 0.4, 0.36
 _CARRY_RAD_S, _GENTLY_RAD_S, _LONG_LEVER_M = 0.9, 0.45, 0.05
 _HEIGHTS_TRIED = 2
 _LEVEL, _PULL_BACK_UP_M = 0.5, (0.02, 0.0)
@@ -310,6 +311,7 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.move_gripper(0.0, force_n, f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
+        X_BH = turned_in_hand(X_BH, self.p_HT) if view.target.upright else X_BH
         self.held = [_held_box(X_BH.inverse(), view.target_box)]
         self.context.payload.corners_H = box_corners(self.held[0])
         self.context.payload.R_BH = X_BH.rotation()
@@ -420,6 +422,25 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _up_B(self) -> FloatArray:
         return np.asarray(self.X_WB().rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
+
+
+def turned_in_hand(X_BH: RigidTransform, p_HT: FloatArray) -> RigidTransform:
+    """The hand's pose at which something upright, held at p_HT of the hand, would have been taken without turning in it.
+
+    The fingers are a groove: what stands and is taken by a hand tilted a little turns in it on the way, until it is
+    square to the fingers (measured in the plant: from 10 to 0 degrees within half a minute). Then the level hand, with
+    which it stands upright again, is what counts. A hand tilted more is left as it is.
+    """
+    fingers = X_BH.rotation().matrix()[:, 0]
+    if abs(fingers[2]) > np.sin(_TURNS_BELOW_RAD):
+        return X_BH
+    level = RotationMatrix(AngleAxis(-float(np.arcsin(-fingers[2])), _level_axis(fingers))) @ X_BH.rotation()
+    return RigidTransform(level, X_BH @ p_HT - level @ p_HT)
+
+
+def _level_axis(fingers_B: FloatArray) -> FloatArray:
+    """The level axis about which fingers that point down by an angle are turned, by which they come to point down."""
+    return np.array([-fingers_B[1], fingers_B[0], 0.0]) / np.hypot(fingers_B[0], fingers_B[1])
 
 
 def _square(

@@ -425,7 +425,7 @@ class Grasp(ArmSkill[GraspInputs]):
 
 
 def turned_in_hand(X_BH: RigidTransform, p_HT: FloatArray) -> RigidTransform:
-    """The hand's pose at which something upright, held at p_HT of the hand, would have been taken without turning in it.
+    """The hand's pose at which something upright, held at p_HT of the hand, would have been taken square to it.
 
     The fingers are a groove: what stands and is taken by a hand tilted a little turns in it on the way, until it is
     square to the fingers (measured in the plant: from 10 to 0 degrees within half a minute). Then the level hand, with
@@ -440,7 +440,7 @@ def turned_in_hand(X_BH: RigidTransform, p_HT: FloatArray) -> RigidTransform:
 
 def _level_axis(fingers_B: FloatArray) -> FloatArray:
     """The level axis about which fingers that point down by an angle are turned, by which they come to point down."""
-    return np.array([-fingers_B[1], fingers_B[0], 0.0]) / np.hypot(fingers_B[0], fingers_B[1])
+    return np.asarray(np.array([-fingers_B[1], fingers_B[0], 0.0]) / np.hypot(fingers_B[0], fingers_B[1]))
 
 
 def _square(

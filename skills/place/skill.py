@@ -49,6 +49,8 @@ _RELAX_M = 0.003
 _FEEL_S = 0.4
 _FLOOR_M = 0.06
 _STANDS_OUT_M, _HIGHEST_M = 0.03, 0.5
+_AT_HAND_M, _HIDDEN = 0.4, 0.5
+"""A picture of which half is nearer than that shows what is held, and not what lies behind it."""
 _OVER_SPOT_M = 0.45
 _RELEASE_RAD = 0.4
 """The finger opens so far to let go, and no farther: wide open it would reach what stands beside."""
@@ -165,7 +167,8 @@ class Place(ArmSkill[PlaceInputs]):
             yield from self.stand_at(self._heights_m(surface)[0], f"standing up to the {surface.name}")
             on_floor, standing_W = surface.height_m < _FLOOR_M, self._standing_W(surface)
             view = yield from self._look_at_floor(surface) if on_floor else self._look(surface, spot_W)
-            view = view or unseen_view(surface, standing_W)
+            if view is None or (on_floor and len(free_spots(view, spots(surface))) == 0):
+                view = unseen_view(surface, standing_W)
             try:
                 return (yield from self._go_above_from_a_height(surface, view, held))
             except SkillFailure as failure:
@@ -243,9 +246,9 @@ class Place(ArmSkill[PlaceInputs]):
         return cost
 
     def _look(self, surface: Surface, spot_W: FloatArray) -> Routine[SurfaceView | None]:
-        """What a picture shows of the surface, None when too little; the object in the gripper hides its lower half.
+        """What a picture shows of the surface, None where the object in the gripper hides all; else its lower half only.
 
-        So the camera looks low.
+        So the camera looks low. Raises SkillFailure when the surface is not there.
         """
         message = f"looking for a free spot on the {surface.name}"
         X_WB = self.X_WB()
@@ -264,9 +267,11 @@ class Place(ArmSkill[PlaceInputs]):
         view = yield from self.compute(
             lambda: view_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
         )
+        if view is None and np.mean((image.depth_m > 0.0) & (image.depth_m < _AT_HAND_M)) < _HIDDEN:
+            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         return view
 
-    def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView]:
+    def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
         """What the cameras at the body's front see of the floor: the object hides it from the hand camera."""
         message, robot = f"looking for a free spot on the {surface.name}", self.context.robot
         X_WO, views = self.context.localiser.estimate().X_WO, list[SurfaceView]()
@@ -278,9 +283,7 @@ class Place(ArmSkill[PlaceInputs]):
             segment = partial(view_surface, image, X_WO, surface)
             view = yield from self.compute(segment, latency_s=0.15, name="segment", message=message)
             views += [] if view is None else [view]
-        if not views:
-            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
-        return max(views, key=lambda view: len(view.plane_points))
+        return max(views, key=lambda view: len(view.plane_points), default=None)
 
     def _go_above_from_a_height(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
         """As `_go_above`, with the body at the first height from which the arm gets there."""

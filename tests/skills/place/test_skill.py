@@ -113,4 +113,4 @@ def test_what_is_held_from_above_is_put_down_nearer(held, off_m, reached):
 
 def test_before_a_high_surface_the_body_stands_up():
     skill = Place(context_of(ScriptedRobot(holding=True)))
-    assert skill._height_m(BENCH) > spot_capabilities().standing_height_m == skill._height_m(TABLE)
+    assert skill._heights_m(BENCH)[0] > spot_capabilities().standing_height_m == skill._heights_m(TABLE)[0]

@@ -246,9 +246,9 @@ class Place(ArmSkill[PlaceInputs]):
         return cost
 
     def _look(self, surface: Surface, spot_W: FloatArray) -> Routine[SurfaceView | None]:
-        """What a picture shows of the surface, None where the object in the gripper hides all; else its lower half only.
+        """What a picture shows of the surface, None where the object in the gripper hides all that is free.
 
-        So the camera looks low. Raises SkillFailure when the surface is not there.
+        It hides the picture's lower half at least, so the camera looks low. Raises SkillFailure: there is no surface.
         """
         message = f"looking for a free spot on the {surface.name}"
         X_WB = self.X_WB()
@@ -267,9 +267,10 @@ class Place(ArmSkill[PlaceInputs]):
         view = yield from self.compute(
             lambda: view_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
         )
-        if view is None and np.mean((image.depth_m > 0.0) & (image.depth_m < _AT_HAND_M)) < _HIDDEN:
+        hidden = np.mean((image.depth_m > 0.0) & (image.depth_m < _AT_HAND_M)) > _HIDDEN
+        if view is None and not hidden:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
-        return view
+        return None if view is None or (hidden and len(free_spots(view, spots(surface))) == 0) else view
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
         """What the cameras at the body's front see of the floor: the object hides it from the hand camera."""

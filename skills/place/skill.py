@@ -268,7 +268,8 @@ class Place(ArmSkill[PlaceInputs]):
         view = yield from self.compute(
             lambda: view_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
         )
-        hidden = np.mean((image.depth_m > 0.0) & (image.depth_m < _AT_HAND_M)) > _HIDDEN
+        near = np.mean((image.depth_m > 0.0) & (image.depth_m < _AT_HAND_M))
+        hidden = near > _HIDDEN and self.context.robot.gripper().holding
         if view is None and not hidden:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         return None if view is None or (hidden and len(free_spots(view, spots(surface))) == 0) else view

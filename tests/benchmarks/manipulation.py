@@ -7,8 +7,8 @@ Each trial is a room of its own: a table of random height, an open shelf or the 
 others around it, all set by the seed, and a second table. The robot goes to the object, takes it, holds it for ten
 seconds and puts it on the second table. The plant's truth judges: `lifted`, `held_10s`, `placed_upright` (None for what
 was not put down), and how many others were pushed over or off. `place_error_m` is from the spot that the place skill
-lowered the object on, as it believed, to where the middle of the object's bounding box is. `planning_s` is the wall time
-of each free arm motion.
+lowered the object on, as it believed, to where the middle of the object's bounding box is. `planning_s` is the wall
+time of each free arm motion.
 
 `--models` takes objects of your own in the place of the catalogue's: a folder of `errand object import`, or one of such
 folders. Each needs a class (`--class` when it was imported): the robot goes for what its detector knows.

@@ -3,8 +3,8 @@
     python -m tests.benchmarks.carry [--classes coke,beer] [--trials N] [--seed S] [--jobs 2] [--json]
 
 The robot takes an object in the room where its class usually is and goes with it to another room, back, and there
-again. The plant's truth judges: `lost` when the object was taken and is not in the gripper at the end, or was not at any
-time in between; `carried` when it was brought 20 m and through two doors at least without that.
+again. The plant's truth judges: `lost` when the object was taken and is not in the gripper at the end, or was not at
+any time in between; `carried` when it was brought 20 m and through two doors at least without that.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ others around it, all set by the seed, and a second table. The robot goes to the
 seconds and puts it on the second table. The plant's truth judges: `lifted`, `held_10s`, `placed_upright` (None for what
 was not put down), and how many others were pushed over or off. `place_error_m` is from the spot that the place skill
 lowered the object on, as it believed, to where the middle of the object's bounding box is. `planning_s` is the wall
-time of each free arm motion.
+time of planning each single arm motion with its goal, `grasp_planning_s` that of each grasp with the motions to it.
 
 `--models` takes objects of your own in the place of the catalogue's: a folder of `errand object import`, or one of such
 folders. Each needs a class (`--class` when it was imported): the robot goes for what its detector knows.
@@ -29,10 +29,10 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from pydrake.geometry import QueryObject
@@ -54,19 +54,21 @@ from plant.pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
 from plant.worlds.placement import place_objects
 from plant.worlds.world import SurfaceTop, World
-from skills.arm.collision import ArmScene
-from skills.arm.kinematics import ArmModel
+from skills.api import Job, Worker
 from skills.perception.class_forms import THING
 from skills.perception.training.scoring import Judged
-from skills.robot import ArmTrajectory, FloatArray, Picture
-from skills.stack import ArmPlanner, default_stack
+from skills.robot import FloatArray, Picture
 from tests.benchmarks.manipulation_room import SECOND, SURFACES, TAKEN, room
 from tests.benchmarks.shapes import written_shape
+
+ResultT = TypeVar("ResultT")
+ReadT = TypeVar("ReadT")
 
 TARGET: Final = "target"
 CLASSES: Final = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
 ROBOT: Final = "Alice"
 HELD_S, UPRIGHT_RAD, DISTURBED_M, DISTURBED_RAD, LOOK_S = 10.0, 0.26, 0.05, 0.35, 0.1
+MOTION_WORK, GRASP_WORK = "plan arm motion", "plan grasp"
 NEAR_SPOT_M: Final = 0.05
 OUTCOMES: Final = {
     "lifted": "never lifted",
@@ -118,33 +120,30 @@ class Watch:
 
 
 @dataclass(frozen=True)
-class TimedPlanner:
-    """An arm planner that notes the wall time (s) of each free path, found or not, in `spent_s`."""
+class TimedWorker:
+    """A worker that notes the wall time (s) of each piece of work by its name, also of work that fails."""
 
-    within: ArmPlanner
-    spent_s: list[float] = field(default_factory=list)
+    within: Worker
+    spent_s: dict[str, list[float]] = field(default_factory=dict)
 
-    def path(
-        self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
-    ) -> FloatArray:
-        """As the planner within. Raises PlanningError."""
+    def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
+        """As the worker within."""
+        return self.within.submit(lambda: self._timed(name, work), latency_s=latency_s, name=name)
+
+    def sense(
+        self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
+    ) -> Job[ResultT]:
+        """As the worker within; reading is not timed."""
+        return self.within.sense(
+            read, lambda given: self._timed(name, lambda: work(given)), latency_s=latency_s, name=name
+        )
+
+    def _timed(self, name: str, work: Callable[[], ResultT]) -> ResultT:
         begun_s = time.perf_counter()
         try:
-            return self.within.path(scene, q_start_rad, q_goal_rad, rng)
+            return work()
         finally:
-            self.spent_s.append(round(time.perf_counter() - begun_s, 4))
-
-    def line(
-        self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
-    ) -> FloatArray:
-        """As the planner within. Raises PlanningError."""
-        return self.within.line(model, q_start_rad, X_BH_to, scene)
-
-    def timed(
-        self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
-    ) -> ArmTrajectory:
-        """As the planner within."""
-        return self.within.timed(path_rad, speed_rad_s=speed_rad_s, scene=scene)
+            self.spent_s.setdefault(name, []).append(round(time.perf_counter() - begun_s, 4))
 
 
 @dataclass
@@ -167,12 +166,12 @@ class LastSpot:
 
 @dataclass(frozen=True)
 class Ran:
-    """A mission that was run: its result, log notes by time (s), the last spot, and the planning times (s)."""
+    """A mission that was run: its result, log notes by time (s), the last spot, and how long each piece of work took by name (s)."""
 
     result: RobotResult
     notes: Sequence[tuple[float, Mapping[str, Any]]]
     spot_W: tuple[float, float] | None
-    planning_s: Sequence[float]
+    spent_s: Mapping[str, Sequence[float]]
 
 
 def run_texts(simulation: Simulation, world: World, texts: Sequence[str], seed: int) -> Ran:
@@ -180,11 +179,11 @@ def run_texts(simulation: Simulation, world: World, texts: Sequence[str], seed: 
     steps = tuple(MissionStep((parse_command(text),)) for text in texts)
     mission = Mission("trial", str(world.folder), ROBOT, steps)
     tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
-    spot, planner = LastSpot(), TimedPlanner(default_stack().arm_planner)
-    stack = replace(default_stack(), arm_planner=planner)
-    entry = replace(run_entry(simulation, world, tree, stack), journal=spot)
+    spot = LastSpot()
+    entry = replace(run_entry(simulation, world, tree), journal=spot)
     clock, notes = simulation.clock, list[tuple[float, Mapping[str, Any]]]()
-    with LockStepWorker(clock) as worker:
+    with LockStepWorker(clock) as lock_step:
+        worker = TimedWorker(lock_step)
         result = run(
             [entry],
             clock=clock,
@@ -192,7 +191,7 @@ def run_texts(simulation: Simulation, world: World, texts: Sequence[str], seed: 
             publish=lambda topic, message: notes.append((clock.now(), message)) if topic == "transitions" else None,
             settings=RunSettings(seed=seed, time_limit_s=600.0),
         ).worst
-    return Ran(result, notes, spot.spot_W, planner.spent_s)
+    return Ran(result, notes, spot.spot_W, worker.spent_s)
 
 
 def poses(simulation: Simulation) -> dict[str, RigidTransform]:
@@ -257,7 +256,8 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
             "cause": "" if succeeded else f"{ran.result.cause}: {ran.result.message}",
             "sim_time_s": round(simulation.clock.now(), 1),
             "pick_s": round(picks[0] - begun[-1], 1) if begun else math.nan,
-            "planning_s": list(ran.planning_s),
+            "planning_s": list(ran.spent_s.get(MOTION_WORK, ())),
+            "grasp_planning_s": list(ran.spent_s.get(GRASP_WORK, ())),
         }
         pictured = trial.pictured and failure(judged)
         return judged, ending_picture(simulation, middle_W) if pictured else None
@@ -405,7 +405,6 @@ def summary(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
     put = [run["placed_upright"] for run in runs if run["placed_upright"] is not None]
     timed = [run["pick_s"] for run in runs if not math.isnan(run["pick_s"])]
     off = [run["place_error_m"] for run in runs if run["place_error_m"] is not None]
-    planning = [spent_s for run in runs for spent_s in run["planning_s"]] or [math.nan]
 
     def rate(key: str, chosen: Sequence[dict[str, Any]]) -> float:
         return round(float(np.mean([run[key] for run in chosen])), 3) if chosen else math.nan
@@ -417,10 +416,8 @@ def summary(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "upright_rate": round(float(np.mean(put)), 3) if put else math.nan,
         "placed_near_upright_rate": round(float(np.mean([near_upright(run) for run in runs])), 3),
         "place_error_m_median": round(float(np.median(off or [math.nan])), 4),
-        "planning_s": {
-            "median": round(float(np.median(planning)), 3),
-            "p95": round(float(np.percentile(planning, 95)), 3),
-        },
+        "planning_s": spread([spent_s for run in runs for spent_s in run["planning_s"]]),
+        "grasp_planning_s": spread([spent_s for run in runs for spent_s in run["grasp_planning_s"]]),
         "disturbed_rate": round(float(np.mean([run["others_disturbed"] > 0 for run in runs])), 3),
         "false_claims": sum(run["false_claim"] for run in runs),
         "by_class": {c: rate("held_10s", [r for r in runs if r["name"] == c]) for c in {r["name"] for r in runs}},
@@ -430,6 +427,12 @@ def summary(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "causes": dict(Counter(run["cause"] for run in runs if run["cause"]).most_common()),
         "pick_s_median": float(np.median(timed or [math.nan])),
     }
+
+
+def spread(values: Sequence[float]) -> dict[str, float]:
+    """Their median and 95th percentile, nan without any."""
+    median, p95 = np.percentile(values or [math.nan], [50, 95])
+    return {"median": round(float(median), 3), "p95": round(float(p95), 3)}
 
 
 def near_upright(run: Mapping[str, Any]) -> bool:

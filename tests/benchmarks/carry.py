@@ -67,9 +67,9 @@ class Way:
             return
         self._held_s = now_s
         pose = self.simulation.true_pose(ROBOT)
-        before, self._xy_W = self._xy_W, (pose.x, pose.y)
+        before, self._xy_W = self._xy_W, (pose.x_m, pose.y_m)
         if before is not None:
-            self.way_m += float(np.hypot(pose.x - before[0], pose.y - before[1]))
+            self.way_m += float(np.hypot(pose.x_m - before[0], pose.y_m - before[1]))
         self.rooms = entered(self.rooms, room_at(self.simulation.world, self._xy_W))
 
 

@@ -166,7 +166,7 @@ class LastSpot:
 
 @dataclass(frozen=True)
 class Ran:
-    """A mission that was run: result, log notes by time (s), last spot, seconds that each piece of work took by name."""
+    """A mission that was run: result, log notes by time (s), last spot, seconds that each piece of work took."""
 
     result: RobotResult
     notes: Sequence[tuple[float, Mapping[str, Any]]]

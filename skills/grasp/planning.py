@@ -60,7 +60,7 @@ class GeometricGraspPlanner:
     beside_fixed_low_m: Margin = 0.017
 
     def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
-        """Grasps, the best first; empty when the object is too wide. p_BS is the shoulder."""
+        """Grasps, the best first; empty when it is too wide or too flat. p_BS is the shoulder."""
         return grasp_candidates(target, p_BS, gripper, (self.beside_fixed_m, self.beside_fixed_low_m))
 
     def plan(

@@ -22,6 +22,7 @@ from skills.grasp.candidates import THIN_M, GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, space_about
+from skills.grasp.refusals import known_too_heavy, without_grasp
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
@@ -109,6 +110,7 @@ class Grasp(ArmSkill[GraspInputs]):
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "the gripper holds something already")
         seen = inputs.observation
+        self._refuse_known_heavy(seen)
         try:
             view, plan = yield from self._plan_from_a_height(seen, inputs.avoid)
             self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
@@ -278,7 +280,7 @@ class Grasp(ArmSkill[GraspInputs]):
         candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
-            raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the gripper")
+            raise SkillFailure(Cause.PLANNING, without_grasp(view.target, self.model.p_BS, self.gripper, thing))
         opening = WIDE * self.open_rad
         yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
 
@@ -324,6 +326,13 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self._refuse_heavy(mass_kg, plan.lift_B, thing)
         firmly_n = min(force_n + _PER_KG_N * max(mass_kg, 0.0), _MOST_OF_FORCE * self.gripper.max_force_n)
         yield from self.move_gripper(0.0, firmly_n, f"lifting the {thing}")
+
+    def _refuse_known_heavy(self, seen: ObjectObservation) -> None:
+        """Raise SkillFailure with cause PRECONDITION for what is known, by its class and size, to be too heavy."""
+        arm = self.context.robot.capabilities().arm
+        too_heavy = None if arm is None else known_too_heavy(seen, arm.max_payload_kg)
+        if too_heavy is not None:
+            raise SkillFailure(Cause.PRECONDITION, too_heavy)
 
     def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, thing: str) -> Routine[None]:
         """Set down again what weighs more than the arm may carry, and raise SkillFailure with cause PRECONDITION."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-
-
 from skills.api import ObjectObservation
 from skills.grasp.candidates import Target, least_height_m, narrowest_m
 from skills.perception.class_forms import class_forms
@@ -17,7 +15,7 @@ def least_mass_kg(seen: ObjectObservation) -> float:
 
 
 def known_too_heavy(seen: ObjectObservation, max_payload_kg: float) -> str | None:
-    """Why the arm cannot carry an object, known before it is lifted; None where it can, or where only weighing tells."""
+    """Why the arm cannot carry an object, known before it is lifted; None: it can, or only weighing tells."""
     mass_kg = least_mass_kg(seen)
     if mass_kg <= max_payload_kg:
         return None

@@ -20,8 +20,8 @@ THING: Final = "thing"
 class ClassForm(BaseModel):
     """One class: id in messages, form, lengths (from, to) in m of its longest and second longest side, usual length.
 
-    `mass_kg` is from the lightest to the heaviest usual one; None: nothing is known. `least_kg_m3` is the least mass per
-    volume of the bar about it (its longest side times the shortest twice); None: its size says nothing of its mass.
+    `mass_kg` is from the lightest to the heaviest usual one; None: nothing is known. `least_kg_m3` is the least mass
+    per volume of the bar about it (its longest side times the shortest twice); None: its size says nothing of its mass.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -48,7 +48,7 @@ def test_nothing_is_known_of_the_mass_of_what_has_no_class_knowledge(name):
 @pytest.mark.parametrize(
     ("target", "why"),
     [
-        (_target(0.25, 0.2, 0.05), "too wide for the gripper: 196 mm where it is narrowest"),
+        (_target(0.25, 0.2, 0.05), "too wide for the gripper: 200 mm where it is narrowest"),
         (_target(0.2, 0.2, 0.12, is_round=True), "too wide for the gripper: 200 mm where it is narrowest"),
         (_target(0.25, 0.02, 0.002), "too flat for the gripper: 2 mm high, and the fingers need"),
     ],

@@ -155,7 +155,7 @@ class GraspPlanner(Protocol):
     """Finds grasps and the motions to them."""
 
     def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
-        """Grasps, the best first; empty when the object is too wide. p_BS is the shoulder."""
+        """Grasps, the best first; empty when it is too wide or too flat. p_BS is the shoulder."""
 
     def plan(
         self,

@@ -15,6 +15,7 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
 from skills.detect.viewpoints import surface_boxes
 from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, observed_target, space_about
+from skills.grasp.refusals import without_grasp
 from skills.navigate.footprint import Footprint
 from skills.navigate.skill import NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
@@ -112,11 +113,10 @@ class Approach(ArmSkill[ApproachInputs]):
 
     def _why_none(self, seen: ObjectObservation) -> str:
         """Whether the object itself is beyond the gripper, or only the places about it are."""
-        candidates = self.context.stack.grasp_planner.candidates
-        if candidates(observed_target(seen, self.X_WB()), p_BS=self.model.p_BS, gripper=self.gripper):
+        target, p_BS = observed_target(seen, self.X_WB()), self.model.p_BS
+        if self.context.stack.grasp_planner.candidates(target, p_BS=p_BS, gripper=self.gripper):
             return f"there is no free place to stand from which the {seen.thing} is within reach"
-        size_mm = " x ".join(f"{1000 * side:.0f}" for side in seen.size_m)
-        return f"the gripper cannot take hold of the {seen.thing} as it lies ({size_mm} mm)"
+        return without_grasp(target, p_BS, self.gripper, str(seen.thing))
 
     def _reach_cost(self, seen: ObjectObservation, surfaces: Sequence[Surface]) -> Callable[[], ReachCost]:
         """Gives, inside a Worker job, what a grasp of the object costs from a pose: None where none is reached."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
@@ -24,6 +24,7 @@ _LEAST_BEYOND, _BESIDE_THIN_M = 0.25, 0.012
 _ENDING_LEVEL_M, _BEVEL_M, _SHORTER_CLOSED_M = 0.017, 0.003, 0.004
 _YIELD_M, _LEAST_TOUCHING, _LOOSE_COST = 0.006, 0.55, 1.5
 _FROM_ABOVE_RAD = np.radians(50.0)
+_HIGHEST_FLAT_MM = 40
 _BELOW_PALM_M, _OVER_TOP_M, _TIPS_UP_M = 0.05, 0.01, 0.012
 
 
@@ -79,12 +80,11 @@ class _Placement:
 def grasp_candidates(
     target: Target, p_BS: FloatArray, gripper: GripperCapabilities, beside_m: tuple[float, float] = (0.010, 0.017)
 ) -> list[GraspCandidate]:
-    """Candidates, the best first; empty when the object is too wide. p_BS is the shoulder.
+    """Candidates, the best first; empty when it is too wide or too flat. p_BS is the shoulder.
 
     `beside_m` is left beside the fixed finger, about what stands and about what lies low.
     """
-    ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
-    placements = _round_placements(target, ahead) if target.round else list(_long_placements(target, ahead))
+    ahead, placements = _placements(target, p_BS)
     tried = [
         _candidate(target, placement, attitude, side, gripper, beside_m[0 if target.upright else 1])
         for placement in placements
@@ -96,6 +96,25 @@ def grasp_candidates(
         towards = np.array([np.cos(ahead), np.sin(ahead), 0.0])
         found = [each for each in found if each.X_BH.rotation().matrix()[:, 0] @ towards > -0.3]
     return sorted(found, key=lambda candidate: candidate.cost)
+
+
+def narrowest_m(target: Target, p_BS: FloatArray) -> float | None:
+    """The least width (m) over which fingers could close on an object; None where they find no place along it."""
+    return min((placement.width_m for placement in _placements(target, p_BS)[1]), default=None)
+
+
+def least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> float | None:
+    """How high (m, in whole mm) an object without grasps had to be for one; None where its height is not the reason."""
+    for height_mm in range(int(1000 * target.height_m) + 1, _HIGHEST_FLAT_MM):
+        if grasp_candidates(replace(target, height_m=0.001 * height_mm), p_BS, gripper):
+            return 0.001 * height_mm
+    return None
+
+
+def _placements(target: Target, p_BS: FloatArray) -> tuple[float, list[_Placement]]:
+    """The direction from the shoulder (rad), and the places to grasp along an object."""
+    ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
+    return ahead, _round_placements(target, ahead) if target.round else list(_long_placements(target, ahead))
 
 
 def _attitudes(target: Target, width_m: float, gripper: GripperCapabilities) -> Sequence[tuple[float, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -20,7 +20,7 @@ PREGRASPS_M = (0.12, 0.07, 0.045)
 """How far before the grasp the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0))
 """Ways to lift, up and back towards the shoulder, the best first."""
-_SLOW_POINTS = 3
+_SLOW_POINTS, _OTHERS_TRIED, _OUT_OF_REACH = 3, 3, "out of reach"
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,37 @@ class GraspPlan:
 
 
 @dataclass(frozen=True)
+class Obstacle:
+    """An object beside the one to grasp: its class, or "thing", and its boxes in B."""
+
+    name: str
+    boxes: tuple[Box, ...]
+
+    @property
+    def centre_B(self) -> FloatArray:
+        """The middle of its boxes."""
+        return np.asarray(np.mean([box.X_FG.translation() for box in self.boxes], axis=0))
+
+
+@dataclass(frozen=True)
 class Surroundings:
-    """What stands around the object, and the object itself, as boxes in B; `up_B` points up in the body frame."""
+    """What stands around the object, and the object itself, as boxes in B; `up_B` points up in the body frame.
+
+    `others` are the objects among the boxes. `thing` and `reach_m`, the arm's furthest reach, serve to say why there is
+    no grasp.
+    """
 
     boxes: Sequence[Box]
     target: Box
     up_B: FloatArray
+    others: Sequence[Obstacle] = ()
+    thing: str = "object"
+    reach_m: float = np.inf
+
+    def without(self, others: Sequence[Obstacle]) -> Surroundings:
+        """As if some of the other objects were not there."""
+        gone = {id(box) for other in others for box in other.boxes}
+        return replace(self, boxes=[box for box in self.boxes if id(box) not in gone])
 
 
 @dataclass(frozen=True)
@@ -60,7 +85,7 @@ class GeometricGraspPlanner:
     beside_fixed_low_m: Margin = 0.017
 
     def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
-        """Grasps, the best first; empty when the object is too wide. p_BS is the shoulder."""
+        """Grasps, the best first; empty when it is too wide or too flat. p_BS is the shoulder."""
         return grasp_candidates(target, p_BS, gripper, (self.beside_fixed_m, self.beside_fixed_low_m))
 
     def plan(
@@ -72,8 +97,8 @@ class GeometricGraspPlanner:
         arm_planner: ArmPlanner,
         rng: np.random.Generator,
     ) -> GraspPlan:
-        """The best candidate that can be carried out. Raises PlanningError when there is none."""
-        reasons = []
+        """The best candidate that can be carried out. Raises PlanningError, which says why, when there is none."""
+        reasons = list[str]()
         for candidate in candidates:
             try:
                 approach, lift_B = self._reached(scene, q_start_rad, candidate, around, arm_planner)
@@ -86,8 +111,38 @@ class GeometricGraspPlanner:
             to_grasp = arm_planner.timed(approach[:-_SLOW_POINTS], speed_rad_s=self.approach_rad_s)
             last_bit = arm_planner.timed(approach[-_SLOW_POINTS - 1 :], speed_rad_s=self.last_rad_s)
             return GraspPlan(candidate, arm_planner.timed(path, scene=scene), to_grasp, last_bit, lift_B)
-        last = f": {max(set(reasons), key=reasons.count)}" if reasons else ""
-        raise PlanningError(f"none of {len(candidates)} grasps is within reach and free{last}")
+        if reasons and set(reasons) == {_OUT_OF_REACH}:
+            raise PlanningError(_out_of_reach(scene.model, around))
+        in_the_way = self._in_the_way(scene, q_start_rad, candidates, around, arm_planner)
+        if in_the_way:
+            raise PlanningError(_behind(scene.model, around, in_the_way))
+        last = f": {max(sorted(set(reasons)), key=reasons.count)}" if reasons else ""
+        raise PlanningError(f"none of {len(candidates)} grasps of the {around.thing} is within reach and free{last}")
+
+    def _in_the_way(
+        self,
+        scene: ArmScene,
+        q_near_rad: FloatArray,
+        candidates: Sequence[GraspCandidate],
+        around: Surroundings,
+        arm_planner: ArmPlanner,
+    ) -> tuple[Obstacle, ...]:
+        """The other object, or all that are near, without which there were a grasp; empty: none is in the way."""
+
+        def graspable(space: Surroundings) -> bool:
+            for candidate in candidates:
+                try:
+                    self._reached(scene, q_near_rad, candidate, space, arm_planner)
+                except PlanningError:
+                    continue
+                return True
+            return False
+
+        p_BT = around.target.X_FG.translation()
+        near = sorted(around.others, key=lambda other: float(np.linalg.norm(other.centre_B - p_BT)))[:_OTHERS_TRIED]
+        if not near or graspable(around) or not graspable(around.without(near)):
+            return ()
+        return next(((other,) for other in near if graspable(around.without([other]))), tuple(near))
 
     def _reached(
         self,
@@ -100,7 +155,7 @@ class GeometricGraspPlanner:
         """The straight approach path from the pre-grasp, and the lift (frame B). Raises PlanningError."""
         scene.set_boxes(around.boxes)
         scene.set_padding(self.final_padding_m)
-        reason = "out of reach"
+        reason = _OUT_OF_REACH
         for distance in PREGRASPS_M:
             solutions = scene.model.inverse(candidate.retreated(distance), margin_rad=0.06)
             for q in sorted(solutions, key=lambda q: float(np.max(np.abs(q - q_near_rad)))):
@@ -113,6 +168,22 @@ class GeometricGraspPlanner:
                 except PlanningError as error:
                     reason = str(error)
         raise PlanningError(reason)
+
+
+def _out_of_reach(model: ArmModel, around: Surroundings) -> str:
+    off_m = float(np.linalg.norm(around.target.X_FG.translation() - model.p_BS))
+    where = f"the {around.thing} is out of reach: {off_m:.2f} m from the shoulder"
+    if off_m > around.reach_m:
+        return f"{where}, and the arm reaches {around.reach_m:.2f} m"
+    return f"{where}, and the arm does not turn the hand there as a grasp needs it"
+
+
+def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -> str:
+    """Which other objects are in the way: before the object as the shoulder sees it, or close beside it."""
+    p_ST = around.target.X_FG.translation() - model.p_BS
+    before = any((other.centre_B - model.p_BS) @ p_ST < p_ST @ p_ST for other in others)
+    names = " and ".join(f"the {other.name}" for other in others)
+    return f"the {around.thing} is {'behind' if before else 'too near'} {names}"
 
 
 def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:

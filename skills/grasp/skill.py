@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
 from typing import ClassVar
@@ -20,8 +20,9 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.grasp.candidates import THIN_M, GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Obstacle, Surroundings, lifts
 from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, space_about
+from skills.grasp.refusals import known_too_heavy, without_grasp
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
@@ -54,12 +55,13 @@ class GraspInputs:
 
 @dataclass(frozen=True)
 class CloseView:
-    """The object and what is around it, seen closely; X_WB at that time."""
+    """The object and what is around it, seen closely; X_WB at that time. `others` are objects among the boxes."""
 
     target: Target
     boxes: tuple[Box, ...]
     target_box: Box
     X_WB: RigidTransform
+    others: tuple[Obstacle, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,7 @@ class Grasp(ArmSkill[GraspInputs]):
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "the gripper holds something already")
         seen = inputs.observation
+        self._refuse_known_heavy(seen)
         try:
             view, plan = yield from self._plan_from_a_height(seen, inputs.avoid)
             self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
@@ -267,7 +270,8 @@ class Grasp(ArmSkill[GraspInputs]):
         def examine() -> CloseView | None:
             found = detections_in(detector, image)
             named = [each for each in found if seen.thing.name in (THING, each.class_name)]
-            placed = detections_3d(image, place, named, [surface])
+            rest = [each for each in found if each not in named]
+            placed = tuple(one for some in (named, rest) for one in detections_3d(image, place, some, [surface]))
             return _examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
 
         return (yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message))
@@ -278,16 +282,19 @@ class Grasp(ArmSkill[GraspInputs]):
         candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
-            raise SkillFailure(Cause.PLANNING, f"the {thing} is too wide for the gripper")
+            raise SkillFailure(Cause.PLANNING, without_grasp(view.target, self.model.p_BS, self.gripper, thing))
         opening = WIDE * self.open_rad
         yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
 
         scene_now, q, stack, seen = self.scene_now(), self.q_rad(), self.context.stack, self.seen_boxes()
+        arm = self.context.robot.capabilities().arm
+        reach_m = np.inf if arm is None else arm.max_reach_m
 
         def plan() -> GraspPlan:
             scene = scene_now()
             scene.set_opening(opening)
-            around = Surroundings((*view.boxes, *seen), view.target_box, up_B)
+            boxes = (*view.boxes, *seen)
+            around = Surroundings(boxes, view.target_box, up_B, view.others, thing, reach_m)
             return stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng)
 
         return (
@@ -324,6 +331,13 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self._refuse_heavy(mass_kg, plan.lift_B, thing)
         firmly_n = min(force_n + _PER_KG_N * max(mass_kg, 0.0), _MOST_OF_FORCE * self.gripper.max_force_n)
         yield from self.move_gripper(0.0, firmly_n, f"lifting the {thing}")
+
+    def _refuse_known_heavy(self, seen: ObjectObservation) -> None:
+        """Raise SkillFailure with cause PRECONDITION for what is known, by its class and size, to be too heavy."""
+        arm = self.context.robot.capabilities().arm
+        too_heavy = None if arm is None else known_too_heavy(seen, arm.max_payload_kg)
+        if too_heavy is not None:
+            raise SkillFailure(Cause.PRECONDITION, too_heavy)
 
     def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, thing: str) -> Routine[None]:
         """Set down again what weighs more than the arm may carry, and raise SkillFailure with cause PRECONDITION."""
@@ -464,16 +478,22 @@ def _examine(
     view = view_surface(image, place.X_WO, surface, margin_m=0.0)
     if view is None:
         return None
-    view = reduce(parted, found, view)
+    own = [each for each in found if seen.thing.name in (THING, each.detection.class_name)]
+    view = reduce(parted, own, view)
     if seen.thing.name == THING:
-        view, found = apart(view, camera_pose_W(image, place.X_WO).translation()), ()
-    cluster = _same_thing(view, seen, found, within_m)
+        view, own = apart(view, camera_pose_W(image, place.X_WO).translation()), []
+    cluster = _same_thing(view, seen, own, within_m)
     if cluster is None:
         return None
-    others = [each for each in view.clusters if each is not cluster]
-    target_box = cluster_box(cluster, X_WB)
-    boxes = (*surface_boxes([_seen_surface(view, surface, cluster.shape.centre)], X_WB), *cluster_boxes(others, X_WB))
-    return CloseView(_target(cluster, X_WB), boxes, target_box, X_WB)
+    names = {id(cluster_of(view.clusters, each)): each.detection.class_name for each in found}
+    others = tuple(
+        Obstacle(names.get(id(each), THING), tuple(cluster_boxes([each], X_WB)))
+        for each in view.clusters
+        if each is not cluster
+    )
+    surfaces = surface_boxes([_seen_surface(view, surface, cluster.shape.centre)], X_WB)
+    boxes = (*surfaces, *(box for other in others for box in other.boxes))
+    return CloseView(_target(cluster, X_WB), boxes, cluster_box(cluster, X_WB), X_WB, others)
 
 
 def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:
@@ -493,7 +513,7 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
 
 
 def _same_thing(
-    view: SurfaceView, seen: ObjectObservation, found: tuple[Detection3D, ...], within_m: float
+    view: SurfaceView, seen: ObjectObservation, found: Sequence[Detection3D], within_m: float
 ) -> Cluster | None:
     """The cluster that is the object: detected as of its class and nearest, else nearest of all; None: all are far."""
     expected = np.array(seen.position_W[:2])

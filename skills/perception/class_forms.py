@@ -18,7 +18,11 @@ THING: Final = "thing"
 
 
 class ClassForm(BaseModel):
-    """One class: id in messages, form, lengths (from, to) in m of its longest and second longest side, usual length."""
+    """One class: id in messages, form, lengths (from, to) in m of its longest and second longest side, usual length.
+
+    `mass_kg` is from the lightest to the heaviest usual one; None: nothing is known. `least_kg_m3` is the least mass
+    per volume of the bar about it (its longest side times the shortest twice); None: its size says nothing of its mass.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -27,6 +31,19 @@ class ClassForm(BaseModel):
     length_m: tuple[float, float]
     width_m: tuple[float, float]
     usual_m: float
+    mass_kg: tuple[float, float] | None = None
+    least_kg_m3: float | None = None
+
+    def least_mass_kg(self, size_m: tuple[float, float, float]) -> float:
+        """What one that was seen with a size (three sides in m) weighs at least; 0.0 where nothing is known.
+
+        What is hidden of it makes it seem smaller, and so lighter, not heavier.
+        """
+        if self.mass_kg is None:
+            return 0.0
+        longest, shortest = max(size_m), min(size_m)
+        by_size_kg = 0.0 if self.least_kg_m3 is None else self.least_kg_m3 * longest * shortest**2
+        return max(self.mass_kg[0], min(by_size_kg, self.mass_kg[1]))
 
 
 @lru_cache(maxsize=1)

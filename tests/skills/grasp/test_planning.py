@@ -1,0 +1,56 @@
+"""Why none of the grasps of an object can be carried out."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from plant.spot.capabilities import spot_capabilities
+from skills.api import PlanningError
+from skills.arm.collision import ArmScene, Box
+from skills.arm.kinematics import arm_model
+from skills.arm.motion import RrtConnect
+from skills.grasp.candidates import Target
+from skills.grasp.planning import GeometricGraspPlanner, Obstacle, Surroundings
+
+CAPABILITIES = spot_capabilities()
+MODEL = arm_model(CAPABILITIES)
+UP = np.array([0.0, 0.0, 1.0])
+PLANNER = GeometricGraspPlanner()
+
+
+def _obstacle(name, x, y, *, width=0.1, height=0.5):
+    return Obstacle(name, (Box(RigidTransform([x, y, 0.2]), (0.06, width, height)),))
+
+
+def _why(others=(), x=0.85, boxes=()):
+    points = np.column_stack([np.full(40, x), np.zeros(40), np.full(40, 0.3)])
+    target = Target(points, (x, 0.0), 0.0, 0.066, 0.066, 0.115, 0.2, True)
+    box = Box(RigidTransform([x, 0.0, 0.26]), (0.07, 0.07, 0.12))
+    all_boxes = (*boxes, *(box for other in others for box in other.boxes))
+    around = Surroundings(all_boxes, box, UP, others, "beer", 0.98)
+    candidates = PLANNER.candidates(target, MODEL.p_BS, CAPABILITIES.gripper)[:12]
+    scene = ArmScene(CAPABILITIES, MODEL, {})
+    with pytest.raises(PlanningError) as error:
+        PLANNER.plan(scene, MODEL.stowed_rad, candidates, around, RrtConnect(), np.random.default_rng(0))
+    return str(error.value)
+
+
+def test_out_of_reach_says_how_far():
+    why = _why(x=1.9)
+    assert why == "the beer is out of reach: 1.61 m from the shoulder, and the arm reaches 0.98 m"
+
+
+def test_of_two_others_the_one_that_stands_before_it_is_named():
+    assert (
+        _why((_obstacle("coke", 0.74, 0.0, width=0.5), _obstacle("cube", 0.85, 0.6))) == "the beer is behind the coke"
+    )
+
+
+def test_what_stands_close_behind_it_is_too_near():
+    wall = _obstacle("box", 0.87, 0.0, width=0.5)
+    assert _why((wall,)) == "the beer is too near the box"
+
+
+def test_what_is_no_object_is_not_named_as_one():
+    wall = _obstacle("wall", 0.74, 0.0, width=0.5)
+    assert "would touch something" in _why((_obstacle("cube", 0.85, 0.6),), boxes=wall.boxes)

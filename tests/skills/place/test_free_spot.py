@@ -8,7 +8,7 @@ from skills.perception.plane import LevelPlane
 from skills.perception.point_cloud import PointCloud
 from skills.perception.shape import SeenShape
 from skills.perception.surface_segmentation import Cluster, SurfaceView
-from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, roomiest_first, spots
+from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, roomiest_first, spots, unseen_view
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)
 PLANE = LevelPlane((1.3, 0.0), 0.7, (0.0, 0.0), 0.002)
@@ -63,3 +63,11 @@ def test_the_spot_with_the_most_room_comes_first_and_none_near_where_the_robot_w
     assert roomiest_first(free, view, [])[-1] == pytest.approx(free[0])
     assert roomiest_first(free, view, [free[2]])[0] == pytest.approx(free[1])
     assert len(roomiest_first(free[:1], view, [free[0]])) == 0
+
+
+def test_a_surface_that_is_hidden_is_free_but_for_what_is_known_to_stand_there():
+    standing = np.array([[1.3, 0.0, 0.78]])
+    free = free_spots(unseen_view(TABLE, standing), spots(TABLE))
+    assert 0 < len(free) < len(spots(TABLE))
+    assert np.linalg.norm(free - [1.3, 0.0], axis=1).min() > CLEARANCE_M - 0.04
+    assert len(free_spots(unseen_view(TABLE, np.empty((0, 3))), spots(TABLE))) == len(spots(TABLE))

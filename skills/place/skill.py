@@ -48,7 +48,7 @@ _LEVEL = 0.5
 _RELAX_M = 0.003
 _FEEL_S = 0.4
 _FLOOR_M = 0.06
-_STANDS_OUT_M, _HIGHEST_M = 0.03, 0.5
+_STANDS_OUT_M, _HIGHEST_M, _OFF_SURFACE_M = 0.03, 0.5, 0.01
 _AT_HAND_M, _HIDDEN = 0.4, 0.5
 """A picture of which half is nearer than that shows what is held, and not what lies behind it."""
 _OVER_SPOT_M = 0.45
@@ -123,8 +123,9 @@ class Place(ArmSkill[PlaceInputs]):
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
         yield from self._lower(surface, q_above_rad)
+        put_down = held.box(self.model.X_BH(self.q_rad()))
         yield from self._let_go()
-        yield from self._check(surface, spot_W)
+        yield from self._check(surface, spot_W, [put_down])
         yield from self.stow()
 
     def _stand_as_usual(self) -> Routine[None]:
@@ -245,14 +246,14 @@ class Place(ArmSkill[PlaceInputs]):
 
         return cost
 
-    def _look(self, surface: Surface, spot_W: FloatArray) -> Routine[SurfaceView | None]:
-        """What a picture shows of the surface, None where the object in the gripper hides all; else its lower half only.
+    def _look(self, surface: Surface, spot_W: FloatArray, beside: Sequence[Box] = ()) -> Routine[SurfaceView | None]:
+        """What a picture shows of the surface, None where the object in the gripper hides all that is free.
 
-        So the camera looks low. Raises SkillFailure when the surface is not there.
+        It hides the picture's lower half at least, so the camera looks low. Raises SkillFailure: there is no surface.
         """
         message = f"looking for a free spot on the {surface.name}"
         X_WB = self.X_WB()
-        self.boxes = surface_boxes([surface], X_WB)
+        self.boxes = [*surface_boxes([surface], X_WB), *beside]
         X_HC = self.hand_camera.X_FC
         p_BT = X_WB.inverse() @ np.array([spot_W[0], spot_W[1], surface.height_m])
         low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
@@ -267,9 +268,11 @@ class Place(ArmSkill[PlaceInputs]):
         view = yield from self.compute(
             lambda: view_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
         )
-        if view is None and np.mean((image.depth_m > 0.0) & (image.depth_m < _AT_HAND_M)) < _HIDDEN:
+        near = np.mean((image.depth_m > 0.0) & (image.depth_m < _AT_HAND_M))
+        hidden = near > _HIDDEN and self.context.robot.gripper().holding
+        if view is None and not hidden:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
-        return view
+        return None if view is None or (hidden and len(free_spots(view, spots(surface))) == 0) else view
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
         """What the cameras at the body's front see of the floor: the object hides it from the hand camera."""
@@ -360,12 +363,14 @@ class Place(ArmSkill[PlaceInputs]):
         """How far the gripper opens to let go of what it holds."""
         return min(self.context.robot.gripper().opening_rad + _RELEASE_RAD, 0.75 * self.open_rad)
 
-    def _check(self, surface: Surface, spot_W: FloatArray) -> Routine[None]:
-        """Raise SkillFailure with cause POSTCONDITION unless something stands where the object was put."""
+    def _check(self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box] = ()) -> Routine[None]:
+        """Raise SkillFailure with cause POSTCONDITION unless something stands where the object was put.
+
+        The arm goes round `put_down`, the object's box (B), on its way.
+        """
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
-        self.boxes = surface_boxes([surface], self.X_WB())
-        view = yield from self._look(surface, spot_W)
+        view = yield from self._look(surface, spot_W, put_down)
         if view is None:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         off = [float(np.min(np.linalg.norm(c.points.p_W[:, :2] - spot_W, axis=1))) for c in view.clusters]
@@ -398,6 +403,13 @@ class HeldObject:
     def p_HO(self) -> FloatArray:
         """The object's middle in the hand frame (3,), m."""
         return np.asarray(0.5 * (self.corners_H.min(axis=0) + self.corners_H.max(axis=0)))
+
+    def box(self, X_BH: RigidTransform) -> Box:
+        """The upright box about it where the hand holds it at X_BH (B), a little lifted off what it stands on."""
+        corners_B = self.corners_H @ X_BH.rotation().matrix().T + X_BH.translation()
+        low, high = corners_B.min(axis=0) + [0.0, 0.0, _OFF_SURFACE_M], corners_B.max(axis=0)
+        x, y, z = np.maximum(high - low, 0.01)
+        return Box(RigidTransform(0.5 * (low + high)), (float(x), float(y), float(z)))
 
     def drop_m(self, rotation: RotationMatrix) -> float:
         """How far below the hand's origin the object reaches, with the hand turned so."""

@@ -1,15 +1,22 @@
 """How well the robot takes, holds and puts down single objects among others; prints a line a trial, JSON at the end.
 
     python -m tests.benchmarks.manipulation [--classes a,b] [--surfaces table,shelf,floor] [--trials N] [--clutter 0-4]
-        [--seed S] [--models DIR] [--jobs 2] [--json]
+        [--seed S] [--models DIR | --shapes N] [--jobs 2] [--sheet FILE.png] [--json]
 
 Each trial is a room of its own: a table of random height, an open shelf or the floor with one object of the class and
 others around it, all set by the seed, and a second table. The robot goes to the object, takes it, holds it for ten
 seconds and puts it on the second table. The plant's truth judges: `lifted`, `held_10s`, `placed_upright` (None for what
-was not put down), and how many others were pushed over or off.
+was not put down), and how many others were pushed over or off. `place_error_m` is from the spot that the place skill
+lowered the object on, as it believed, to where the middle of the object's bounding box is. `planning_s` is the wall
+time of planning each single arm motion with its goal, `grasp_planning_s` that of each grasp with the motions to it.
 
 `--models` takes objects of your own in the place of the catalogue's: a folder of `errand object import`, or one of such
 folders. Each needs a class (`--class` when it was imported): the robot goes for what its detector knows.
+
+`--shapes` takes so many random boxes, cylinders and blocks, one by each seed, as any object (`thing`), with nothing
+around.
+
+`--sheet` writes a picture of how each failed trial ended. A table of failures by class and cause goes to stderr.
 """
 
 from __future__ import annotations
@@ -20,34 +27,55 @@ import math
 import multiprocessing
 import sys
 import tempfile
+import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
+from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
 from executive.cli.assembly import run_entry, simulate
 from executive.cli.worlds import knowledge_of
+from executive.cli.worst_sheet import Shown, contact_sheet
 from executive.mission.command import parse_command
 from executive.mission.file.model import Mission, MissionStep
-from executive.run.outcome import Outcome
+from executive.run.journal import TickNote
+from executive.run.outcome import Outcome, RobotResult
 from executive.run.runner import RunSettings, run
 from executive.run.worker import LockStepWorker
-from executive.tree.compiler import compile_mission
+from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import built_in_skills
 from plant.models.imported import FACTS_FILE, ImportedFolderError, read_imported
+from plant.pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
 from plant.worlds.placement import place_objects
-from plant.worlds.world import SurfaceTop
+from plant.worlds.world import SurfaceTop, World
+from skills.api import Job, Worker
+from skills.perception.class_forms import THING
+from skills.perception.training.scoring import Judged
+from skills.robot import FloatArray, Picture
 from tests.benchmarks.manipulation_room import SECOND, SURFACES, TAKEN, room
+from tests.benchmarks.shapes import written_shape
+
+ResultT = TypeVar("ResultT")
+ReadT = TypeVar("ReadT")
 
 TARGET: Final = "target"
 CLASSES: Final = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
 ROBOT: Final = "Alice"
-HELD_S, LIFTED_M, UPRIGHT_RAD, DISTURBED_M, DISTURBED_RAD, LOOK_S = 10.0, 0.03, 0.26, 0.05, 0.35, 0.1
+HELD_S, UPRIGHT_RAD, DISTURBED_M, DISTURBED_RAD, LOOK_S = 10.0, 0.26, 0.05, 0.35, 0.1
+MOTION_WORK, GRASP_WORK = "plan arm motion", "plan grasp"
+NEAR_SPOT_M: Final = 0.05
+OUTCOMES: Final = {
+    "lifted": "never lifted",
+    "held_10s": "not held for ten seconds",
+    "placed": "not on the second table",
+    "placed_upright": "fell over on the second table",
+}
 
 
 @dataclass(frozen=True)
@@ -59,6 +87,7 @@ class Trial:
     clutter: int
     seed: int
     model: Path | None = None
+    pictured: bool = False
 
     @property
     def name(self) -> str:
@@ -90,6 +119,81 @@ class Watch:
         self.longest_s = max(self.longest_s, now_s - self.lifted_since_s)
 
 
+@dataclass(frozen=True)
+class TimedWorker:
+    """A worker that notes the wall time (s) of each piece of work by its name, also of work that fails."""
+
+    within: Worker
+    spent_s: dict[str, list[float]] = field(default_factory=dict)
+
+    def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
+        """As the worker within."""
+        return self.within.submit(lambda: self._timed(name, work), latency_s=latency_s, name=name)
+
+    def sense(
+        self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
+    ) -> Job[ResultT]:
+        """As the worker within; reading is not timed."""
+        return self.within.sense(
+            read, lambda given: self._timed(name, lambda: work(given)), latency_s=latency_s, name=name
+        )
+
+    def _timed(self, name: str, work: Callable[[], ResultT]) -> ResultT:
+        begun_s = time.perf_counter()
+        try:
+            return work()
+        finally:
+            self.spent_s.setdefault(name, []).append(round(time.perf_counter() - begun_s, 4))
+
+
+@dataclass
+class LastSpot:
+    """A journal that keeps where the place skill last lowered something: x and y (m) in the world, None for nowhere."""
+
+    spot_W: tuple[float, float] | None = None
+
+    def note(self, note: TickNote) -> None:
+        """Keep the spot of a running skill's checkpoint."""
+        for checkpoint in note.checkpoints.values():
+            if "spot_W" in checkpoint:
+                x, y = checkpoint["spot_W"]
+                self.spot_W = (x, y)
+
+    def replaced(self, tree: CompiledTree) -> LastSpot:
+        """The same."""
+        return self
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A mission that was run: result, log notes by time (s), last spot, seconds that each piece of work took."""
+
+    result: RobotResult
+    notes: Sequence[tuple[float, Mapping[str, Any]]]
+    spot_W: tuple[float, float] | None
+    spent_s: Mapping[str, Sequence[float]]
+
+
+def run_texts(simulation: Simulation, world: World, texts: Sequence[str], seed: int) -> Ran:
+    """Run a mission of commands in their text form, timed and noted."""
+    steps = tuple(MissionStep((parse_command(text),)) for text in texts)
+    mission = Mission("trial", str(world.folder), ROBOT, steps)
+    tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
+    spot = LastSpot()
+    entry = replace(run_entry(simulation, world, tree), journal=spot)
+    clock, notes = simulation.clock, list[tuple[float, Mapping[str, Any]]]()
+    with LockStepWorker(clock) as lock_step:
+        worker = TimedWorker(lock_step)
+        result = run(
+            [entry],
+            clock=clock,
+            worker=worker,
+            publish=lambda topic, message: notes.append((clock.now(), message)) if topic == "transitions" else None,
+            settings=RunSettings(seed=seed, time_limit_s=600.0),
+        ).worst
+    return Ran(result, notes, spot.spot_W, worker.spent_s)
+
+
 def poses(simulation: Simulation) -> dict[str, RigidTransform]:
     """The true pose of each loose object."""
     engine = simulation.engine
@@ -114,8 +218,8 @@ def others_of(trial: Trial) -> tuple[str, ...]:
     return tuple(str(each) for each in rng.choice([c for c in CLASSES if c != trial.class_name], trial.clutter))
 
 
-def attempt(trial: Trial) -> dict[str, Any]:
-    """Take, hold, put down; what the plant's truth says of it."""
+def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
+    """Take, hold, put down; what the plant's truth says of it, and how it ended where it failed, if pictured."""
     with tempfile.TemporaryDirectory() as folder:
         world = room(Path(folder), trial.class_name, others_of(trial), trial.surface, trial.seed, trial.model)
         simulation = simulate(world, seed=trial.seed, robot_name=ROBOT, record=False)
@@ -126,26 +230,14 @@ def attempt(trial: Trial) -> dict[str, Any]:
             "Take [Nothing] to [Nothing] and do [wait] to [12 second]",
             f"Take [{trial.class_name}] to [{SECOND}] and do [Nothing] to [Nothing]",
         )
-        steps = tuple(MissionStep((parse_command(text),)) for text in texts)
-        mission = Mission("trial", str(folder), ROBOT, steps)
-        tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
-        entry, clock, notes = run_entry(simulation, world, tree), simulation.clock, list[tuple[float, Any]]()
-        result = run(
-            [entry],
-            clock=clock,
-            worker=LockStepWorker(clock),
-            publish=lambda topic, message: notes.append((clock.now(), message)) if topic == "transitions" else None,
-            settings=RunSettings(seed=trial.seed, time_limit_s=600.0),
-        ).worst
-        after = poses(simulation)
+        ran = run_texts(simulation, world, texts, trial.seed)
+        after, middle_W = poses(simulation), middle(simulation)
         target = simulation.referee.objects[TARGET]
         put = target.resting and within(world.surfaces[SECOND], after[TARGET])
         upright = tilt_rad(before[TARGET], after[TARGET]) < UPRIGHT_RAD
-        grasping = [(at, note["to"]) for at, note in notes if "grasp" in note["node"].rsplit("/", 1)[-1]]
-        picks = [at for at, status in grasping if status == "SUCCESS"]
-        begun = [at for at, status in grasping if status == "RUNNING" and picks and at < picks[0]]
-        claimed = bool(picks)
-        return {
+        picks, begun = grasps(ran.notes)
+        claimed, succeeded = bool(picks), ran.result.outcome is Outcome.SUCCESS
+        judged = {
             "class": trial.class_name,
             "name": trial.name,
             "model": str(place_objects(world, trial.seed)[0].form.file),
@@ -156,14 +248,63 @@ def attempt(trial: Trial) -> dict[str, Any]:
             "held_10s": watch.longest_s >= HELD_S,
             "placed": put,
             "placed_upright": upright if put else None,
+            "place_error_m": place_error_m(ran.spot_W, middle_W) if put else None,
             "others_disturbed": sum(disturbed(before[name], after[name]) for name in before if name != TARGET),
             "claimed": claimed,
             "false_claim": claimed != watch.lifted,
             "collisions": len(simulation.referee.collisions),
-            "cause": "" if result.outcome is Outcome.SUCCESS else f"{result.cause}: {result.message}",
-            "sim_time_s": round(clock.now(), 1),
+            "cause": "" if succeeded else f"{ran.result.cause}: {ran.result.message}",
+            "sim_time_s": round(simulation.clock.now(), 1),
             "pick_s": round(picks[0] - begun[-1], 1) if begun else math.nan,
+            "planning_s": list(ran.spent_s.get(MOTION_WORK, ())),
+            "grasp_planning_s": list(ran.spent_s.get(GRASP_WORK, ())),
         }
+        pictured = trial.pictured and failure(judged)
+        return judged, ending_picture(simulation, middle_W) if pictured else None
+
+
+def grasps(notes: Sequence[tuple[float, Mapping[str, Any]]]) -> tuple[list[float], list[float]]:
+    """When the grasp skill succeeded, and when it had begun before the first success (s)."""
+    grasping = [(at, note["to"]) for at, note in notes if "grasp" in note["node"].rsplit("/", 1)[-1]]
+    picks = [at for at, status in grasping if status == "SUCCESS"]
+    return picks, [at for at, status in grasping if status == "RUNNING" and picks and at < picks[0]]
+
+
+def middle(simulation: Simulation) -> FloatArray:
+    """The middle (3,) of the target's bounding box in its own frame, where it is in the world now."""
+    engine = simulation.engine
+    world = engine.world
+    plant = world.plant
+    body = plant.get_body(plant.GetBodyIndices(plant.GetModelInstanceByName(TARGET))[0])
+    inspector = simulation_query(simulation).inspector()
+    boxes = [
+        (inspector.GetPoseInFrame(each), found)
+        for each in plant.GetCollisionGeometriesForBody(body)
+        if (found := inspector.GetObbInGeometryFrame(each)) is not None
+    ]
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1)
+    corners_O = np.hstack([X_OG @ box.pose() @ (signs * box.half_width()[:, None]) for X_OG, box in boxes])
+    p_O = (corners_O.min(axis=1) + corners_O.max(axis=1)) / 2.0
+    return np.asarray(plant.EvalBodyPoseInWorld(engine.context, body) @ p_O)
+
+
+def simulation_query(simulation: Simulation) -> QueryObject:
+    """The scene as it is now."""
+    engine = simulation.engine
+    scene = engine.world.scene
+    assert scene is not None
+    return scene.query_at(engine.world.plant.GetPositions(engine.context))
+
+
+def place_error_m(spot_W: Sequence[float] | None, p_W: FloatArray) -> float | None:
+    """How far (m) along the surface something is from the spot it was lowered on; None where it never was."""
+    return None if spot_W is None else round(float(np.linalg.norm(np.asarray(spot_W) - p_W[:2])), 4)
+
+
+def ending_picture(simulation: Simulation, p_W: FloatArray) -> Picture:
+    """What is about a point now, from a side where nothing hides it."""
+    query = simulation_query(simulation)
+    return render_view(query, best_view(query, p_W), (800, 600))
 
 
 def within(surface: SurfaceTop, X_WO: RigidTransform) -> bool:
@@ -184,12 +325,22 @@ def trials(options: argparse.Namespace) -> Iterator[Trial]:
     """`--trials` of each class, over the surfaces in turn; the seed chooses the clutter."""
     low, _, high = options.clutter.partition("-")
     targets = [(name, None) for name in options.classes.split(",")] if options.models is None else own(options.models)
+    surfaces, pictured = options.surfaces.split(","), options.sheet is not None
     for class_name, model in targets:
         for number in range(options.trials):
             seed = options.seed + number
-            surface = options.surfaces.split(",")[number % len(options.surfaces.split(","))]
             clutter = int(np.random.default_rng([seed, 3]).integers(int(low), int(high or low) + 1))
-            yield Trial(class_name, surface, clutter, seed, model)
+            yield Trial(class_name, surfaces[number % len(surfaces)], clutter, seed, model, pictured)
+
+
+def shape_trials(options: argparse.Namespace, folder: Path) -> Iterator[Trial]:
+    """`--trials` of each shape, one by each seed, over the surfaces in turn; they are written to a folder."""
+    surfaces, pictured = options.surfaces.split(","), options.sheet is not None
+    for index in range(options.shapes):
+        seed = options.seed + index
+        model = written_shape(seed, folder)
+        for number in range(options.trials):
+            yield Trial(THING, surfaces[(index + number) % len(surfaces)], 0, seed + 1000 * number, model, pictured)
 
 
 def own(folder: Path) -> list[tuple[str, Path | None]]:
@@ -209,6 +360,35 @@ def own(folder: Path) -> list[tuple[str, Path | None]]:
     return list(found)
 
 
+def failure(run: Mapping[str, Any]) -> str:
+    """Why a trial failed: the mission's cause, else what the truth denies; empty for a good one."""
+    return str(run["cause"]) or next((words for key, words in OUTCOMES.items() if not run[key]), "")
+
+
+def failures(runs: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A line for each class and cause with its number of failures, the commonest first."""
+    counted = Counter((str(run["name"]), failure(run)) for run in runs if failure(run))
+    return [f"{number:4}  {name:14} {cause}" for (name, cause), number in counted.most_common()]
+
+
+def caption(run: Mapping[str, Any]) -> str:
+    """A trial in a few words below its picture."""
+    return f"{run['name']} {run['surface']} {run['seed']}: {failure(run)}"[:55]
+
+
+def write_sheet(path: Path, shown: Sequence[tuple[Mapping[str, Any], Picture]]) -> str:
+    """Write a sheet of failed trials; what was written, in a line. Raises OSError when it cannot be."""
+    if not shown:
+        return f"no trial failed: {path} is not written"
+    save_png(path, contact_sheet([Shown(caption(each), picture, Judged((), (), ())) for each, picture in shown]))
+    return f"{path}: {len(shown)} failed trials"
+
+
+def left_s(done: int, count: int, elapsed_s: float) -> float:
+    """About how long (s) the rest of the trials take."""
+    return elapsed_s / done * (count - done)
+
+
 def told(run: dict[str, Any]) -> str:
     """One line of a trial."""
     marks = " ".join(
@@ -224,6 +404,7 @@ def summary(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Rates over all trials."""
     put = [run["placed_upright"] for run in runs if run["placed_upright"] is not None]
     timed = [run["pick_s"] for run in runs if not math.isnan(run["pick_s"])]
+    off = [run["place_error_m"] for run in runs if run["place_error_m"] is not None]
 
     def rate(key: str, chosen: Sequence[dict[str, Any]]) -> float:
         return round(float(np.mean([run[key] for run in chosen])), 3) if chosen else math.nan
@@ -233,6 +414,10 @@ def summary(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "held_rate": rate("held_10s", runs),
         "placed_rate": rate("placed", runs),
         "upright_rate": round(float(np.mean(put)), 3) if put else math.nan,
+        "placed_near_upright_rate": round(float(np.mean([near_upright(run) for run in runs])), 3),
+        "place_error_m_median": round(float(np.median(off or [math.nan])), 4),
+        "planning_s": spread([spent_s for run in runs for spent_s in run["planning_s"]]),
+        "grasp_planning_s": spread([spent_s for run in runs for spent_s in run["grasp_planning_s"]]),
         "disturbed_rate": round(float(np.mean([run["others_disturbed"] > 0 for run in runs])), 3),
         "false_claims": sum(run["false_claim"] for run in runs),
         "by_class": {c: rate("held_10s", [r for r in runs if r["name"] == c]) for c in {r["name"] for r in runs}},
@@ -244,23 +429,48 @@ def summary(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
+def spread(values: Sequence[float]) -> dict[str, float]:
+    """Their median and 95th percentile, nan without any."""
+    median, p95 = np.percentile(values or [math.nan], [50, 95])
+    return {"median": round(float(median), 3), "p95": round(float(p95), 3)}
+
+
+def near_upright(run: Mapping[str, Any]) -> bool:
+    """Whether it stands upright within 5 cm of the spot."""
+    error_m = run["place_error_m"]
+    return bool(run["placed_upright"] and error_m is not None and error_m <= NEAR_SPOT_M)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--classes", default=",".join(CLASSES))
-    parser.add_argument("--models", type=Path, help="objects of your own, in the place of the classes")
+    own_objects = parser.add_mutually_exclusive_group()
+    own_objects.add_argument("--models", type=Path, help="objects of your own, in the place of the classes")
+    own_objects.add_argument("--shapes", type=int, help="so many random shapes, in the place of the classes")
     parser.add_argument("--surfaces", default=",".join(SURFACES))
     parser.add_argument("--trials", type=int, default=3, help="of each class")
-    parser.add_argument("--clutter", default="0-4", help="how many others stand around, as LOW-HIGH")
+    parser.add_argument("--clutter", help="how many others stand around, as LOW-HIGH (0-4)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--sheet", type=Path, help="a PNG file with a picture of how each failed trial ended")
     parser.add_argument("--json", action="store_true", help="one line of JSON at the end, and nothing else")
     options = parser.parse_args()
-    runs = []
-    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
-        for each in pool.imap_unordered(attempt, list(trials(options))):
+    if options.shapes is not None and (options.shapes < 1 or options.clutter not in (None, "0")):
+        parser.error("--shapes takes at least one, as any object, alone on its surface: leave --clutter out")
+    options.clutter = options.clutter or "0-4"
+    runs, shown, begun_s = list[dict[str, Any]](), list[tuple[Mapping[str, Any], Picture]](), time.monotonic()
+    with tempfile.TemporaryDirectory() as folder, multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
+        chosen = list(trials(options) if options.shapes is None else shape_trials(options, Path(folder)))
+        for each, picture in pool.imap_unordered(attempt, chosen):
             runs.append(each)
-            print(told(each), file=sys.stderr, flush=True)
+            shown += [] if picture is None else [(each, picture)]
+            rest_s = left_s(len(runs), len(chosen), time.monotonic() - begun_s)
+            print(f"{told(each)}  [{len(runs)} of {len(chosen)}, {rest_s:.0f} s left]", file=sys.stderr, flush=True)
+    for line in failures(runs):
+        print(line, file=sys.stderr)
+    if options.sheet is not None:
+        print(write_sheet(options.sheet, shown), file=sys.stderr)
     print(json.dumps({"runs": runs, **summary(runs)}, indent=None if options.json else 1))
 
 

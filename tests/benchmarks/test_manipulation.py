@@ -1,0 +1,126 @@
+"""The manipulation benchmark's figures: spots, failures, sheets, shapes, ways through doors."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from plant.models.imported import read_imported
+from tests.benchmarks.carry import doors, entered
+from tests.benchmarks.manipulation import (
+    TimedWorker,
+    failure,
+    failures,
+    near_upright,
+    place_error_m,
+    spread,
+    write_sheet,
+)
+from tests.benchmarks.shapes import DENSITY_KG_M3, SLENDER, random_shape, written_shape
+
+GOOD = {
+    "name": "coke", "surface": "floor", "seed": 7, "cause": "",
+    "lifted": True, "held_10s": True, "placed": True, "placed_upright": True, "place_error_m": 0.02,
+}  # fmt: skip
+FALLEN = {**GOOD, "placed_upright": False}
+UNSEEN = {**GOOD, "cause": "PLANNING: no path", "placed": False, "placed_upright": None, "place_error_m": None}
+
+
+class DoneAtOnce:
+    """A worker that works when it is asked to, and gives the result as the job."""
+
+    def submit(self, work, *, latency_s, name):
+        return work()
+
+    def sense(self, read, work, *, latency_s, name):
+        return work(read())
+
+
+def test_a_place_error_is_measured_along_the_surface():
+    assert place_error_m((1.0, 2.0), np.array([1.03, 2.04, 0.8])) == pytest.approx(0.05)
+
+
+def test_without_a_spot_there_is_no_place_error():
+    assert place_error_m(None, np.zeros(3)) is None
+
+
+@pytest.mark.parametrize(
+    ("run", "near"), [(GOOD, True), ({**GOOD, "place_error_m": 0.06}, False), (FALLEN, False), (UNSEEN, False)]
+)
+def test_only_what_stands_upright_within_5_cm_counts_as_near(run, near):
+    assert near_upright(run) is near
+
+
+@pytest.mark.parametrize(
+    ("run", "why"), [(GOOD, ""), (FALLEN, "fell over on the second table"), (UNSEEN, "PLANNING: no path")]
+)
+def test_a_failure_is_told_by_the_mission_or_else_by_the_truth(run, why):
+    assert failure(run) == why
+
+
+def test_failures_are_counted_by_class_and_cause():
+    lines = [line.split() for line in failures([GOOD, UNSEEN, FALLEN, UNSEEN])]
+    assert [line[:2] for line in lines] == [["2", "coke"], ["1", "coke"]]
+
+
+def test_a_sheet_has_a_picture_for_each_failure(tmp_path: Path):
+    path = tmp_path / "made" / "sheet.png"
+    assert "2 failed trials" in write_sheet(path, [(UNSEEN, np.zeros((60, 80, 3), np.uint8))] * 2)
+    assert cv2.imread(str(path)).shape[1] == 2 * 400
+
+
+def test_without_failures_no_sheet_is_written(tmp_path: Path):
+    path = tmp_path / "sheet.png"
+    assert "no trial failed" in write_sheet(path, [])
+    assert not path.exists()
+
+
+def test_work_is_timed_by_name_also_when_it_fails():
+    worker = TimedWorker(DoneAtOnce())
+    assert worker.submit(lambda: 3, latency_s=0.1, name="plan") == 3
+    assert worker.sense(lambda: 3, lambda given: given + 1, latency_s=0.1, name="look") == 4
+    with pytest.raises(ZeroDivisionError):
+        worker.submit(lambda: 1 // 0, latency_s=0.1, name="plan")
+    assert {name: len(spent_s) for name, spent_s in worker.spent_s.items()} == {"plan": 2, "look": 1}
+
+
+def test_a_spread_without_values_is_not_a_number():
+    assert math.isnan(spread([])["p95"])
+    assert spread([1.0, 2.0, 3.0])["median"] == 2.0
+
+
+def test_shapes_stay_within_what_the_gripper_takes():
+    for seed in range(200):
+        shape = random_shape(seed)
+        x, y, z = shape.size_m
+        assert 0.02 <= y <= 0.10
+        assert 0.02 <= min(x, z) <= max(x, z) <= 0.30
+        assert shape.kind == "block" or z <= SLENDER * min(x, y)
+        assert DENSITY_KG_M3[0] <= shape.density_kg_m3 <= DENSITY_KG_M3[1]
+
+
+def test_a_seed_gives_the_same_shape_again():
+    assert random_shape(501) == random_shape(501) != random_shape(502)
+
+
+def test_a_shape_is_written_as_an_imported_object_of_its_size(tmp_path: Path):
+    pytest.importorskip("coacd")
+    made = read_imported(written_shape(502, tmp_path))
+    assert made.name == made.class_name == "cylinder_502"
+    assert sorted(made.size_m) == pytest.approx(sorted(random_shape(502).size_m), rel=0.02)
+
+
+def test_a_room_is_entered_once_and_a_doorway_is_none():
+    rooms = list[str]()
+    for room in ("kitchen", "kitchen", None, "hall", "hall", "bedroom", None, "hall"):
+        rooms = entered(rooms, room)
+    assert rooms == ["kitchen", "hall", "bedroom", "hall"]
+    assert doors(rooms) == 3
+
+
+def test_the_opening_between_hall_and_living_room_is_no_door():
+    assert doors(["hall", "living room", "kitchen"]) == 1

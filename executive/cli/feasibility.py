@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache, cached_property
 from pathlib import Path
-from xml.etree import ElementTree
 
 from executive.cli.requests import Prepared
 from executive.cli.route_cache import RouteCache, route_cache_of
@@ -104,13 +103,9 @@ def abilities_in(world: World) -> Abilities:
 
 @cache
 def abilities_of() -> Abilities:
-    """What the robot can lift, and what the lightest form of each class weighs."""
-    masses = {name: min(_mass_kg(form.path()) for form in one.forms.values()) for name, one in load_catalogue().items()}
+    """What the robot can lift, and what the lightest of each class weighs as far as is known of it, else 0.0."""
+    known = {name: form.mass_kg for name, form in class_forms().items() if name in load_catalogue()}
+    masses = {name: 0.0 if mass_kg is None else mass_kg[0] for name, mass_kg in known.items()}
     arm = spot_capabilities().arm
     lift_kg = 0.0 if arm is None else arm.max_payload_kg
     return Abilities(masses, lift_kg, frozenset(class_forms()), known_attributes())
-
-
-def _mass_kg(sdf: Path) -> float:
-    """The mass of a model, all its links together."""
-    return sum(float(mass.text or 0.0) for mass in ElementTree.parse(sdf).iter("mass"))

@@ -22,7 +22,7 @@ from skills.grasp.candidates import THIN_M, GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Obstacle, Surroundings, lifts
 from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, space_about
-from skills.grasp.refusals import known_too_heavy, without_grasp
+from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
@@ -115,7 +115,7 @@ class Grasp(ArmSkill[GraspInputs]):
         try:
             view, plan = yield from self._plan_from_a_height(seen, inputs.avoid)
             self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
-            yield from self._take(view, plan, str(thing))
+            yield from self._take(view, plan, seen)
         except SkillFailure as failure:
             yield from self._let_go(draw_back=len(self._tried) > len(inputs.avoid))
             raise self._telling(failure) from failure
@@ -301,11 +301,12 @@ class Grasp(ArmSkill[GraspInputs]):
             yield from self.compute(plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}")
         )
 
-    def _take(self, view: CloseView, plan: GraspPlan, thing: str) -> Routine[None]:
-        """Reach, close, lift, weigh.
+    def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[None]:
+        """Reach, close as firmly as what it weighs at least needs, lift, weigh, close as firmly as it needs.
 
         Raises SkillFailure with cause POSTCONDITION when it is not held then, PRECONDITION when it is too heavy.
         """
+        thing, least_kg = str(seen.thing), least_mass_kg(seen)
         yield from self.follow(plan.to_pregrasp, f"reaching for the {thing}")
         yield from self.follow(plan.to_grasp, f"reaching for the {thing}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
@@ -314,8 +315,8 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {thing}")
         X_BH = self.model.X_BH(self.q_rad())
         force_n = self.options.force_n + _PER_LEVER_N_M * plan.candidate.lever_m
-        force_n = min(force_n, _MOST_OF_FORCE * self.gripper.max_force_n)
-        yield from self.move_gripper(0.0, force_n, f"closing on the {thing}")
+        most_n = _MOST_OF_FORCE * self.gripper.max_force_n
+        yield from self.move_gripper(0.0, min(force_n + _PER_KG_N * least_kg, most_n), f"closing on the {thing}")
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
         X_BH = turned_in_hand(X_BH, self.p_HT) if view.target.upright else X_BH
@@ -329,7 +330,7 @@ class Grasp(ArmSkill[GraspInputs]):
         mass_kg = yield from self.weigh(p_HO, f"lifting the {thing}")
         self._check_held(thing, opening)
         yield from self._refuse_heavy(mass_kg, plan.lift_B, thing)
-        firmly_n = min(force_n + _PER_KG_N * max(mass_kg, 0.0), _MOST_OF_FORCE * self.gripper.max_force_n)
+        firmly_n = min(force_n + _PER_KG_N * max(mass_kg, least_kg), most_n)
         yield from self.move_gripper(0.0, firmly_n, f"lifting the {thing}")
 
     def _refuse_known_heavy(self, seen: ObjectObservation) -> None:

@@ -72,7 +72,7 @@ class Slippery(Grasp):
         chosen = others_first(grasp_candidates(view.target, MODEL.p_BS, GRIPPER), avoid, CENTRE, view.X_WB)[0]
         return type("Plan", (), {"candidate": chosen})()
 
-    def _take(self, view, plan, thing):
+    def _take(self, view, plan, seen):
         yield from self.pause(0.1, "taking")
         raise SkillFailure(Cause.POSTCONDITION, "it slipped")
 

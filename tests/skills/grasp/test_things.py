@@ -23,6 +23,7 @@ def test_of_two_that_touch_the_one_that_was_seen_is_taken_and_the_other_is_in_th
     assert view.target.centre_B == pytest.approx((at.x, at.y), abs=0.012)
     assert view.target.width_m == pytest.approx(0.066, abs=0.012)
     assert len(view.boxes) == 2  # the table and the other can
+    assert [(other.name, len(other.boxes)) for other in view.others] == [("thing", 1)]
 
 
 def test_a_thing_that_is_gone_is_not_seen():

@@ -50,7 +50,7 @@ _FEEL_S = 0.4
 _FLOOR_M = 0.06
 _STANDS_OUT_M, _HIGHEST_M, _OFF_SURFACE_M = 0.03, 0.5, 0.01
 _AT_HAND_M, _HIDDEN = 0.4, 0.5
-"""A picture of which half is nearer than that shows what is held, and not what lies behind it."""
+"""A picture of which half is nearer than that, or too near to tell, shows what is held and not what lies behind it."""
 _OVER_SPOT_M = 0.45
 _RELEASE_RAD = 0.4
 """The finger opens so far to let go, and no farther: wide open it would reach what stands beside."""
@@ -268,8 +268,8 @@ class Place(ArmSkill[PlaceInputs]):
         view = yield from self.compute(
             lambda: view_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
         )
-        near = np.mean((image.depth_m > 0.0) & (image.depth_m < _AT_HAND_M))
-        hidden = near > _HIDDEN and self.context.robot.gripper().holding
+        robot, near = self.context.robot, np.mean(image.depth_m < _AT_HAND_M)
+        hidden = near > _HIDDEN and robot.gripper().holding and robot.scan() is not None
         if view is None and not hidden:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
         return None if view is None or (hidden and len(free_spots(view, spots(surface))) == 0) else view

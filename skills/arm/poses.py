@@ -81,9 +81,10 @@ def _left_of(p_B: FloatArray, p_BT: FloatArray) -> FloatArray:
 def carry_configuration(scene: ArmScene, R_BH: RotationMatrix, q_near_rad: FloatArray) -> FloatArray:
     """Arm angles that hold the hand low over the body, the thing as upright as in R_BH, turned to the front.
 
-    Where that tilt cannot be kept, the hand points forward. Raises PlanningError when no pose is free.
+    Where that tilt cannot be kept, the hand points forward and a little up, so that the object lies on a finger and
+    leans to the palm; else level, or down. Raises PlanningError when no pose is free.
     """
-    for rotations in (_turned(R_BH), _forward()):
+    for rotations in (_turned(R_BH), *map(_forward, _CARRY_PITCHES_RAD)):
         candidates = [
             (cost, q)
             for rotation, (x, z) in itertools.product(rotations, _CARRY_PLACES)
@@ -96,6 +97,7 @@ def carry_configuration(scene: ArmScene, R_BH: RotationMatrix, q_near_rad: Float
     raise PlanningError("no pose to carry the thing near the body is free of contact")
 
 
+_CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
 _CARRY_PLACES = tuple(itertools.product((0.3, 0.35, 0.4, 0.45, 0.5), (0.26, 0.29, 0.32, 0.36, 0.41, 0.46, 0.54)))
 
 
@@ -112,8 +114,9 @@ def _turned(R_BH: RotationMatrix) -> list[RotationMatrix]:
     return [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in (0.0, 0.4, -0.4)]
 
 
-def _forward() -> list[RotationMatrix]:
+def _forward(pitches_rad: tuple[float, ...]) -> list[RotationMatrix]:
+    """Hands that point ahead, down by an angle."""
     return [
         RollPitchYaw(roll, pitch, 0.0).ToRotationMatrix()
-        for roll, pitch in itertools.product((0.0, np.pi), (0.0, 0.4, 0.8))
+        for roll, pitch in itertools.product((0.0, np.pi), pitches_rad)
     ]

@@ -14,6 +14,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from plant.carried import Carried
 from plant.diagram import TIME_STEP_S, LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
 from plant.locomotion.floating_base import FloatingBaseLimits
@@ -70,6 +71,10 @@ class Engine:
         }
         self.walkers = Walkers(world, self.context, routes)
         self._sleepers = Sleepers(world, self.root_context)
+        plant = world.plant
+        loose = [plant.get_body(index) for model in world.models.values() for index in plant.GetBodyIndices(model)]
+        self._carried = Carried(plant, self.context, loose)
+        self._hands = {name: plant.GetBodyByName(HAND_LINK, model.instance) for name, model in world.robots.items()}
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
         self._after_advance: list[Callable[[], None]] = []
@@ -116,6 +121,9 @@ class Engine:
             self.walkers.before_step(TIME_STEP_S)
             self._steps += 1
             self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
+            for name, spot in self._spots.items():
+                if spot.gripper().holding:
+                    self._carried.after_step(self._hands[name], TIME_STEP_S)
             self.work["plant_steps"] += 1
             for every, observer in self._observers:
                 if self._steps % every == 0:

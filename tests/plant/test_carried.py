@@ -23,7 +23,7 @@ def scene():
 
 def _set(plant, context, body, p_W, w_W, v_W):
     plant.SetFreeBodyPose(context, body, RigidTransform(p_W))
-    plant.SetFreeBodySpatialVelocity(context=context, body=body, V_PB=SpatialVelocity(w=w_W, v=v_W))
+    plant.SetFreeBodySpatialVelocity(context, body, SpatialVelocity(w=w_W, v=v_W))
 
 
 # where the object is, and how fast it moves -> how far it is moved (mm)

@@ -41,6 +41,7 @@ _FEEL_S = 0.4
 _AT_THING_M, _TURNS_BELOW_RAD = 0.4, 0.36
 _CARRY_RAD_S, _GENTLY_RAD_S, _LONG_LEVER_M = 0.9, 0.45, 0.05
 _HEIGHTS_TRIED = 2
+_GAP_BESIDE_M, _LESS_OPEN_RAD = 0.045, 0.2
 _LEVEL, _PULL_BACK_UP_M = 0.5, (0.02, 0.0)
 _DRAW_BACK_M = (0.18, 0.14, PREGRASPS_M[0], PREGRASPS_M[-1])
 
@@ -283,23 +284,41 @@ class Grasp(ArmSkill[GraspInputs]):
         candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
             raise SkillFailure(Cause.PLANNING, without_grasp(view.target, self.model.p_BS, self.gripper, thing))
-        opening = WIDE * self.open_rad
-        yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
-
+        openings_rad = self._openings_rad(candidates)
         scene_now, q, stack, seen = self.scene_now(), self.q_rad(), self.context.stack, self.seen_boxes()
         arm = self.context.robot.capabilities().arm
         reach_m = np.inf if arm is None else arm.max_reach_m
 
-        def plan() -> GraspPlan:
+        def plan() -> tuple[GraspPlan, float]:
             scene = scene_now()
-            scene.set_opening(opening)
             boxes = (*view.boxes, *seen)
             around = Surroundings(boxes, view.target_box, up_B, view.others, thing, reach_m)
-            return stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng)
+            for opening_rad in openings_rad:
+                scene.set_opening(opening_rad)
+                try:
+                    found = stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng)
+                except PlanningError:
+                    if opening_rad == openings_rad[-1]:
+                        raise
+                    continue
+                return found, opening_rad
+            raise AssertionError("there is at least one opening")
 
-        return (
-            yield from self.compute(plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}")
+        found, opening_rad = yield from self.compute(
+            plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}"
         )
+        yield from self.move_gripper(opening_rad, GRIPPER_FORCE_N, "opening the gripper")
+        return found
+
+    def _openings_rad(self, candidates: Sequence[GraspCandidate]) -> tuple[float, ...]:
+        """How far the gripper is open as it reaches: wide or, where neighbours leave no room for that, as far as needed.
+
+        The opening is about proportional to the finger's angle.
+        """
+        gap_m = min(each.width_m for each in candidates) + _GAP_BESIDE_M
+        wide_rad = WIDE * self.open_rad
+        narrow_rad = self.open_rad * gap_m / self.gripper.max_opening_m
+        return (wide_rad, narrow_rad) if narrow_rad < wide_rad - _LESS_OPEN_RAD else (wide_rad,)
 
     def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[None]:
         """Reach, close as firmly as what it weighs at least needs, lift, weigh, close as firmly as it needs.

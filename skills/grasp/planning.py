@@ -18,9 +18,10 @@ from skills.stack import ArmPlanner
 
 PREGRASPS_M = (0.12, 0.07, 0.045)
 """How far before the grasp the straight approach begins, the best first."""
-LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0))
+LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0), (0.03, 0.0))
 """Ways to lift, up and back towards the shoulder, the best first."""
 _SLOW_POINTS, _OTHERS_TRIED, _OUT_OF_REACH = 3, 3, "out of reach"
+_OFF_M = 0.015
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ class GeometricGraspPlanner:
                     continue
                 try:
                     approach = arm_planner.line(scene.model, q, candidate.X_BH, scene)
-                    return approach, _lift(scene, approach[-1], around.up_B, arm_planner)
+                    return approach, _lift(scene, approach[-1], around, arm_planner)
                 except PlanningError as error:
                     reason = str(error)
         raise PlanningError(reason)
@@ -202,14 +203,27 @@ def lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[Float
     return [up_m * up_B + back_m * back for up_m, back_m in LIFTS_M]
 
 
-def _lift(scene: ArmScene, q_rad: FloatArray, up_B: FloatArray, arm_planner: ArmPlanner) -> FloatArray:
-    """The first way to lift that the arm can follow and that touches nothing. Raises PlanningError."""
+def _lift(scene: ArmScene, q_rad: FloatArray, around: Surroundings, arm_planner: ArmPlanner) -> FloatArray:
+    """The first way to lift that the arm can follow, on which neither it nor the object touches anything.
+
+    Raises PlanningError.
+    """
     X_BH = scene.model.X_BH(q_rad)
-    for lift_B in lifts(scene.model, X_BH, up_B):
-        try:
-            lifted = RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B)
-            arm_planner.line(scene.model, q_rad, lifted, scene)
-        except PlanningError:
-            continue
-        return lift_B
+    scene.hold([_off_surface(X_BH.inverse(), around)])
+    try:
+        for lift_B in lifts(scene.model, X_BH, around.up_B):
+            try:
+                lifted = RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B)
+                arm_planner.line(scene.model, q_rad, lifted, scene)
+            except PlanningError:
+                continue
+            return lift_B
+    finally:
+        scene.hold(())
     raise PlanningError("the arm cannot lift the object from there")
+
+
+def _off_surface(X_HB: RigidTransform, around: Surroundings) -> Box:
+    """The object in the hand (frame H): a little less than its box, so that what it stands on and beside is off it."""
+    x, y, z = (max(side - 2.0 * _OFF_M, 0.005) for side in around.target.size_m)
+    return Box(X_HB @ around.target.X_FG, (x, y, z))

@@ -311,7 +311,7 @@ class Grasp(ArmSkill[GraspInputs]):
         return found
 
     def _openings_rad(self, candidates: Sequence[GraspCandidate]) -> tuple[float, ...]:
-        """How far the gripper is open as it reaches: wide or, where neighbours leave no room for that, as far as needed.
+        """How far the gripper is open as it reaches: wide or, where neighbours leave no room for it, as far as needed.
 
         The opening is about proportional to the finger's angle.
         """

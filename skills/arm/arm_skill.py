@@ -176,9 +176,15 @@ class ArmSkill(RoutineSkill[InputsT]):
         return q_goal_rad
 
     def move_straight(
-        self, p_BH: FloatArray, message: str, q_from_rad: FloatArray | None = None, *, clear_of_boxes: bool = False
-    ) -> Routine[None]:
-        """Move the hand straight to p_BH with the orientation that it has.
+        self,
+        p_BH: FloatArray,
+        message: str,
+        q_from_rad: FloatArray | None = None,
+        *,
+        clear_of_boxes: bool = False,
+        guard: Callable[[FloatArray], bool] | None = None,
+    ) -> Routine[bool]:
+        """Move the hand straight to p_BH with the orientation that it has; whether `guard` stopped it (see `follow`).
 
         The line begins at the joint angles of the arm, or at `q_from_rad`, which the arm about has. With
         `clear_of_boxes` it must not touch what stands around.
@@ -196,7 +202,7 @@ class ArmSkill(RoutineSkill[InputsT]):
             return planner.timed(planner.line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
 
         trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)
-        yield from self.follow(trajectory, message)
+        return (yield from self.follow(trajectory, message, guard))
 
     def shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[None]:
         """Move the hand straight by an offset in the body frame."""
@@ -218,12 +224,12 @@ class ArmSkill(RoutineSkill[InputsT]):
             yield Running(message)
         return float(np.median(found))
 
-    def held_up(self, direction_B: FloatArray) -> Callable[[FloatArray], bool]:
+    def held_up(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
         """A guard for `follow`: whether the hand, which moves slowly that way, lags as far as if something stops it."""
 
         def guard(q_wanted_rad: FloatArray) -> bool:
             lag = self.model.X_BH(q_wanted_rad).translation() - self.model.X_BH(self.q_rad()).translation()
-            return float(lag @ direction_B) > CONTACT_LAG_M
+            return float(lag @ direction_B) > lag_m
 
         return guard
 

@@ -36,6 +36,8 @@ ABOVE_M = 0.10
 """So high over the surface the object's lowest point is brought, before it goes down."""
 _SURELY_FREE_M = 0.03
 _PRESS_M = 0.03
+_LAG_IN_CONTACT_M = 0.02
+"""A hand that goes down fast lags by so much only in contact: what it holds hangs lower than was thought."""
 _SIDE_DROP_M, _LIFT_AGAIN_M = 0.12, 0.135
 _LEAST_BACK_M, _BACK_M = 0.08, (0.16, 0.12, 0.08, 0.05)
 """How far the hand is drawn back, the best first; a spot counts only where the hand gets back by the former."""
@@ -324,9 +326,11 @@ class Place(ArmSkill[PlaceInputs]):
         """
         message = f"putting the object down on the {surface.name}"
         p_BH = self.model.X_BH(q_above_rad).translation() - [0.0, 0.0, ABOVE_M - _SURELY_FREE_M]
-        yield from self.move_straight(p_BH, message, q_from_rad=q_above_rad)
-        down = self._way_down()
-        stopped = yield from self.follow(down, message, self.held_up(np.array([0.0, 0.0, -1.0])))
+        down_B = np.array([0.0, 0.0, -1.0])
+        early = self.held_up(down_B, _LAG_IN_CONTACT_M)
+        stopped = yield from self.move_straight(p_BH, message, q_from_rad=q_above_rad, guard=early)
+        if not stopped:
+            stopped = yield from self.follow(self._way_down(), message, self.held_up(down_B))
         if stopped:
             yield from self.try_shift_hand(np.array([0.0, 0.0, _RELAX_M]), message)
 

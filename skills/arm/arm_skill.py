@@ -98,12 +98,15 @@ class ArmSkill(RoutineSkill[InputsT]):
         return self._model
 
     def q_rad(self) -> FloatArray:
-        """Arm angles now. Raises SkillFailure with cause EXECUTION when the robot gives no numbers."""
+        """Arm angles now, within their limits, beyond which a servo may be by a little; no trajectory may begin there.
+
+        Raises SkillFailure with cause EXECUTION when the robot gives no numbers.
+        """
         positions = self.context.robot.joints().position_rad
         q = np.array([positions[name] for name in self.model.names])
         if not np.all(np.isfinite(q)):
             raise SkillFailure(Cause.EXECUTION, "the robot does not know its arm's angles")
-        return q
+        return np.asarray(np.clip(q, self.model.lower_rad, self.model.upper_rad))
 
     def X_WB(self) -> RigidTransform:
         """The body's pose in the world, as estimated."""

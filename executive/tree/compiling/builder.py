@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final
 
-from executive.mission.command import Command, Task
+from executive.mission.command import Command, Task, Thing
 from executive.mission.errors import InputError, SourceLine, suggestion
 from executive.mission.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.tree.behaviours.board import Binding, Constant, FromBoard
@@ -50,7 +50,8 @@ class PlanBuilder:
     """Makes the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
 
     `anywhere` says whether an object that is not in its place is looked for elsewhere, too, but never on the surfaces
-    in `avoided`: what lies there is where it is to go. With `in_gripper` an earlier step has grasped the object.
+    in `avoided`: what lies there is where it is to go. With `in_gripper` an earlier step has grasped the object;
+    `carried` is what an earlier step has grasped, whatever this one is about.
     What falls on the way is picked up again `pick_ups` times at most.
     """
 
@@ -63,6 +64,7 @@ class PlanBuilder:
     anywhere: bool = True
     avoided: frozenset[str] = frozenset()
     in_gripper: bool = False
+    carried: Thing | None = None
     pick_ups: int = PICK_UPS
 
     def at(self, *parts: str) -> PlanBuilder:

@@ -143,7 +143,19 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
     if command.goal is None:
         raise builder.error("the command asks for nothing", "name a place to go to, or an object")
     to = _called(builder, command.goal)
-    return builder.sequence(f"go to {to}", go_near_plan(builder, _goal_pose(builder, command.goal), to))
+    way = go_near_plan(builder, _goal_pose(builder, command.goal), to)
+    return builder.sequence(f"go to {to}", _carried_along(builder, way, f"to {to}"))
+
+
+def _carried_along(builder: PlanBuilder, way: NodeSpec, to: str) -> NodeSpec:
+    """A way on which what an earlier step has grasped stays in the gripper; it is picked up again where it falls.
+
+    An earlier step that failed and was passed over has grasped nothing: then there is nothing to watch.
+    """
+    if builder.carried is None:
+        return way
+    guard = _holding(builder.at("carried"), builder.carried, to, way, until_put_down=True)
+    return unless_fallen(builder.at("carry-on"), builder.carried, to, guard, (guard,))
 
 
 def _called(builder: PlanBuilder, goal: str) -> str:
@@ -167,7 +179,8 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
     if command.goal is None:
         return builder.sequence("wait here", pause)
     goal, to = _goal_pose(builder, command.goal), _called(builder, command.goal)
-    return builder.sequence(f"wait at {to}", go_near_plan(builder, goal, to), pause)
+    way = _carried_along(builder, go_near_plan(builder, goal, to), f"to {to}")
+    return builder.sequence(f"wait at {to}", way, pause)
 
 
 def charge_plan(builder: PlanBuilder) -> NodeSpec:

@@ -233,6 +233,28 @@ def test_what_falls_on_the_way_is_picked_up_from_the_floor_and_carried_on(carryi
     assert "the coke fell on the way to the bedroom; it is picked up again" in told
 
 
+def test_what_an_earlier_step_grasped_is_picked_up_again_when_it_falls_on_a_later_way(
+    compiled, run_tree, script, robot, published
+):
+    script.seen_on = ("counter", "floor")
+    tree = compiled(GRASP, "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")
+    script.steps, robot.standing = 40, Pose2D(-2.0, 0.0, 0.0)
+
+    def observer(progress):
+        if script.begun[-1:] == ["navigate"] and script.begun.count("grasp") == 1 and robot.holding:
+            robot.holding = False
+
+    assert run_tree(tree, observer=observer).worst.outcome is Outcome.SUCCESS
+    assert script.begun[script.begun.index("grasp") :].count("grasp") == 2
+    told = [message["message"] for topic, message in published if topic == "transitions"]
+    assert "the coke fell on the way to the bedroom; it is picked up again" in told
+
+
+def test_where_nothing_was_grasped_before_a_way_is_not_watched(compiled):
+    tree = compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")
+    assert "holding" not in " ".join(node.name for node in tree.root.walk())
+
+
 def test_a_loss_ends_the_running_skill_within_three_ticks(carrying, script, published):
     carrying(0.5)
     ended = next(m["t"] for topic, m in published if topic == "transitions" and m["cause"] is Cause.EXECUTION)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import ClassVar
 
 from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
@@ -13,8 +12,7 @@ from skills.approach.standing import Standing, free_places, go_to_one, is_comfor
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
-from skills.detect.viewpoints import surface_boxes
-from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, observed_target, space_about
+from skills.grasp.reach import body_heights_m, observed_target, reach_check
 from skills.grasp.refusals import without_grasp
 from skills.navigate.footprint import Footprint
 from skills.navigate.skill import NavigateInputs
@@ -120,19 +118,14 @@ class Approach(ArmSkill[ApproachInputs]):
 
     def _reach_cost(self, seen: ObjectObservation, surfaces: Sequence[Surface]) -> Callable[[], ReachCost]:
         """Gives, inside a Worker job, what a grasp of the object costs from a pose: None where none is reached."""
-        base_m, X_WB = seen.position_W[2] - 0.5 * seen.size_m[2], self.X_WB()
-        off_m = math.hypot(seen.position_W[0] - X_WB.translation()[0], seen.position_W[1] - X_WB.translation()[1])
-        self.known_W = space_about(seen.position_W, base_m)
-        boxes = [*surface_boxes(surfaces, X_WB), *self.seen_boxes(beyond_m=off_m)]
-        self.known_W = None
+        base_m, pose = seen.position_W[2] - 0.5 * seen.size_m[2], self.context.pose()
+        off_m = math.hypot(seen.position_W[0] - pose.x_m, seen.position_W[1] - pose.y_m)
         heights_m = body_heights_m(base_m, self.context.robot.capabilities())
-        candidates = partial(self.context.stack.grasp_planner.candidates, p_BS=self.model.p_BS, gripper=self.gripper)
-        scene_now, opening_rad = self.scene_now(boxes), WIDE * self.open_rad
+        check_now = reach_check(self, seen, surfaces, beyond_m=off_m)
 
         def prepared() -> ReachCost:
-            scene = scene_now()
-            scene.set_opening(opening_rad)
-            check = ReachCheck(scene, boxes, X_WB, seen, candidates)
+            """The cost by pose; all poses share one collision scene."""
+            check = check_now()
 
             def cost(pose: Pose2D) -> float | None:
                 best = check.best(pose.transform, heights_m)

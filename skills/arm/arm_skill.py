@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from skills.estimate.self_filter import segment_distance
 from skills.robot import ArmTrajectory, CameraCapabilities, FloatArray, GripperCapabilities, Image
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
+PlannedT = TypeVar("PlannedT")
 
 PLANNING_LATENCY_S = 0.3
 PICTURE_LATENCY_S = 0.1
@@ -161,6 +163,24 @@ class ArmSkill(RoutineSkill[InputsT]):
         points_B = (points_W - self.X_WB().translation()) @ self.X_WB().rotation().matrix()
         inside = (points_B[:, :2] > corners.min(axis=0) - 0.05) & (points_B[:, :2] < corners.max(axis=0) + 0.05)
         return np.asarray(np.all(inside, axis=1))
+
+    def from_a_height(
+        self, heights_m: Sequence[float], message: str, attempt: Callable[[], Routine[PlannedT]]
+    ) -> Routine[PlannedT]:
+        """What `attempt` gives with the body at the first of some heights (m) at which it finds a plan.
+
+        Raises SkillFailure: that of the last height, or the first one that is not for want of a plan.
+        """
+        *first_m, last_m = heights_m
+        for height_m in first_m:
+            yield from self.stand_at(height_m, message)
+            try:
+                return (yield from attempt())
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING:
+                    raise
+        yield from self.stand_at(last_m, message)
+        return (yield from attempt())
 
     def move_to(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[FloatArray]:
         """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration."""

@@ -140,7 +140,7 @@ class ArmScene:
 class _BuiltScene:
     """Drake's collision checker with the robot welded by its body and all boxes on one floating body.
 
-    Boxes are part of the model from the start: shapes that are added to a checker later cost 12 ms each.
+    Boxes are part of the model from the start: shapes that are added to a checker later cost 10 ms each.
     """
 
     def __init__(

@@ -193,16 +193,15 @@ def _candidate(
     beside_m: float,
 ) -> GraspCandidate | None:
     tilt, lean = attitude
+    cost = placement.cost + 0.4 * tilt
     ahead = np.array([np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad), 0.0])
     R_BH = RotationMatrix(AngleAxis(lean, ahead)) @ hand_rotation(tilt, placement.azimuth_rad, side)
     if target.upright and tilt > _FROM_ABOVE_RAD:
         below_top, depth = _top_grip(placement.half_depth_m, tilt, gripper)
         height = max(target.height_m - below_top, (gripper.tip_x_m - depth) * np.sin(tilt) + _TIPS_UP_M)
-        cost = placement.cost + 0.4 * tilt
     elif target.upright:
         height = max(float(np.clip(0.56 * target.height_m, 0.05, 0.095)), 0.45 * target.height_m)
         depth = gripper.palm_x_m + placement.half_depth_m + 0.008
-        cost = placement.cost + 0.4 * tilt
     else:
         beside_m = min(beside_m, _BESIDE_THIN_M) if target.height_m < THIN_M else beside_m
         low = _low_grip(R_BH, target.height_m, placement.width_m, gripper, beside_m)

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import ObjectObservation
+from skills.api import ObjectObservation, Surface
+from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
+from skills.detect.viewpoints import surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.planning import PREGRASPS_M, lifts, within_reach
 from skills.robot import Capabilities, FloatArray
@@ -156,3 +159,26 @@ def space_about(
     x, y, _ = position_W
     low = np.array([x - half_m, y - half_m, base_m - _SURFACE_BAND_M])
     return low, np.array([x + half_m, y + half_m, base_m + _KNOWN_ABOVE_M])
+
+
+def reach_check(
+    skill: ArmSkill[Any], seen: ObjectObservation, surfaces: Sequence[Surface], beyond_m: float = 0.0
+) -> Callable[[], ReachCheck]:
+    """Gives, inside a Worker job, the check of how a skill's arm reaches an object on some surfaces.
+
+    Around it stands what the hand camera has seen within the arm's reach and `beyond_m`, but just about the object.
+    """
+    X_WB, known_W = skill.X_WB(), skill.known_W
+    skill.known_W = space_about(seen.position_W, seen.position_W[2] - 0.5 * seen.size_m[2])
+    boxes = [*surface_boxes(surfaces, X_WB), *skill.seen_boxes(beyond_m)]
+    skill.known_W = known_W
+    candidates = partial(skill.context.stack.grasp_planner.candidates, p_BS=skill.model.p_BS, gripper=skill.gripper)
+    scene_now, opening_rad = skill.scene_now(boxes), WIDE * skill.open_rad
+
+    def check() -> ReachCheck:
+        """The check, with a collision scene of its own boxes."""
+        scene = scene_now()
+        scene.set_opening(opening_rad)
+        return ReachCheck(scene, boxes, X_WB, seen, candidates)
+
+    return check

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import reduce
 from typing import ClassVar
 
 import numpy as np
@@ -21,7 +22,7 @@ from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.grasp.candidates import THIN_M, GraspCandidate, Target
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Obstacle, Surroundings, lifts
-from skills.grasp.reach import WIDE, ReachCheck, body_heights_m, space_about
+from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import Detection3D, detections_3d
@@ -131,33 +132,26 @@ class Grasp(ArmSkill[GraspInputs]):
         self, seen: ObjectObservation, avoid: tuple[TriedGrasp, ...]
     ) -> Routine[tuple[CloseView, GraspPlan]]:
         """Look and plan with the body at the height that suits best, or at another where that one does not do."""
+
+        def look_and_plan() -> Routine[tuple[CloseView, GraspPlan]]:
+            """What is seen from the height at which the body stands, and a plan for it."""
+            view = yield from self._look_closely(seen)
+            return view, (yield from self._plan(view, str(seen.thing), avoid))
+
         heights_m = yield from self._heights(seen)
-        for number, height_m in enumerate(heights_m, start=1):
-            yield from self.stand_at(height_m, f"standing up to the {seen.thing}")
-            try:
-                view = yield from self._look_closely(seen)
-                return view, (yield from self._plan(view, str(seen.thing), avoid))
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING or number == len(heights_m):
-                    raise
-        raise AssertionError("there is at least one height")
+        return (yield from self.from_a_height(heights_m, f"standing up to the {seen.thing}", look_and_plan))
 
     def _heights(self, seen: ObjectObservation) -> Routine[list[float]]:
         """Body heights (m) from which the arm seems to reach the object, the best first; at least the usual one."""
-        base_m, X_WB = seen.position_W[2] - 0.5 * seen.size_m[2], self.X_WB()
+        base_m, pose = seen.position_W[2] - 0.5 * seen.size_m[2], self.context.pose()
         heights_m = body_heights_m(base_m, self.context.robot.capabilities())
         if len(heights_m) == 1:
             return list(heights_m)
-        surface = _square(seen.position_W, base_m, "guess", _SURFACE_AROUND_M)
-        self.known_W = space_about(seen.position_W, base_m)
-        boxes = [*surface_boxes([surface], X_WB), *self.seen_boxes()]
-        candidates = partial(self.context.stack.grasp_planner.candidates, p_BS=self.model.p_BS, gripper=self.gripper)
-        scene_now, opening_rad, pose = self.scene_now(boxes), WIDE * self.open_rad, self.context.pose()
+        check_now = reach_check(self, seen, [_square(seen.position_W, base_m, "guess", _SURFACE_AROUND_M)])
 
         def choose() -> list[float]:
-            scene = scene_now()
-            scene.set_opening(opening_rad)
-            found = ReachCheck(scene, boxes, X_WB, seen, candidates).all(pose.transform, heights_m)
+            """The heights by what the best grasp from each costs."""
+            found = check_now().all(pose.transform, heights_m)
             return [each.height_m for each in sorted(found, key=lambda each: each.cost)][:_HEIGHTS_TRIED]
 
         chosen = yield from self.compute(
@@ -289,20 +283,20 @@ class Grasp(ArmSkill[GraspInputs]):
         arm = self.context.robot.capabilities().arm
         reach_m = np.inf if arm is None else arm.max_reach_m
 
+        around = Surroundings((*view.boxes, *seen), view.target_box, up_B, view.others, thing, reach_m)
+
+        def planned(scene: ArmScene, opening_rad: float) -> tuple[GraspPlan, float]:
+            """A plan for a gripper that is open so far, and that opening."""
+            scene.set_opening(opening_rad)
+            return stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng), opening_rad
+
         def plan() -> tuple[GraspPlan, float]:
-            scene = scene_now()
-            boxes = (*view.boxes, *seen)
-            around = Surroundings(boxes, view.target_box, up_B, view.others, thing, reach_m)
-            for opening_rad in openings_rad:
-                scene.set_opening(opening_rad)
-                try:
-                    found = stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng)
-                except PlanningError:
-                    if opening_rad == openings_rad[-1]:
-                        raise
-                    continue
-                return found, opening_rad
-            raise AssertionError("there is at least one opening")
+            """A plan for the first opening for which there is one."""
+            scene, (*first_rad, last_rad) = scene_now(), openings_rad
+            for opening_rad in first_rad:
+                with suppress(PlanningError):
+                    return planned(scene, opening_rad)
+            return planned(scene, last_rad)
 
         found, opening_rad = yield from self.compute(
             plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}"

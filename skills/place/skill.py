@@ -166,14 +166,16 @@ class Place(ArmSkill[PlaceInputs]):
         Gives the joint angles that the arm is to have there.
         """
         spot_W, gone_to = _nearest_spot(surface, self.X_WB()), list[FloatArray]()
+        heights_m, standing = self._heights_m(surface), f"standing up to the {surface.name}"
         while True:
-            yield from self.stand_at(self._heights_m(surface)[0], f"standing up to the {surface.name}")
+            yield from self.stand_at(heights_m[0], standing)
             on_floor, standing_W = surface.height_m < _FLOOR_M, self._standing_W(surface)
             view = yield from self._look_at_floor(surface) if on_floor else self._look(surface, spot_W)
             if view is None or (on_floor and len(free_spots(view, spots(surface))) == 0):
                 view = unseen_view(surface, standing_W)
             try:
-                return (yield from self._go_above_from_a_height(surface, view, held))
+                above = partial(self._go_above, surface, view, held)
+                return (yield from self.from_a_height(heights_m, standing, above))
             except SkillFailure as failure:
                 others = roomiest_first(free_spots(view, spots(surface)), view, [*gone_to, spot_W])
                 if failure.cause is not Cause.PLANNING or len(others) == 0 or len(gone_to) >= self.options.moves:
@@ -289,18 +291,6 @@ class Place(ArmSkill[PlaceInputs]):
             view = yield from self.compute(segment, latency_s=0.15, name="segment", message=message)
             views += [] if view is None else [view]
         return max(views, key=lambda view: len(view.plane_points), default=None)
-
-    def _go_above_from_a_height(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
-        """As `_go_above`, with the body at the first height from which the arm gets there."""
-        heights_m = self._heights_m(surface)
-        for number, height_m in enumerate(heights_m, start=1):
-            yield from self.stand_at(height_m, f"standing up to the {surface.name}")
-            try:
-                return (yield from self._go_above(surface, view, held))
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING or number == len(heights_m):
-                    raise
-        raise AssertionError("there is at least one height")
 
     def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
         """Bring the object above the best free spot; gives the joint angles that the arm is to have there."""

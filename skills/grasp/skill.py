@@ -5,41 +5,37 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import reduce
 from typing import ClassVar
 
 import numpy as np
-from pydrake.common.eigen_geometry import AngleAxis
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
-from skills.api import Cause, LocalisationEstimate, ObjectObservation, PlanningError, Succeeded, Surface
+from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
-from skills.arm.collision import ArmScene, Box, box_corners
+from skills.arm.collision import ArmScene, box_corners
 from skills.arm.hold import Grip, HoldWatch, grip_again
 from skills.arm.poses import carry_configuration, close_viewpoints, look_configuration, overview_viewpoints
 from skills.arm.routine import Routine, SkillFailure
-from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
-from skills.grasp.candidates import THIN_M, GraspCandidate, Target
+from skills.detect.viewpoints import surface_boxes
+from skills.grasp.candidates import THIN_M, GraspCandidate
+from skills.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseView, examine, square
+from skills.grasp.in_hand import held_box, turned_in_hand
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Obstacle, Surroundings, lifts
+from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.perception.class_forms import THING
-from skills.perception.detection_3d import Detection3D, detections_3d
+from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
-from skills.perception.point_cloud import camera_pose_W
-from skills.perception.surface_segmentation import Cluster, SurfaceView, apart, cluster_of, parted, view_surface
 from skills.quantities import Force, Length, Margin, Turn
-from skills.robot import FloatArray, Image
+from skills.robot import FloatArray
 
-_LOOK_HALF_SIDE_M = 0.4
 _CLOSED_RAD = 0.06
 _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95
 _RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.014, 0.12, 0.8
-_SURFACE_AROUND_M, _SURFACE_YIELDS_M = 0.2, 0.003
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
-_AT_THING_M, _TURNS_BELOW_RAD = 0.4, 0.36
+_AT_THING_M = 0.4
 _CARRY_RAD_S, _GENTLY_RAD_S, _LONG_LEVER_M = 0.9, 0.45, 0.05
 _HEIGHTS_TRIED = 2
 _GAP_BESIDE_M, _LESS_OPEN_RAD = 0.045, 0.2
@@ -53,17 +49,6 @@ class GraspInputs:
 
     observation: ObjectObservation
     avoid: tuple[TriedGrasp, ...] = ()
-
-
-@dataclass(frozen=True)
-class CloseView:
-    """The object and what is around it, seen closely; X_WB at that time. `others` are objects among the boxes."""
-
-    target: Target
-    boxes: tuple[Box, ...]
-    target_box: Box
-    X_WB: RigidTransform
-    others: tuple[Obstacle, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -147,7 +132,7 @@ class Grasp(ArmSkill[GraspInputs]):
         heights_m = body_heights_m(base_m, self.context.robot.capabilities())
         if len(heights_m) == 1:
             return list(heights_m)
-        check_now = reach_check(self, seen, [_square(seen.position_W, base_m, "guess", _SURFACE_AROUND_M)])
+        check_now = reach_check(self, seen, [square(seen.position_W, base_m, "guess", SURFACE_AROUND_M)])
 
         def choose() -> list[float]:
             """The heights by what the best grasp from each costs."""
@@ -228,7 +213,7 @@ class Grasp(ArmSkill[GraspInputs]):
         base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
         best: CloseView | None = None
         for aside_rad in _ASIDE_RAD:
-            self.boxes = surface_boxes([_square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
+            self.boxes = surface_boxes([square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
             self.known_W = space_about(seen.position_W, base_m)
             try:
                 view = yield from self._look_from(seen, base_m, aside_rad)
@@ -242,13 +227,13 @@ class Grasp(ArmSkill[GraspInputs]):
                 break
         if best is None:
             raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} is no longer where it was seen")
-        self.known_W = space_about(seen.position_W, base_m, _LOOK_HALF_SIDE_M)
+        self.known_W = space_about(seen.position_W, base_m, LOOK_HALF_SIDE_M)
         return best
 
     def _look_from(self, seen: ObjectObservation, base_m: float, aside_rad: float) -> Routine[CloseView | None]:
         """What a picture from near shows of the object, the camera turned about it; None when it is not there."""
         message = f"looking closely at the {seen.thing}"
-        surface = _square(seen.position_W, base_m, seen.surface or "surface")
+        surface = square(seen.position_W, base_m, seen.surface or "surface")
         X_HC = self.hand_camera.X_FC
         p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
 
@@ -262,14 +247,14 @@ class Grasp(ArmSkill[GraspInputs]):
         image = yield from self.picture(message)
         place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
 
-        def examine() -> CloseView | None:
+        def look() -> CloseView | None:
             found = detections_in(detector, image)
             named = [each for each in found if seen.thing.name in (THING, each.class_name)]
             rest = [each for each in found if each not in named]
             placed = tuple(one for some in (named, rest) for one in detections_3d(image, place, some, [surface]))
-            return _examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
+            return examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)
 
-        return (yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message))
+        return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="detect closely", message=message))
 
     def _plan(self, view: CloseView, thing: str, avoid: tuple[TriedGrasp, ...]) -> Routine[GraspPlan]:
         self.boxes = view.boxes
@@ -333,7 +318,7 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.pause(0.4, f"closing on the {thing}")
         opening = self._check_held(thing, None)
         X_BH = turned_in_hand(X_BH, self.p_HT) if view.target.upright else X_BH
-        self.held = [_held_box(X_BH.inverse(), view.target_box)]
+        self.held = [held_box(X_BH.inverse(), view.target_box)]
         self.context.payload.corners_H = box_corners(self.held[0])
         self.context.payload.R_BH = X_BH.rotation()
         self._watch = HoldWatch()
@@ -450,119 +435,3 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _up_B(self) -> FloatArray:
         return np.asarray(self.X_WB().rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
-
-
-def turned_in_hand(X_BH: RigidTransform, p_HT: FloatArray) -> RigidTransform:
-    """The hand's pose at which something upright, held at p_HT of the hand, would have been taken square to it.
-
-    The fingers are a groove: what stands and is taken by a hand tilted a little turns in it on the way, until it is
-    square to the fingers (measured in the plant: from 10 to 0 degrees within half a minute). Then the level hand, with
-    which it stands upright again, is what counts. A hand tilted more is left as it is.
-    """
-    fingers = X_BH.rotation().matrix()[:, 0]
-    if abs(fingers[2]) > np.sin(_TURNS_BELOW_RAD):
-        return X_BH
-    level = RotationMatrix(AngleAxis(-float(np.arcsin(-fingers[2])), _level_axis(fingers))) @ X_BH.rotation()
-    return RigidTransform(level, X_BH @ p_HT - level @ p_HT)
-
-
-def _level_axis(fingers_B: FloatArray) -> FloatArray:
-    """The level axis about which fingers that point down by an angle are turned, by which they come to point down."""
-    return np.asarray(np.array([-fingers_B[1], fingers_B[0], 0.0]) / np.hypot(fingers_B[0], fingers_B[1]))
-
-
-def _square(
-    position_W: tuple[float, float, float], height_m: float, name: str, half: float = _LOOK_HALF_SIDE_M
-) -> Surface:
-    """A square patch about a point."""
-    x, y, _ = position_W
-    corners = ((x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half))
-    return Surface(name, corners, height_m)
-
-
-def _examine(
-    image: Image,
-    X_WB: RigidTransform,
-    surface: Surface,
-    seen: ObjectObservation,
-    place: LocalisationEstimate,
-    found: tuple[Detection3D, ...],
-    within_m: float,
-) -> CloseView | None:
-    view = view_surface(image, place.X_WO, surface, margin_m=0.0)
-    if view is None:
-        return None
-    own = [each for each in found if seen.thing.name in (THING, each.detection.class_name)]
-    view = reduce(parted, own, view)
-    if seen.thing.name == THING:
-        view, own = apart(view, camera_pose_W(image, place.X_WO).translation()), []
-    cluster = _same_thing(view, seen, own, within_m)
-    if cluster is None:
-        return None
-    names = {id(cluster_of(view.clusters, each)): each.detection.class_name for each in found}
-    others = tuple(
-        Obstacle(names.get(id(each), THING), tuple(cluster_boxes([each], X_WB)))
-        for each in view.clusters
-        if each is not cluster
-    )
-    surfaces = surface_boxes([_seen_surface(view, surface, cluster.shape.centre)], X_WB)
-    boxes = (*surfaces, *(box for other in others for box in other.boxes))
-    return CloseView(_target(cluster, X_WB), boxes, cluster_box(cluster, X_WB), X_WB, others)
-
-
-def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:
-    """The surface as far as its own points show it, and as much all around the object, since its edge may be unseen.
-
-    It lies a little low: fingers that take something thin come within a millimetre of it, and feel for it.
-    """
-    xy = view.plane_points.p_W[:, :2]
-    low, high = np.percentile(xy, [0.2, 99.8], axis=0)
-    low, high = (
-        np.minimum(low, np.array(centre) - _SURFACE_AROUND_M),
-        np.maximum(high, np.array(centre) + _SURFACE_AROUND_M),
-    )
-    corners = ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
-    top_m = view.plane.height_m - _SURFACE_YIELDS_M
-    return Surface(surface.name, tuple((float(x), float(y)) for x, y in corners), top_m)
-
-
-def _same_thing(
-    view: SurfaceView, seen: ObjectObservation, found: Sequence[Detection3D], within_m: float
-) -> Cluster | None:
-    """The cluster that is the object: detected as of its class and nearest, else nearest of all; None: all are far."""
-    expected = np.array(seen.position_W[:2])
-
-    def off(cluster: Cluster) -> float:
-        return float(np.linalg.norm(np.array(cluster.shape.centre) - expected))
-
-    classed = [cluster for each in found if (cluster := cluster_of(view.clusters, each)) is not None]
-    for clusters in (classed, view.clusters):
-        near = [cluster for cluster in clusters if off(cluster) < within_m]
-        if near:
-            return min(near, key=off)
-    return None
-
-
-def _target(cluster: Cluster, X_WB: RigidTransform) -> Target:
-    X_BW = X_WB.inverse()
-    shape = cluster.shape
-    points_B = cluster.points.p_W @ X_BW.rotation().matrix().T + X_BW.translation()
-    centre_B = X_BW @ np.array([*shape.centre, cluster.base_m])
-    axis_B = X_BW.rotation().matrix() @ np.array([np.cos(shape.yaw_rad), np.sin(shape.yaw_rad), 0.0])
-    return Target(
-        points_B=points_B,
-        centre_B=(float(centre_B[0]), float(centre_B[1])),
-        yaw_rad=float(np.arctan2(axis_B[1], axis_B[0])),
-        length_m=shape.length_m,
-        width_m=shape.width_m,
-        height_m=shape.height_m,
-        base_m=float(centre_B[2]),
-        round=shape.round,
-    )
-
-
-def _held_box(X_HB: RigidTransform, box: Box) -> Box:
-    """A box in B as the upright box about it in H, for the object once it is held."""
-    corners = box_corners(Box(X_HB @ box.X_FG, box.size_m))
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    return Box(RigidTransform(0.5 * (low + high)), tuple(float(v) for v in np.maximum(high - low - 0.02, 0.01)))  # type: ignore[arg-type]

@@ -11,9 +11,9 @@ from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 from skills.api import ObjectObservation, Thing
 from skills.arm.collision import ArmScene, Box
 from skills.grasp.candidates import hand_rotation
+from skills.grasp.in_hand import turned_in_hand
 from skills.grasp.planning import GeometricGraspPlanner
 from skills.grasp.reach import ReachCheck, body_heights_m, space_about
-from skills.grasp.skill import turned_in_hand
 from skills.robot import Pose2D
 
 CANDIDATES = partial(GeometricGraspPlanner().candidates, p_BS=MODEL.p_BS, gripper=GRIPPER)

@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform
 from table_scene import GREEN, TABLE, Can, scene
 
 from skills.api import LocalisationEstimate, ObjectObservation, Thing
-from skills.grasp.skill import _examine
+from skills.grasp.close_view import examine
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
 ONE, OTHER = Can(1.0, 0.0, 0.033, 0.115, GREEN), Can(1.0, 0.067, 0.033, 0.115, GREEN)
@@ -14,7 +14,7 @@ ONE, OTHER = Can(1.0, 0.0, 0.033, 0.115, GREEN), Can(1.0, 0.067, 0.033, 0.115, G
 
 def examined(things, at):
     seen = ObjectObservation(0.0, Thing("thing"), (at.x, at.y, 0.81), (0.066, 0.066, 0.115), 0.0, 0.7, "table")
-    return _examine(scene(things), RigidTransform(), TABLE, seen, PLACE, (), 0.12)
+    return examine(scene(things), RigidTransform(), TABLE, seen, PLACE, (), 0.12)
 
 
 @pytest.mark.parametrize("at", [ONE, OTHER])

@@ -99,7 +99,14 @@ class Approach(ArmSkill[ApproachInputs]):
     def _look_again(self, inputs: ApproachInputs) -> Routine[Succeeded]:
         seen = inputs.observation
         surfaces, on_floor = own_surfaces(inputs), seen.surface == FLOOR
-        again = DetectInputs((seen.thing.name,), surfaces, seen.thing.attributes, seen.position_W, floor=on_floor)
+        again = DetectInputs(
+            (seen.thing.name,),
+            surfaces,
+            seen.thing.attributes,
+            seen.position_W,
+            floor=on_floor,
+            seen_before=seen,
+        )
         found = yield from self.perform(Detect(self.context), again)
         return Succeeded(f"standing before the {seen.thing}", found.outputs)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeVar
 
@@ -16,7 +17,7 @@ from skills.arm.kinematics import ArmModel, arm_model
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.arm.solid_cells import solid_boxes, with_picture
 from skills.estimate.self_filter import segment_distance
-from skills.robot import ArmTrajectory, CameraCapabilities, FloatArray, GripperCapabilities, Image
+from skills.robot import ArmTrajectory, CameraCapabilities, CommandId, FloatArray, GripperCapabilities, Image
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
 PlannedT = TypeVar("PlannedT")
@@ -31,6 +32,8 @@ CONTACT_LAG_M = 0.006
 """A hand that moves slowly and freely lags by 2 mm at most (measured in the plant); in contact it lags more at once."""
 WEIGHING_S = 0.3
 _STEP_RAD, _GRAVITY_M_S2 = 1e-4, 9.81
+_TURNS_WITHIN_S, _TURN_CHECKED = 1.6, 3
+"""The gripper has turned within so long (s); each such sample of the arm's trajectory is checked meanwhile."""
 _AT_ARM_M = 0.12
 _BEYOND_M = 0.5
 
@@ -41,6 +44,41 @@ def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm:
     rises = [(model.X_BH(q_rad + step) @ p_HO - model.X_BH(q_rad - step) @ p_HO)[2] for step in steps]
     lever_nm = _GRAVITY_M_S2 * np.array(rises) / (2.0 * _STEP_RAD)
     return float(lever_nm @ extra_nm / (lever_nm @ lever_nm))
+
+
+@dataclass(frozen=True)
+class GripperTurn:
+    """The gripper turns from one opening to another (rad) while the arm moves."""
+
+    from_rad: float
+    to_rad: float
+
+    @property
+    def closes(self) -> bool:
+        """Whether it ends narrower than it began."""
+        return self.to_rad < self.from_rad
+
+    @property
+    def narrow_rad(self) -> float:
+        """The narrower opening, for which the arm's motion is planned."""
+        return max(0.0, min(self.from_rad, self.to_rad))
+
+    def begins_s(self, scene: ArmScene, trajectory: ArmTrajectory) -> float | None:
+        """When on a trajectory the gripper may begin to turn: as long as it is wide it touches nothing.
+
+        None where there is no room for it on the way.
+        """
+        scene.set_opening(max(self.from_rad, self.to_rad))
+        times_s = trajectory.times_s
+        if self.closes:
+            wide = trajectory.positions_rad[times_s <= _TURNS_WITHIN_S]
+            return 0.0 if scene.path_free(wide[::_TURN_CHECKED]) else None
+        begin_s = None
+        for time_s, q_rad in zip(times_s[::-_TURN_CHECKED], trajectory.positions_rad[::-_TURN_CHECKED], strict=True):
+            if times_s[-1] - time_s > _TURNS_WITHIN_S or not scene.free(q_rad):
+                break
+            begin_s = float(time_s)
+        return begin_s
 
 
 class ArmSkill(RoutineSkill[InputsT]):
@@ -182,21 +220,48 @@ class ArmSkill(RoutineSkill[InputsT]):
         yield from self.stand_at(last_m, message)
         return (yield from attempt())
 
-    def move_to(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[FloatArray]:
-        """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration."""
+    def move_to(
+        self, goal: Goal, message: str, speed_rad_s: float | None = None, opening_rad: float | None = None
+    ) -> Routine[FloatArray]:
+        """Plan to the configuration that `goal(scene, q_now)` gives, and go there; gives that configuration.
 
-        scene_now, start = self.scene_now(), self.q_rad()
+        The gripper comes to `opening_rad` on the way, as long as its wider opening is free of contact there; what it
+        cannot do on the way it does before when it closes, afterwards when it opens.
+        """
 
-        def plan() -> tuple[ArmTrajectory, FloatArray]:
+        scene_now, start, now_rad = self.scene_now(), self.q_rad(), self.context.robot.gripper().opening_rad
+        turn = None if opening_rad is None else GripperTurn(now_rad, opening_rad)
+
+        def plan() -> tuple[ArmTrajectory, FloatArray, float | None]:
             scene, planner = scene_now(), self.context.stack.arm_planner
+            if turn is not None:
+                scene.set_opening(turn.narrow_rad)
             path = planner.path(scene, start, goal(scene, start), self._rng)
-            return planner.timed(path, speed_rad_s=speed_rad_s, scene=scene), path[-1]
+            trajectory = planner.timed(path, speed_rad_s=speed_rad_s, scene=scene)
+            return trajectory, path[-1], None if turn is None else turn.begins_s(scene, trajectory)
 
-        trajectory, q_goal_rad = yield from self.compute(
+        trajectory, q_goal_rad, turn_s = yield from self.compute(
             plan, latency_s=PLANNING_LATENCY_S, name="plan arm motion", message=message
         )
-        yield from self.follow(trajectory, message)
+        if turn is None:
+            yield from self.follow(trajectory, message)
+            return q_goal_rad
+        if turn_s is None and turn.closes:
+            yield from self.move_gripper(turn.to_rad, GRIPPER_FORCE_N, message)
+        yield from self.follow(trajectory, message, None if turn_s is None else self._turning(turn, turn_s))
+        yield from self.move_gripper(turn.to_rad, GRIPPER_FORCE_N, message)
         return q_goal_rad
+
+    def _turning(self, turn: GripperTurn, after_s: float) -> Callable[[FloatArray], bool]:
+        """A guard for `follow` that stops nothing: it gives the gripper its command after a while."""
+        begins_s, given = self.context.clock.now() + after_s, list[CommandId]()
+
+        def guard(q_wanted_rad: FloatArray) -> bool:
+            if not given and self.context.clock.now() >= begins_s:
+                given.append(self.issue(self.gripper_command(turn.to_rad, GRIPPER_FORCE_N)))
+            return False
+
+        return guard
 
     def move_straight(
         self,
@@ -282,20 +347,21 @@ class ArmSkill(RoutineSkill[InputsT]):
         """Where the middle of what the gripper holds is in the hand frame (3,), m."""
         return np.array([self.gripper.grip_x_m, 0.0, 0.0])
 
-    def clear_view(self, message: str) -> Routine[None]:
-        """Open an empty gripper, which else stands before the hand camera."""
+    def look_from(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[None]:
+        """Go where `goal` says to take a picture; an empty gripper, which else stands before the camera, opens."""
         gripper = self.context.robot.gripper()
-        if not gripper.holding and gripper.opening_rad < 0.9 * self.open_rad:
-            yield from self.move_gripper(0.98 * self.open_rad, GRIPPER_FORCE_N, message)
+        opens = not gripper.holding and gripper.opening_rad < 0.9 * self.open_rad
+        yield from self.move_to(goal, message, speed_rad_s, opening_rad=0.98 * self.open_rad if opens else None)
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
         """Close the gripper and fold the arm onto the body; nothing is done where it lies there already."""
         stowed = self.model.stowed_rad
         gripper = self.context.robot.gripper()
-        if not gripper.holding and gripper.opening_rad > 0.05:
-            yield from self.move_gripper(0.0, GRIPPER_FORCE_N, message)
+        closing_rad = 0.0 if not gripper.holding and gripper.opening_rad > 0.05 else None
         if np.max(np.abs(self.q_rad() - stowed)) > 0.05:
-            yield from self.move_to(lambda scene, q: stowed, message)
+            yield from self.move_to(lambda scene, q: stowed, message, opening_rad=closing_rad)
+        elif closing_rad is not None:
+            yield from self.move_gripper(closing_rad, GRIPPER_FORCE_N, message)
 
     def picture(self, message: str) -> Routine[Image]:
         """A new picture of the hand camera, once the arm is still.

@@ -61,6 +61,19 @@ def close_viewpoints(p_BS: FloatArray, p_BT: FloatArray, shift_rad: float = 0.0)
     ]
 
 
+def sees_closely(X_BC: RigidTransform, p_BT: FloatArray) -> bool:
+    """Whether a camera at X_BC looks at p_BT about as from one of the `close_viewpoints` that are not turned aside."""
+    offset = p_BT - X_BC.translation()
+    distance_m = float(np.linalg.norm(offset))
+    off_axis_rad = np.arccos(np.clip(X_BC.rotation().matrix()[:, 2] @ offset / distance_m, -1.0, 1.0))
+    below_rad = np.arcsin(-offset[2] / distance_m)
+    near = _CLOSE_M[0] < distance_m < _CLOSE_M[1] and _CLOSE_BELOW_RAD[0] < below_rad < _CLOSE_BELOW_RAD[1]
+    return bool(near and off_axis_rad < _CLOSE_OFF_AXIS_RAD)
+
+
+_CLOSE_M, _CLOSE_BELOW_RAD, _CLOSE_OFF_AXIS_RAD = (0.33, 0.5), (0.45, 1.05), 0.12
+
+
 def viewpoints_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, aside_m: float = 0.06) -> list[FloatArray]:
     """Camera places beside and above p_BC, as seen when looking from there at p_BT.
 

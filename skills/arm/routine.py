@@ -202,14 +202,18 @@ class RoutineSkill(Skill[InputsT]):
 
     def move_gripper(self, opening_rad: float, force_n: float, message: str) -> Routine[None]:
         """Move the gripper with limited force. Raises SkillFailure with cause EXECUTION when it does not finish."""
+        stopped_s: float | None = 0.0
+        while stopped_s is not None:
+            command = self.gripper_command(opening_rad, force_n)
+            stopped_s = yield from self.finish(self.issue(command), message, "the gripper")
+
+    def gripper_command(self, opening_rad: float, force_n: float) -> CommandId:
+        """Give the gripper its command, and do not wait for it."""
         context = self.context
         if opening_rad > context.robot.gripper().opening_rad:
             context.payload.corners_H = context.payload.R_BH = None
-        stopped_s: float | None = 0.0
-        while stopped_s is not None:
-            until_s = context.clock.now() + GRIPPER_EXPIRY_S
-            command = context.robot.set_gripper(opening_rad, force_n, until_s=until_s, lease=context.lease)
-            stopped_s = yield from self.finish(self.issue(command), message, "the gripper")
+        until_s = context.clock.now() + GRIPPER_EXPIRY_S
+        return context.robot.set_gripper(opening_rad, force_n, until_s=until_s, lease=context.lease)
 
     def stand_at(self, height_m: float, message: str) -> Routine[None]:
         """Bring the body to a height, level; nothing is done where it is there already."""

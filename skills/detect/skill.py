@@ -47,6 +47,7 @@ from skills.quantities import Angle, Coordinate, Duration, Height, Length, Tries
 from skills.robot import FloatArray, Image
 
 _LEAST_SEEN = 0.02
+_FITS_NEAR_M = 0.4
 _LOOKED_AT_M = 0.08
 _AVOIDED_M = 0.08
 
@@ -70,6 +71,7 @@ class DetectInputs:
     count: Tries = 1
     floor: bool = False
     avoid: tuple[ObjectObservation, ...] = ()
+    seen_before: ObjectObservation | None = None
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,7 @@ class Detect(ArmSkill[DetectInputs]):
         self._clusters: list[Cluster] = []
         blocked: list[SkillFailure] = []
         for k, target in enumerate(targets):
-            yield from self._look_and_confirm(inputs, target, blocked)
+            yield from self._look_and_confirm(inputs, target, blocked, close=_fits_near(inputs))
             if self._has_enough(inputs):
                 break
             yield Running(f"looking for {wanted(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
@@ -170,11 +172,14 @@ class Detect(ArmSkill[DetectInputs]):
         return 0 < inputs.count <= len(self._found(inputs))
 
     def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
-        """Look from near where the object is expected, or at what was not named and may be what is wanted."""
+        """Look from near where the object is expected, or at what was not named and may be what is wanted.
+
+        What was looked at from near already is looked at from above.
+        """
         if inputs.expected_W is not None:
             if not self._has_enough(inputs):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
-                yield from self._look_and_confirm(inputs, p_BT, [], close=True)
+                yield from self._look_and_confirm(inputs, p_BT, [], close=not _fits_near(inputs))
             return
         if THING in inputs.classes:
             return
@@ -321,8 +326,7 @@ class Detect(ArmSkill[DetectInputs]):
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
             return look_configuration(scene, self.hand_camera.X_FC, viewpoints_B, p_BT, q)
 
-        yield from self.move_to(goal, message)
-        yield from self.clear_view(message)
+        yield from self.look_from(goal, message)
         image = yield from self.picture(message)
         place, detector = self.context.localiser.estimate(), self.context.detector
 
@@ -385,19 +389,25 @@ class Detect(ArmSkill[DetectInputs]):
         return SkillFailure(Cause.POSTCONDITION, f"no {what} seen on {names} from here ({seen})")
 
 
+def _fits_near(inputs: DetectInputs) -> bool:
+    """Whether it was seen before and fits into a picture from near."""
+    return inputs.seen_before is not None and max(inputs.seen_before.size_m) < _FITS_NEAR_M
+
+
 def _is_wanted(inputs: DetectInputs, track: Track) -> bool:
     return THING in inputs.classes or track.class_name in inputs.classes
 
 
 def _is_sure(inputs: DetectInputs, track: Track) -> bool:
     """Whether nothing more is to be seen of a track: for any object, its class does not matter."""
-    return track.stands if THING in inputs.classes else track.confirmed
+    views = 2 if inputs.seen_before is None else 1
+    return track.stands(views) if THING in inputs.classes else track.confirmed(views)
 
 
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
     """A track as an observation: its fused place, the rest from its last detection; a `THING` without a sure class."""
     seen = observation(replace(track.latest, position_W=track.position_W), attributes)
-    return seen if track.confirmed else replace(seen, thing=Thing(THING, attributes))
+    return seen if track.confirmed(1) else replace(seen, thing=Thing(THING, attributes))
 
 
 def _tries_for(track: Track, shifts: int) -> int:

@@ -14,7 +14,13 @@ from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, box_corners
 from skills.arm.hold import Grip, HoldWatch, grip_again
-from skills.arm.poses import carry_configuration, close_viewpoints, look_configuration, overview_viewpoints
+from skills.arm.poses import (
+    carry_configuration,
+    close_viewpoints,
+    look_configuration,
+    overview_viewpoints,
+    sees_closely,
+)
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.viewpoints import surface_boxes
 from skills.grasp.candidates import THIN_M, GraspCandidate
@@ -216,7 +222,7 @@ class Grasp(ArmSkill[GraspInputs]):
             self.boxes = surface_boxes([square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
             self.known_W = space_about(seen.position_W, base_m)
             try:
-                view = yield from self._look_from(seen, base_m, aside_rad)
+                view = yield from self._view_from(seen, base_m, aside_rad)
             except SkillFailure as failure:
                 if best is None or failure.cause is not Cause.PLANNING:
                     raise
@@ -230,7 +236,7 @@ class Grasp(ArmSkill[GraspInputs]):
         self.known_W = space_about(seen.position_W, base_m, LOOK_HALF_SIDE_M)
         return best
 
-    def _look_from(self, seen: ObjectObservation, base_m: float, aside_rad: float) -> Routine[CloseView | None]:
+    def _view_from(self, seen: ObjectObservation, base_m: float, aside_rad: float) -> Routine[CloseView | None]:
         """What a picture from near shows of the object, the camera turned about it; None when it is not there."""
         message = f"looking closely at the {seen.thing}"
         surface = square(seen.position_W, base_m, seen.surface or "surface")
@@ -242,8 +248,10 @@ class Grasp(ArmSkill[GraspInputs]):
             viewpoints = [*near, *overview_viewpoints(self.model, p_BT, aside_rad)]
             return look_configuration(scene, X_HC, viewpoints, p_BT, q)
 
-        yield from self.move_to(goal, message)
-        yield from self.clear_view(message)
+        X_BC = self.model.X_BH(self.q_rad()) @ X_HC
+        open_wide = self.context.robot.gripper().opening_rad > WIDE * self.open_rad
+        if aside_rad != 0.0 or not (open_wide and sees_closely(X_BC, p_BT)):
+            yield from self.look_from(goal, message)
         image = yield from self.picture(message)
         place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
 

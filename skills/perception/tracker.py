@@ -76,15 +76,15 @@ class Track:
         """When it was seen last."""
         return self.latest.stamp_s
 
-    @property
-    def confirmed(self) -> bool:
+    def confirmed(self, views: int = 2) -> bool:
         """An object for sure, believed to be of its class, and taken for the same when it was seen last."""
-        return self.stands and self.class_belief >= CONFIRMED_BELIEF and self.latest.class_name == self.class_name
+        return (
+            self.stands(views) and self.class_belief >= CONFIRMED_BELIEF and self.latest.class_name == self.class_name
+        )
 
-    @property
-    def stands(self) -> bool:
-        """Seen from two places and believed, whatever it is."""
-        return self.views >= 2 and self.belief >= CONFIRMED_BELIEF
+    def stands(self, views: int = 2) -> bool:
+        """Seen from so many places and believed, whatever it is."""
+        return self.views >= views and self.belief >= CONFIRMED_BELIEF
 
 
 class Tracker:

@@ -265,8 +265,7 @@ class Place(ArmSkill[PlaceInputs]):
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
             return look_configuration(scene, X_HC, overview_viewpoints(self.model, low_BT), low_BT, q)
 
-        yield from self.move_to(goal, message, speed_rad_s=0.9)
-        yield from self.clear_view(message)
+        yield from self.look_from(goal, message, speed_rad_s=0.9)
         image = yield from self.picture(message)
         X_WO = self.context.localiser.estimate().X_WO
         view = yield from self.compute(

@@ -153,7 +153,8 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
             if np.count_nonzero(local) < 8:
                 continue
             low, high = np.percentile(t[local], [1, 99])
-            touching = min(_touching(s[local], -t[local], -low), _touching(s[local], t[local], high))
+            sides = ((-t[local], -low), (t[local], high))
+            touching = min(_touching(s[local], side, edge_m, float(np.ptp(s))) for side, edge_m in sides)
             if touching < _LEAST_TOUCHING:
                 continue
             xy = np.array(target.centre_B) + (0.0 if square else middle + shift) * along + 0.5 * (low + high) * across
@@ -164,13 +165,15 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
                 yield _Placement(xy, azimuth, float(high - low), half_depth, cost, abs(shift))
 
 
-def _touching(s: FloatArray, t: FloatArray, edge_m: float) -> float:
+def _touching(s: FloatArray, t: FloatArray, edge_m: float, length_m: float) -> float:
     """Over which part of its breadth a finger that closes at edge_m touches an outline (s along, t across, m).
 
-    A finger at the cheek of a hammer's head touches at one end of its breadth only, and the hammer turns out of it.
+    A finger at the cheek of a hammer's head touches at one end of its breadth only, and the hammer turns out of it; so
+    does one that is half beyond the end of a handle. What is shorter (length_m) than the finger is broad has no more.
     """
     bins = np.round(s / _BIN_M).astype(int)
-    return float(np.mean([np.percentile(t[bins == k], 98) > edge_m - _YIELD_M for k in np.unique(bins)]))
+    touched = [np.percentile(t[bins == k], 98) > edge_m - _YIELD_M for k in np.unique(bins)]
+    return float(sum(touched) / max(len(touched), min(2.0 * _BREADTH_M, length_m) // _BIN_M))
 
 
 def _balance(s: FloatArray, t: FloatArray) -> float:

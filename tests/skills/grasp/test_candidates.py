@@ -22,16 +22,22 @@ def _target(length, width, height, *, is_round=False, yaw=0.0, points=None, base
     return Target(cloud, (x, 0.0), yaw, length, width, height, base, is_round)
 
 
-def _hammer(yaw):
-    """Seen from above: a handle of 30 mm along x with a head of 120 mm across at its end."""
+def _hammer(yaw, head_m=0.12):
+    """Seen from above: a handle of 30 mm along x with a head across at its end."""
     handle = np.stack(np.meshgrid(np.linspace(-0.165, 0.13, 150), np.linspace(-0.015, 0.015, 15)), -1).reshape(-1, 2)
-    head = np.stack(np.meshgrid(np.linspace(0.13, 0.165, 18), np.linspace(-0.06, 0.06, 60)), -1).reshape(-1, 2)
-    return _target(0.33, 0.12, 0.03, yaw=yaw, points=np.concatenate([handle, head]))
+    head = np.stack(
+        np.meshgrid(np.linspace(0.13, 0.165, 18), np.linspace(-0.5 * head_m, 0.5 * head_m, 60)), -1
+    ).reshape(-1, 2)
+    return _target(0.33, head_m, 0.03, yaw=yaw, points=np.concatenate([handle, head]))
 
 
 def _wrench(yaw):
     """Seen from above: a flat handle of 14 mm."""
     return _target(0.27, 0.014, 0.0096, yaw=yaw)
+
+
+def _found(target):
+    return grasp_candidates(target, MODEL.p_BS, GRIPPER)
 
 
 def test_a_can_is_taken_from_the_side_with_the_wrist_rolled():
@@ -106,6 +112,19 @@ def test_nobody_takes_a_sheet_of_paper():
 def test_a_finger_that_would_touch_at_one_end_of_its_breadth_only_is_no_grasp():
     # a hammer's head, 35 mm along the handle, is wide over less than half of what a finger covers
     assert all(candidate.width_m < 0.05 for candidate in grasp_candidates(_hammer(0.6), MODEL.p_BS, GRIPPER))
+
+
+@pytest.mark.parametrize("head_m", [0.08, 0.1, 0.11])
+def test_fingers_do_not_close_beyond_the_end_of_a_hammers_head(head_m):
+    s_m = [(each.X_BH @ np.array([GRIPPER.tip_x_m, 0.0, 0.0]))[0] - 0.85 for each in _found(_hammer(0.0, head_m))]
+    assert s_m
+    assert max(s_m) < 0.168
+
+
+# length of a cube, m -> it is taken although it is shorter than the fingers are broad
+@pytest.mark.parametrize("length_m", [0.022, 0.03, 0.05])
+def test_what_is_shorter_than_the_fingers_are_broad_is_taken(length_m):
+    assert _found(_target(length_m, length_m, length_m))
 
 
 def test_a_thing_wider_than_the_gripper_has_no_candidates():

@@ -9,6 +9,7 @@ seconds and puts it on the second table. The plant's truth judges: `lifted`, `he
 was not put down), and how many others were pushed over or off. `place_error_m` is from the spot that the place skill
 lowered the object on, as it believed, to where the middle of the object's bounding box is. `planning_s` is the wall
 time of planning each single arm motion with its goal, `grasp_planning_s` that of each grasp with the motions to it.
+`pick_s` is the robot's time from when it stood still before the object, all looks included, to when it was lifted.
 
 `--models` takes objects of your own in the place of the catalogue's: a folder of `errand object import`, or one of such
 folders. Each needs a class (`--class` when it was imported): the robot goes for what its detector knows.
@@ -67,7 +68,7 @@ ReadT = TypeVar("ReadT")
 TARGET: Final = "target"
 CLASSES: Final = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
 ROBOT: Final = "Alice"
-HELD_S, UPRIGHT_RAD, DISTURBED_M, DISTURBED_RAD, LOOK_S = 10.0, 0.26, 0.05, 0.35, 0.1
+HELD_S, UPRIGHT_RAD, DISTURBED_M, DISTURBED_RAD, LOOK_S, MOVED_M = 10.0, 0.26, 0.05, 0.35, 0.1, 0.02
 MOTION_WORK, GRASP_WORK = "plan arm motion", "plan grasp"
 NEAR_SPOT_M: Final = 0.05
 OUTCOMES: Final = {
@@ -97,24 +98,33 @@ class Trial:
 
 @dataclass
 class Watch:
-    """What the truth shows of one object: how long it was off its support without a break (s)."""
+    """What the truth shows of one object: how long it was off its support without a break (s).
+
+    `pick_s` is from when the robot stood still before it to when it was lifted first.
+    """
 
     simulation: Simulation
+    pick_s: float = math.nan
     lifted_since_s: float | None = None
     longest_s: float = 0.0
     lifted: bool = False
     _due_s: float = 0.0
+    _stands_since_s: float = 0.0
+    _base_W: FloatArray = field(default_factory=lambda: np.zeros(2))
 
     def __call__(self, now_s: float) -> None:
         """Look, ten times a second."""
         if now_s < self._due_s:
             return
         self._due_s = now_s + LOOK_S
-        history = self.simulation.referee.objects[TARGET]
+        history, base_W = self.simulation.referee.objects[TARGET], base_xy_W(self.simulation)
+        if float(np.linalg.norm(base_W - self._base_W)) > MOVED_M:
+            self._stands_since_s, self._base_W = now_s, base_W
         if not history.held_out:
             self.lifted_since_s = None
             return
-        self.lifted = True
+        if not self.lifted:
+            self.lifted, self.pick_s = True, round(now_s - self._stands_since_s, 1)
         self.lifted_since_s = now_s if self.lifted_since_s is None else self.lifted_since_s
         self.longest_s = max(self.longest_s, now_s - self.lifted_since_s)
 
@@ -206,6 +216,14 @@ def poses(simulation: Simulation) -> dict[str, RigidTransform]:
     }
 
 
+def base_xy_W(simulation: Simulation) -> FloatArray:
+    """Where the robot's body is (2,)."""
+    (robot,) = simulation.engine.world.robots.values()
+    return np.array(
+        simulation.engine.world.plant.EvalBodyPoseInWorld(simulation.engine.context, robot.body).translation()[:2]
+    )
+
+
 def tilt_rad(before: RigidTransform, after: RigidTransform) -> float:
     """How far a body leans against how it stood."""
     up = after.rotation().matrix() @ before.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
@@ -235,8 +253,7 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
         target = simulation.referee.objects[TARGET]
         put = target.resting and within(world.surfaces[SECOND], after[TARGET])
         upright = tilt_rad(before[TARGET], after[TARGET]) < UPRIGHT_RAD
-        picks, begun = grasps(ran.notes)
-        claimed, succeeded = bool(picks), ran.result.outcome is Outcome.SUCCESS
+        claimed, succeeded = has_grasped(ran.notes), ran.result.outcome is Outcome.SUCCESS
         judged = {
             "class": trial.class_name,
             "name": trial.name,
@@ -255,7 +272,7 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
             "collisions": len(simulation.referee.collisions),
             "cause": "" if succeeded else f"{ran.result.cause}: {ran.result.message}",
             "sim_time_s": round(simulation.clock.now(), 1),
-            "pick_s": round(picks[0] - begun[-1], 1) if begun else math.nan,
+            "pick_s": watch.pick_s,
             "planning_s": list(ran.spent_s.get(MOTION_WORK, ())),
             "grasp_planning_s": list(ran.spent_s.get(GRASP_WORK, ())),
         }
@@ -263,11 +280,9 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
         return judged, ending_picture(simulation, middle_W) if pictured else None
 
 
-def grasps(notes: Sequence[tuple[float, Mapping[str, Any]]]) -> tuple[list[float], list[float]]:
-    """When the grasp skill succeeded, and when it had begun before the first success (s)."""
-    grasping = [(at, note["to"]) for at, note in notes if "grasp" in note["node"].rsplit("/", 1)[-1]]
-    picks = [at for at, status in grasping if status == "SUCCESS"]
-    return picks, [at for at, status in grasping if status == "RUNNING" and picks and at < picks[0]]
+def has_grasped(notes: Sequence[tuple[float, Mapping[str, Any]]]) -> bool:
+    """Whether the grasp skill ever succeeded."""
+    return any("grasp" in note["node"].rsplit("/", 1)[-1] and note["to"] == "SUCCESS" for _, note in notes)
 
 
 def middle(simulation: Simulation) -> FloatArray:

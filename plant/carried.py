@@ -4,6 +4,10 @@ A step moves a free body along its velocity, but a robot's joints along their ar
 of an axis about which the robot turns at w would creep outwards by w^2 r dt^2 / 2 a step, that is 3 mm/s at 0.75 rad/s,
 and leave the gripper within a minute of walking. What moves with a hand is therefore moved by w x v dt^2 / 2 after each
 step, as on an arc. Forces, velocities and contacts stay those of the plant.
+
+Nor do such steps follow a body that spins fast: its gyroscopic torque, taken at the step's beginning, makes a flat
+wrench that flies out of the fingers spin ever faster, until nothing is finite. Free bodies therefore spin no faster
+than a step can follow.
 """
 
 from __future__ import annotations
@@ -20,6 +24,8 @@ from skills.robot import FloatArray
 
 WITH_HAND_M_S: Final = 0.02
 """What moves against the hand by less than this moves with it."""
+FASTEST_SPIN_RAD_S: Final = 15.0
+"""A fifth of a radian in a step of 12.5 ms."""
 _AT_HAND_M: Final = 0.5
 
 
@@ -29,6 +35,8 @@ class Carried:
     def __init__(self, plant: MultibodyPlant, context: Context, loose: Sequence[RigidBody]) -> None:
         self._plant, self._context = plant, context
         self._loose = [body for body in loose if body.is_floating_base_body()]
+        starts = [body.floating_velocities_start_in_v() for body in self._loose]
+        self._spins = np.array([range(start, start + 3) for start in starts], dtype=np.int64).reshape(-1, 3)
 
     def after_step(self, hand: RigidBody, dt_s: float) -> None:
         """Move what the hand carries along its arc; dt_s is the length of the step."""
@@ -43,6 +51,15 @@ class Carried:
             with_hand = V_WH.translational() + np.cross(V_WH.rotational(), p_WO - p_WH)
             if np.linalg.norm(v_WO - with_hand) < WITH_HAND_M_S:
                 self._shift(body, arc_m(V_WH.rotational(), v_WO, dt_s))
+
+    def limit_spin(self) -> None:
+        """Slow down the free bodies that spin faster than `FASTEST_SPIN_RAD_S`."""
+        velocities = self._plant.GetVelocities(self._context)
+        spins = velocities[self._spins]
+        rates = np.linalg.norm(spins, axis=1, keepdims=True)
+        if rates.size and rates.max() > FASTEST_SPIN_RAD_S:
+            velocities[self._spins] = spins * np.minimum(1.0, FASTEST_SPIN_RAD_S / np.maximum(rates, 1e-9))
+            self._plant.SetVelocities(self._context, velocities)
 
     def _shift(self, body: RigidBody, offset_W: FloatArray) -> None:
         q = self._plant.GetPositions(self._context)

@@ -116,6 +116,7 @@ class Engine:
         for _ in range(max(1, round(dt_s / TIME_STEP_S))):
             if self._steps % SLEEP_PERIOD_STEPS == 0:
                 self._sleepers.update(self.now())
+                self._carried.limit_spin()
             if self._steps % CONTROL_STEPS == 0:
                 self._command_robots()
             self.walkers.before_step(TIME_STEP_S)

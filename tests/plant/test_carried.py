@@ -6,8 +6,9 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import SpatialInertia
+from pydrake.systems.analysis import Simulator
 
-from plant.carried import Carried, arc_m
+from plant.carried import FASTEST_SPIN_RAD_S, Carried, arc_m
 
 DT_S, TURN_RAD_S, REACH_M = 0.0125, 0.75, 0.9
 
@@ -53,3 +54,24 @@ def test_steps_along_tangents_with_the_arc_stay_on_the_circle():
         p_m, tangents_m = p_m + DT_S * v + arc_m(turn, v, DT_S), tangents_m + DT_S * along
     assert np.linalg.norm(p_m) == pytest.approx(REACH_M, abs=1e-4)
     assert np.linalg.norm(tangents_m) > REACH_M + 0.015
+
+
+def _spinning_bar(limited):
+    """The spin (rad/s) of a flat bar of 150 g, thrown into the air with a spin, after two seconds."""
+    plant = MultibodyPlant(DT_S)
+    bar = plant.AddRigidBody("bar", SpatialInertia.SolidBoxWithMass(0.15, 0.26, 0.03, 0.01))
+    plant.Finalize()
+    simulator = Simulator(plant)
+    context = simulator.get_mutable_context()
+    _set(plant, context, bar, np.zeros(3), [30.0, 3.0, 35.0], np.zeros(3))
+    carried = Carried(plant, context, [bar])
+    for step in range(160):
+        if limited and step % 4 == 0:
+            carried.limit_spin()
+        simulator.AdvanceTo((step + 1) * DT_S)
+    return float(np.linalg.norm(plant.EvalBodySpatialVelocityInWorld(context, bar).rotational()))
+
+
+def test_a_bar_that_spins_as_it_flies_spins_no_faster_with_time():
+    assert _spinning_bar(limited=True) < 2.0 * FASTEST_SPIN_RAD_S
+    assert not _spinning_bar(limited=False) < 1000.0

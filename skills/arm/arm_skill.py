@@ -363,12 +363,12 @@ class ArmSkill(RoutineSkill[InputsT]):
         elif closing_rad is not None:
             yield from self.move_gripper(closing_rad, GRIPPER_FORCE_N, message)
 
-    def picture(self, message: str) -> Routine[Image]:
+    def picture(self, message: str, settle_s: float = SETTLE_S) -> Routine[Image]:
         """A new picture of the hand camera, once the arm is still.
 
         Raises SkillFailure with cause EXECUTION when the camera gives an old one.
         """
-        yield from self.pause(SETTLE_S, message)
+        yield from self.pause(settle_s, message)
         robot, asked_s = self.context.robot, self.context.clock.now()
         source = self.hand_camera.source
         image = yield from self.sense(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
@@ -18,7 +18,7 @@ from skills.perception.class_forms import THING
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import camera_pose_W
 from skills.perception.surface_segmentation import Cluster, SurfaceView, apart, cluster_of, parted, view_surface
-from skills.robot import Image
+from skills.robot import FloatArray, Image
 
 LOOK_HALF_SIDE_M, SURFACE_AROUND_M = 0.4, 0.2
 _SURFACE_YIELDS_M = 0.003
@@ -33,6 +33,13 @@ class CloseView:
     target_box: Box
     X_WB: RigidTransform
     others: tuple[Obstacle, ...] = ()
+
+    def moved(self, offset_B: FloatArray) -> CloseView:
+        """The same with the object offset_B (3,), level, beside where it was."""
+        x, y = np.array(self.target.centre_B) + offset_B[:2]
+        target = replace(self.target, points_B=self.target.points_B + offset_B, centre_B=(float(x), float(y)))
+        box = Box(RigidTransform(offset_B) @ self.target_box.X_FG, self.target_box.size_m)
+        return replace(self, target=target, target_box=box)
 
 
 def square(

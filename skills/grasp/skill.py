@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -30,17 +30,20 @@ from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
+from skills.grasp.servo import seen_shift, shifted
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
+from skills.perception.point_cloud import camera_pose_W
 from skills.quantities import Force, Length, Margin, Turn
-from skills.robot import FloatArray
+from skills.robot import ArmTrajectory, FloatArray
 
 _CLOSED_RAD = 0.06
 _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95
 _RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.014, 0.12, 0.8
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
+_AIM_LATENCY_S, _AIMED_M, _FAR_OFF_M, _LEAST_OVERLAP = 0.1, 0.003, 0.05, 0.5
 _AT_THING_M = 0.4
 _CARRY_RAD_S, _GENTLY_RAD_S, _LONG_LEVER_M = 0.9, 0.45, 0.05
 _HEIGHTS_TRIED = 2
@@ -106,9 +109,7 @@ class Grasp(ArmSkill[GraspInputs]):
         seen = inputs.observation
         self._refuse_known_heavy(seen)
         try:
-            view, plan = yield from self._plan_from_a_height(seen, inputs.avoid)
-            self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
-            yield from self._take(view, plan, seen)
+            view, plan = yield from self._take_where_it_is(inputs)
         except SkillFailure as failure:
             yield from self._let_go(draw_back=len(self._tried) > len(inputs.avoid))
             raise self._telling(failure) from failure
@@ -119,18 +120,79 @@ class Grasp(ArmSkill[GraspInputs]):
             raise self._telling(failure) from failure
         return Succeeded(f"holding the {thing}", {"tried": self._tried})
 
+    def _take_where_it_is(self, inputs: GraspInputs) -> Routine[tuple[CloseView, GraspPlan]]:
+        """Look, plan and take; what moved meanwhile is looked at once more. Raises SkillFailure."""
+        seen = inputs.observation
+        view, plan = yield from self._plan_from_a_height(seen, inputs.avoid)
+        moved = yield from self._taken(view, plan, inputs)
+        if moved:
+            view, plan = yield from self._look_and_plan(seen, inputs.avoid)
+            if (yield from self._taken(view, plan, inputs)):
+                raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} moves while the hand reaches for it")
+        return view, plan
+
+    def _taken(self, view: CloseView, plan: GraspPlan, inputs: GraspInputs) -> Routine[bool]:
+        """Reach for the object and take it, unless it is seen to have moved away: then whether it has."""
+        seen = inputs.observation
+        self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
+        yield from self.follow(plan.to_pregrasp, f"reaching for the {seen.thing}")
+        aimed = yield from self._aimed(view, plan, str(seen.thing))
+        if aimed is None:
+            return True
+        yield from self._take(*aimed, seen)
+        return False
+
+    def _aimed(self, view: CloseView, plan: GraspPlan, thing: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
+        """View and plan corrected across the fingers by what is seen from the pre-grasp; None: the object is not there.
+
+        Along the fingers, the guard stops the hand; along the object, a few cm do not matter.
+        """
+        message = f"reaching for the {thing}"
+        image = yield from self.picture(message, settle_s=0.0)
+        X_BC = self.X_WB().inverse() @ camera_pose_W(image, self.context.localiser.estimate().X_WO)
+        scene_now, closing_B = self.scene_now([*view.boxes, *self.seen_boxes()]), plan.candidate.X_BH.rotation().col(2)
+
+        def aim() -> tuple[FloatArray, tuple[ArmTrajectory, ArmTrajectory] | None] | None:
+            """How far to shift the hand, with the approach from there; without it where that is not free."""
+            found = seen_shift(view.target, image, X_BC)
+            if found is None:
+                return np.zeros(3), None
+            if found.overlap < _LEAST_OVERLAP or np.linalg.norm(found.offset_B) > _FAR_OFF_M:
+                return None
+            offset_B = (found.offset_B @ closing_B) * closing_B * [1.0, 1.0, 0.0]
+            if np.linalg.norm(offset_B) < _AIMED_M:
+                return np.zeros(3), None
+            approach = [shifted(self.model, each, offset_B) for each in (plan.to_grasp, plan.last_bit)]
+            scene = scene_now()
+            scene.set_padding(0.0)
+            free = [each for each in approach if each is not None and scene.path_free(each.positions_rad)]
+            return offset_B, (free[0], free[1]) if len(free) == len(approach) else None
+
+        aimed = yield from self.compute(aim, latency_s=_AIM_LATENCY_S, name="aim", message=message)
+        if aimed is None:
+            return None
+        offset_B, approach = aimed
+        if approach is None or not (yield from self.try_shift_hand(offset_B, message, clear_of_boxes=True)):
+            return view, plan
+        X_BH = RigidTransform(offset_B) @ plan.candidate.X_BH
+        plan = replace(plan, candidate=replace(plan.candidate, X_BH=X_BH), to_grasp=approach[0], last_bit=approach[1])
+        return view.moved(offset_B), plan
+
     def _plan_from_a_height(
         self, seen: ObjectObservation, avoid: tuple[TriedGrasp, ...]
     ) -> Routine[tuple[CloseView, GraspPlan]]:
         """Look and plan with the body at the height that suits best, or at another where that one does not do."""
 
-        def look_and_plan() -> Routine[tuple[CloseView, GraspPlan]]:
-            """What is seen from the height at which the body stands, and a plan for it."""
-            view = yield from self._look_closely(seen)
-            return view, (yield from self._plan(view, str(seen.thing), avoid))
-
         heights_m = yield from self._heights(seen)
-        return (yield from self.from_a_height(heights_m, f"standing up to the {seen.thing}", look_and_plan))
+        message = f"standing up to the {seen.thing}"
+        return (yield from self.from_a_height(heights_m, message, lambda: self._look_and_plan(seen, avoid)))
+
+    def _look_and_plan(
+        self, seen: ObjectObservation, avoid: tuple[TriedGrasp, ...]
+    ) -> Routine[tuple[CloseView, GraspPlan]]:
+        """What is seen from the height at which the body stands, and a plan for it."""
+        view = yield from self._look_closely(seen)
+        return view, (yield from self._plan(view, str(seen.thing), avoid))
 
     def _heights(self, seen: ObjectObservation) -> Routine[list[float]]:
         """Body heights (m) from which the arm seems to reach the object, the best first; at least the usual one."""
@@ -308,12 +370,11 @@ class Grasp(ArmSkill[GraspInputs]):
         return (wide_rad, narrow_rad) if narrow_rad < wide_rad - _LESS_OPEN_RAD else (wide_rad,)
 
     def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[None]:
-        """Reach, close as firmly as what it weighs at least needs, lift, weigh, close as firmly as it needs.
+        """Go on from the pre-grasp: close as firmly as its least mass needs, lift, weigh, close as firmly as it needs.
 
         Raises SkillFailure with cause POSTCONDITION when it is not held then, PRECONDITION when it is too heavy.
         """
         thing, least_kg = str(seen.thing), least_mass_kg(seen)
-        yield from self.follow(plan.to_pregrasp, f"reaching for the {thing}")
         yield from self.follow(plan.to_grasp, f"reaching for the {thing}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
         touched = yield from self.follow(plan.last_bit, f"reaching for the {thing}", self.held_up(ahead))

@@ -135,12 +135,16 @@ class Grasp(ArmSkill[GraspInputs]):
         """Reach for the object and take it, unless it is seen to have moved away: then whether it has."""
         seen = inputs.observation
         self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
-        yield from self.follow(plan.to_pregrasp, f"reaching for the {seen.thing}")
-        aimed = yield from self._aimed(view, plan, str(seen.thing))
+        aimed = yield from self._reach(view, plan, str(seen.thing))
         if aimed is None:
             return True
         yield from self._take(*aimed, seen)
         return False
+
+    def _reach(self, view: CloseView, plan: GraspPlan, thing: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
+        """Bring the hand to the pre-grasp; view and plan as they are aimed there (see `_aimed`)."""
+        yield from self.follow(plan.to_pregrasp, f"reaching for the {thing}")
+        return (yield from self._aimed(view, plan, thing))
 
     def _aimed(self, view: CloseView, plan: GraspPlan, thing: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
         """View and plan corrected across the fingers by what is seen from the pre-grasp; None: the object is not there.

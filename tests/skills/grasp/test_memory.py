@@ -72,6 +72,10 @@ class Slippery(Grasp):
         chosen = others_first(grasp_candidates(view.target, MODEL.p_BS, GRIPPER), avoid, CENTRE, view.X_WB)[0]
         return type("Plan", (), {"candidate": chosen})()
 
+    def _reach(self, view, plan, thing):
+        yield from self.pause(0.1, "reaching")
+        return view, plan
+
     def _take(self, view, plan, seen):
         yield from self.pause(0.1, "taking")
         raise SkillFailure(Cause.POSTCONDITION, "it slipped")

@@ -63,9 +63,15 @@ def reachable(free: Sequence[Standing], reach_cost: Callable[[Pose2D], float | N
 
     `reach_cost` says how awkward the reach from a pose is, None where the point is out of reach.
     """
-    reaches = [(standing, reach_cost(standing.pose)) for standing in free]
-    reached = [Standing(each.pose, each.cost + REACH_WEIGHT * cost) for each, cost in reaches if cost is not None]
-    return sorted(reached, key=lambda standing: standing.cost)[:_OFFERED]
+    best = list[Standing]()
+    for standing in sorted(free, key=lambda standing: standing.cost):
+        if len(best) == _OFFERED and standing.cost >= best[-1].cost:
+            break
+        cost = reach_cost(standing.pose)
+        if cost is not None:
+            best.append(Standing(standing.pose, standing.cost + REACH_WEIGHT * cost))
+            best = sorted(best, key=lambda each: each.cost)[:_OFFERED]
+    return best
 
 
 def _cost(pose: Pose2D, here: Pose2D, distance_m: float) -> float:

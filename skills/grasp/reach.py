@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -31,6 +31,7 @@ _OTHER_HEIGHT_COST: Final = 0.15
 _PADDING_M, _MARGIN_RAD = -0.002, 0.08
 """Fingertips end 1 mm above the surface where something thin lies."""
 _LOOKED_AT = 60
+_PARTS, _ABOVE_ARM_M = 9, 0.1
 _SURFACE_AROUND_M, _SURFACE_BAND_M, _KNOWN_ABOVE_M = 0.2, 0.06, 0.34
 WIDE: Final = 0.9
 """How far the gripper is open, as a part of all that it opens, as it reaches for an object."""
@@ -79,30 +80,47 @@ class ReachCheck:
             found.append(Reached(cost + (0.0 if height_m == heights_m[0] else _OTHER_HEIGHT_COST), height_m))
         return found
 
+    def arm_W(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> FloatArray:
+        """Points (N, 3) in the world along the arm and above it at the best grasp, before it and after a lift."""
+        reached = self.best(at, heights_m)
+        X_WB = None if reached is None else at(reached.height_m)
+        best = None if X_WB is None else self._best(X_WB)[0]
+        if X_WB is None or best is None:
+            return np.empty((0, 3))
+        model = self.scene.model
+        along_B = np.concatenate([_along(model.points_B(q)) for q in _postures(self.scene, best, _up_B(X_WB))])
+        along_W = along_B @ X_WB.rotation().matrix().T + X_WB.translation()
+        return np.concatenate([along_W, along_W + [0.0, 0.0, _ABOVE_ARM_M]])
+
     def _cost(self, X_WB: RigidTransform) -> float | None:
+        best, least = self._best(X_WB)
+        return None if best is None else best.cost - least
+
+    def _best(self, X_WB: RigidTransform) -> tuple[GraspCandidate | None, float]:
+        """The best grasp that is reached from X_WB, and the cost of the best there is."""
         up_B = _up_B(X_WB)
         self.scene.set_padding(_PADDING_M)
         self.scene.set_boxes(self.boxes, X_WB.inverse() @ self.X_WB)
-        return grasp_cost(
-            self.scene.model, self.candidates_of, X_WB, self.seen, lambda each: _free(self.scene, each, up_B)
+        return best_grasp(
+            self.scene.model, self.candidates_of, X_WB, self.seen, lambda each: bool(_postures(self.scene, each, up_B))
         )
 
 
-def grasp_cost(
+def best_grasp(
     model: ArmModel,
     candidates_of: CandidatesOf,
     X_WB: RigidTransform,
     seen: ObjectObservation,
     free: Callable[[GraspCandidate], bool] = lambda candidate: True,
-) -> float | None:
-    """Cost of the best grasp that the arm reaches with the body at X_WB and that is `free`, beyond the best there is.
+) -> tuple[GraspCandidate | None, float]:
+    """The best grasp that the arm reaches with the body at X_WB and that is `free`, and the cost of the best there is.
 
     None when there is no such grasp.
     """
     candidates = candidates_of(observed_target(seen, X_WB))
     reached = (each for each in candidates if within_reach(model, each, _up_B(X_WB), _MARGIN_RAD))
     best = next((each for each in islice(reached, _LOOKED_AT) if free(each)), None)
-    return None if best is None else best.cost - candidates[0].cost
+    return best, candidates[0].cost if candidates else np.inf
 
 
 def _up_B(X_WB: RigidTransform) -> FloatArray:
@@ -110,17 +128,23 @@ def _up_B(X_WB: RigidTransform) -> FloatArray:
     return np.asarray(X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
 
 
-def _free(scene: ArmScene, candidate: GraspCandidate, up_B: FloatArray) -> bool:
-    """Whether the arm touches nothing at a grasp, before it and after a lift."""
+def _postures(scene: ArmScene, candidate: GraspCandidate, up_B: FloatArray) -> list[FloatArray]:
+    """Arm angles at a grasp, before it and after a lift at which it touches nothing; empty when there are none."""
     X_BH = candidate.X_BH
-    if not (_any_free(scene, X_BH) and any(_any_free(scene, candidate.retreated(m)) for m in PREGRASPS_M)):
-        return False
     lifted = (RigidTransform(X_BH.rotation(), X_BH.translation() + way_B) for way_B in lifts(scene.model, X_BH, up_B))
-    return any(_any_free(scene, X) for X in lifted)
+    found = list[FloatArray]()
+    for ways in ([X_BH], map(candidate.retreated, PREGRASPS_M), lifted):
+        q_rad = next((q for X in ways for q in scene.model.inverse(X, _MARGIN_RAD) if scene.free(q)), None)
+        if q_rad is None:
+            return []
+        found.append(q_rad)
+    return found
 
 
-def _any_free(scene: ArmScene, X_BH: RigidTransform) -> bool:
-    return any(scene.free(q) for q in scene.model.inverse(X_BH, _MARGIN_RAD))
+def _along(points_B: FloatArray) -> FloatArray:
+    """Points (N, 3) along the segments between points, a few on each."""
+    parts = np.linspace(0.0, 1.0, _PARTS)[:, None]
+    return np.concatenate([a + parts * (b - a) for a, b in pairwise(points_B)])
 
 
 def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ...]:

@@ -24,6 +24,7 @@ from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
 from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
+from skills.grasp.unseen import look_into_unseen
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
@@ -32,7 +33,7 @@ from skills.robot import FloatArray
 
 _CLOSED_RAD = 0.06
 _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95
-_RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.014, 0.12, 0.8
+_RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.026, 0.12, 0.8
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
 _AT_THING_M = 0.4
@@ -128,21 +129,27 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _heights(self, seen: ObjectObservation) -> Routine[list[float]]:
         """Body heights (m) from which the arm seems to reach the object, the best first; at least the usual one."""
-        base_m, pose = seen.position_W[2] - 0.5 * seen.size_m[2], self.context.pose()
+        base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
         heights_m = body_heights_m(base_m, self.context.robot.capabilities())
-        if len(heights_m) == 1:
-            return list(heights_m)
+        chosen, arm_W = yield from self._suiting(seen, base_m, heights_m)
+        if (yield from look_into_unseen(self, seen, arm_W)):
+            chosen, _ = yield from self._suiting(seen, base_m, heights_m)
+        return chosen or [heights_m[0]]
+
+    def _suiting(
+        self, seen: ObjectObservation, base_m: float, heights_m: Sequence[float]
+    ) -> Routine[tuple[list[float], FloatArray]]:
+        """Those heights (m) from which the arm seems to reach, the best first; where (points, world) it would be."""
+        pose = self.context.pose()
         check_now = reach_check(self, seen, [square(seen.position_W, base_m, "guess", SURFACE_AROUND_M)])
 
-        def choose() -> list[float]:
-            """The heights by what the best grasp from each costs."""
-            found = check_now().all(pose.transform, heights_m)
-            return [each.height_m for each in sorted(found, key=lambda each: each.cost)][:_HEIGHTS_TRIED]
+        def choose() -> tuple[list[float], FloatArray]:
+            check = check_now()
+            found = sorted(check.all(pose.transform, heights_m), key=lambda each: each.cost)
+            return [each.height_m for each in found][:_HEIGHTS_TRIED], check.arm_W(pose.transform, heights_m)
 
-        chosen = yield from self.compute(
-            choose, latency_s=0.1, name="choose a height", message=f"choosing how high to stand before the {seen.thing}"
-        )
-        return chosen or [heights_m[0]]
+        message = f"choosing how high to stand before the {seen.thing}"
+        return (yield from self.compute(choose, latency_s=0.1, name="choose a height", message=message))
 
     _watch: HoldWatch | None = None
 
@@ -245,7 +252,8 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)
         image = yield from self.picture(message)
-        place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
+        place, detector = self.context.localiser.estimate(), self.context.detector
+        X_WB = place.X_WO @ image.frames.pose("body")
 
         def look() -> CloseView | None:
             found = detections_in(detector, image)

@@ -66,6 +66,12 @@ def solid_boxes(
     return [_box(low, high, X_BW) for low, high in merged(solid)]
 
 
+def boxes_of(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArray], NDArray[np.bool_]]) -> list[Box]:
+    """Boxes in the body frame about those cells alone whose middles p_W (N, 3) are `chosen`."""
+    X_BW = X_WB.inverse()
+    return [_box(low, high, X_BW) for low, high in merged(cells[chosen((cells + 0.5) * CELL_M)])]
+
+
 def _unique(cells: Cells) -> tuple[Cells, NDArray[np.int64]]:
     """Each cell once, in order, and how often it was there."""
     keys, counts = np.unique(((cells + _OFFSET) * _STRIDES).sum(axis=1), return_counts=True)
@@ -90,7 +96,7 @@ def with_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tupl
 
 
 def never_seen(points_W: FloatArray, views: Iterable[View]) -> NDArray[np.bool_]:
-    """Which world points (N, 3) lie in no view, or only far behind what it shows: what is just behind counts as solid."""
+    """Which world points (N, 3) lie in no view, or far behind what it shows: just behind it all counts as solid."""
     unseen = np.ones(len(points_W), dtype=np.bool_)
     for image, X_WO in views:
         inside, z, depth = _at_pixels(points_W, image, X_WO)

@@ -10,7 +10,7 @@ from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 from skills.api import ObjectObservation, Thing
 from skills.approach.standing import free_places, is_comfortable, reachable
 from skills.grasp.planning import GeometricGraspPlanner
-from skills.grasp.reach import best_grasp, observed_target
+from skills.grasp.reach import observed_target, reached_grasps
 from skills.navigate.footprint import Footprint
 from skills.robot import Pose2D
 
@@ -29,8 +29,8 @@ class _Table:
 
 
 def _grasp_cost(X_WB, seen):
-    best, least = best_grasp(MODEL, CANDIDATES, X_WB, seen)
-    return None if best is None else best.cost - least
+    reached, least = reached_grasps(MODEL, CANDIDATES, X_WB, seen)
+    return reached[0].cost - least if reached else None
 
 
 def _poses(reach_cost=lambda pose: 0.0):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -278,18 +278,18 @@ class Grasp(ArmSkill[GraspInputs]):
 
         around = Surroundings((*view.boxes, *seen), view.target_box, up_B, view.others, thing, reach_m)
 
-        def planned(scene: ArmScene, opening_rad: float) -> tuple[GraspPlan, float]:
+        def planned(scene: ArmScene, opening_rad: float, space: Surroundings) -> tuple[GraspPlan, float]:
             """A plan for a gripper that is open so far, and that opening."""
             scene.set_opening(opening_rad)
-            return stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng), opening_rad
+            return stack.grasp_planner.plan(scene, q, candidates, space, stack.arm_planner, self._rng), opening_rad
 
         def plan() -> tuple[GraspPlan, float]:
             """A plan for the first opening for which there is one."""
             scene, (*first_rad, last_rad) = scene_now(), openings_rad
             for opening_rad in first_rad:
-                with suppress(PlanningError):
-                    return planned(scene, opening_rad)
-            return planned(scene, last_rad)
+                with suppress(PlanningError):  # why there is none is not asked: another opening is left
+                    return planned(scene, opening_rad, replace(around, others=()))
+            return planned(scene, last_rad, around)
 
         found, opening_rad = yield from self.compute(
             plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}"

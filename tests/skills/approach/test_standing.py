@@ -95,3 +95,8 @@ def test_a_place_with_a_better_grasp_is_preferred():
     nearest = _poses()[0].pose
     best = _poses(lambda pose: 1.0 if pose == nearest else 0.0)[0].pose
     assert best != nearest
+
+
+def test_a_place_is_left_for_a_nearer_one_where_stopping_short_of_it_is_out_of_reach():
+    best = _poses(lambda pose: 0.0 if math.hypot(pose.x_m - 2.15, pose.y_m) < 0.91 else None)[0].pose
+    assert math.hypot(best.x_m - 2.15, best.y_m) < 0.88

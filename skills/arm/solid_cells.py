@@ -53,7 +53,7 @@ def solid_boxes(
 
     What is behind a cell, up to 32 cm, is unknown and counts as solid, too: of a board only the edge is seen.
     """
-    middles, origin_W = (cells + 0.5) * CELL_M, X_WB.translation()
+    middles, origin_W = _middles(cells), X_WB.translation()
     middles = middles[np.linalg.norm((middles - origin_W)[:, :2], axis=1) < reach_m]
     middles = middles[~left_out(middles)]
     if len(middles) == 0:
@@ -69,7 +69,12 @@ def solid_boxes(
 def boxes_of(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArray], NDArray[np.bool_]]) -> list[Box]:
     """Boxes in the body frame about those cells alone whose middles p_W (N, 3) are `chosen`."""
     X_BW = X_WB.inverse()
-    return [_box(low, high, X_BW) for low, high in merged(cells[chosen((cells + 0.5) * CELL_M)])]
+    return [_box(low, high, X_BW) for low, high in merged(cells[chosen(_middles(cells))])]
+
+
+def _middles(cells: Cells) -> FloatArray:
+    """The middles (N, 3) of cells, m."""
+    return np.asarray((cells + 0.5) * CELL_M, dtype=np.float64)
 
 
 def _unique(cells: Cells) -> tuple[Cells, NDArray[np.int64]]:
@@ -106,7 +111,7 @@ def never_seen(points_W: FloatArray, views: Iterable[View]) -> NDArray[np.bool_]
 
 def _seen_past(cells: Cells, image: Image, X_WO: RigidTransform) -> NDArray[np.bool_]:
     """Which cells lie clearly before what the picture shows at their pixel."""
-    inside, z, depth = _at_pixels((cells + 0.5) * CELL_M, image, X_WO)
+    inside, z, depth = _at_pixels(_middles(cells), image, X_WO)
     return np.asarray(inside & (depth > z + _SEEN_PAST_M))
 
 

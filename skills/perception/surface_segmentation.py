@@ -82,8 +82,8 @@ def _view(cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: float
     if plane is None:
         return None
     height = cloud.p_W[:, 2] - plane.z(cloud.p_W[:, :2])
-    above = height > max(_LOWEST_M, 3.0 * plane.noise_m)
-    standing = cloud.where(above).where(resting(cloud.p_W[above, :2], height[above]))
+    raised = height > max(_LOWEST_M, 3.0 * plane.noise_m)
+    standing = cloud.where(raised).where(resting(cloud.p_W[raised, :2], height[raised]))
     clusters = tuple(_cluster(points, surface.name, plane, p_WC) for points in _groups(standing))
     return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
 

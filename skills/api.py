@@ -22,7 +22,7 @@ from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
 from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share
-from skills.robot import Clock, Lease, Pose2D, Robot, Scan
+from skills.robot import Clock, Image, Lease, Pose2D, Robot, Scan
 from skills.stack import RobotStack, default_stack
 
 if TYPE_CHECKING:
@@ -326,9 +326,13 @@ class Payload:
 
 @dataclass
 class SeenSolid:
-    """Solid cells (N, 3) of the world near the robot, as its depth pictures show them; see `skills.arm.solid_cells`."""
+    """Solid cells (N, 3) of the world near the robot, as its depth pictures show them; see `skills.arm.solid_cells`.
+
+    `views` are the last depth pictures, thinned out, each with the X_WO of its time.
+    """
 
     cells: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
+    views: tuple[tuple[Image, RigidTransform], ...] = ()
 
 
 @dataclass(frozen=True)

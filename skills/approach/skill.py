@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
+
+import numpy as np
 
 from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
 from skills.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
@@ -14,13 +16,13 @@ from skills.arm.routine import Routine, SkillFailure
 from skills.detect.skill import Detect, DetectInputs
 from skills.grasp.reach import body_heights_m, observed_target, reach_check
 from skills.grasp.refusals import without_grasp
+from skills.grasp.unseen import look_into_unseen
 from skills.navigate.footprint import Footprint
 from skills.navigate.skill import NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
-from skills.robot import Pose2D
+from skills.robot import FloatArray, Pose2D
 
 _STILL_BEFORE_M = 1.3
-ReachCost = Callable[[Pose2D], float | None]
 
 
 @dataclass(frozen=True)
@@ -76,15 +78,34 @@ class Approach(ArmSkill[ApproachInputs]):
         return (yield from self._look_again(inputs))
 
     def _places(self, inputs: ApproachInputs) -> Routine[list[Standing]]:
-        """Where to stand, best first: where the robot stands already, when that is good enough."""
+        """Where to stand, best first, once the space where the arm would go from there was looked into."""
+        places, arm_W = yield from self._choose(inputs)
+        if (yield from look_into_unseen(self, inputs.observation, arm_W)):
+            places, _ = yield from self._choose(inputs)
+        return places
+
+    def _choose(self, inputs: ApproachInputs) -> Routine[tuple[list[Standing], FloatArray]]:
+        """Where to stand as far as is known, best first, and where (points, world) the arm would be there.
+
+        The first is where the robot stands already, when that is good enough.
+        """
         seen, here, enough = inputs.observation, self.context.pose(), self.options.good_grasp
         comfortable = is_comfortable(here, (seen.position_W[0], seen.position_W[1]))
-        free, reach_cost = self._free_places(seen), self._reach_cost(seen, own_surfaces(inputs))
+        free, off_m = self._free_places(seen), math.hypot(seen.position_W[0] - here.x_m, seen.position_W[1] - here.y_m)
+        heights_m = body_heights_m(seen.position_W[2] - 0.5 * seen.size_m[2], self.context.robot.capabilities())
+        check_now = reach_check(self, seen, own_surfaces(inputs), beyond_m=off_m)
 
-        def choose() -> list[Standing]:
-            cost_at = reach_cost()
+        def choose() -> tuple[list[Standing], FloatArray]:
+            check = check_now()
+
+            def cost_at(pose: Pose2D) -> float | None:
+                best = check.best(pose.transform, heights_m)
+                return None if best is None else best.cost
+
             from_here = cost_at(here) if comfortable else None
-            return [Standing(here, 0.0)] if from_here is not None and from_here <= enough else reachable(free, cost_at)
+            well_here = from_here is not None and from_here <= enough
+            places = [Standing(here, 0.0)] if well_here else reachable(free, cost_at)
+            return places, check.arm_W(places[0].pose.transform, heights_m) if places else np.empty((0, 3))
 
         return (
             yield from self.compute(choose, latency_s=0.2, name="choose a place", message="choosing where to stand")
@@ -122,25 +143,6 @@ class Approach(ArmSkill[ApproachInputs]):
         if self.context.stack.grasp_planner.candidates(target, p_BS=p_BS, gripper=self.gripper):
             return f"there is no free place to stand from which the {seen.thing} is within reach"
         return without_grasp(target, p_BS, self.gripper, str(seen.thing))
-
-    def _reach_cost(self, seen: ObjectObservation, surfaces: Sequence[Surface]) -> Callable[[], ReachCost]:
-        """Gives, inside a Worker job, what a grasp of the object costs from a pose: None where none is reached."""
-        base_m, pose = seen.position_W[2] - 0.5 * seen.size_m[2], self.context.pose()
-        off_m = math.hypot(seen.position_W[0] - pose.x_m, seen.position_W[1] - pose.y_m)
-        heights_m = body_heights_m(base_m, self.context.robot.capabilities())
-        check_now = reach_check(self, seen, surfaces, beyond_m=off_m)
-
-        def prepared() -> ReachCost:
-            """The cost by pose; all poses share one collision scene."""
-            check = check_now()
-
-            def cost(pose: Pose2D) -> float | None:
-                best = check.best(pose.transform, heights_m)
-                return None if best is None else best.cost
-
-            return cost
-
-        return prepared
 
 
 def own_surfaces(inputs: ApproachInputs) -> tuple[Surface, ...]:

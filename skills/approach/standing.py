@@ -24,6 +24,7 @@ COMFORTABLE_M = (0.80, 1.02)
 COMFORTABLE_BEARING_RAD = 0.35
 _LOOKED_AT = 40
 _OFFERED = 5
+_SHORT_M, _UNSURE_COST = 0.03, 0.5
 
 
 @dataclass(frozen=True)
@@ -63,9 +64,25 @@ def reachable(free: Sequence[Standing], reach_cost: Callable[[Pose2D], float | N
 
     `reach_cost` says how awkward the reach from a pose is, None where the point is out of reach.
     """
-    reaches = [(standing, reach_cost(standing.pose)) for standing in free]
-    reached = [Standing(each.pose, each.cost + REACH_WEIGHT * cost) for each, cost in reaches if cost is not None]
-    return sorted(reached, key=lambda standing: standing.cost)[:_OFFERED]
+    best = list[Standing]()
+    for standing in sorted(free, key=lambda standing: standing.cost):
+        if len(best) == _OFFERED and standing.cost >= best[-1].cost:
+            break
+        cost = _sure_cost(standing.pose, reach_cost)
+        if cost is not None:
+            best.append(Standing(standing.pose, standing.cost + REACH_WEIGHT * cost))
+            best = sorted(best, key=lambda each: each.cost)[:_OFFERED]
+    return best
+
+
+def _sure_cost(pose: Pose2D, reach_cost: Callable[[Pose2D], float | None]) -> float | None:
+    """How awkward the reach is where the robot may stop a little short of a pose; None for one out of reach."""
+    cost = reach_cost(pose)
+    if cost is None:
+        return None
+    x_m, y_m = pose.x_m - _SHORT_M * math.cos(pose.yaw_rad), pose.y_m - _SHORT_M * math.sin(pose.yaw_rad)
+    behind = reach_cost(Pose2D(x_m, y_m, pose.yaw_rad))
+    return cost + _UNSURE_COST if behind is None else max(cost, behind)
 
 
 def _cost(pose: Pose2D, here: Pose2D, distance_m: float) -> float:

@@ -15,7 +15,7 @@ from skills.api import Cause, InputsT, Running, SkillContext
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel, arm_model
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
-from skills.arm.solid_cells import solid_boxes, with_picture
+from skills.arm.solid_cells import solid_boxes, with_picture, with_view
 from skills.estimate.self_filter import segment_distance
 from skills.robot import ArmTrajectory, CameraCapabilities, CommandId, FloatArray, GripperCapabilities, Image
 
@@ -377,8 +377,11 @@ class ArmSkill(RoutineSkill[InputsT]):
         if image.stamp_s < asked_s - OLDEST_PICTURE_S:
             age_s = asked_s - image.stamp_s
             raise SkillFailure(Cause.EXECUTION, f"the hand camera gives only a picture that is {age_s:.1f} s old")
-        solid = self.context.solid
-        solid.cells = with_picture(solid.cells, image, self.context.localiser.estimate().X_WO, self._own)
+        solid, X_WO = self.context.solid, self.context.localiser.estimate().X_WO
+        solid.cells, solid.views = (
+            with_picture(solid.cells, image, X_WO, self._own),
+            with_view(solid.views, image, X_WO),
+        )
         return image
 
     def try_stow(self) -> Routine[None]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -11,7 +12,7 @@ from pydrake.math import RigidTransform
 
 from skills.arm.collision import Box
 from skills.perception.point_cloud import camera_pose_W, cloud_from_image
-from skills.robot import FloatArray, Image
+from skills.robot import FloatArray, Image, Intrinsics
 
 CELL_M: Final = 0.04
 _NEAREST_M, _FURTHEST_M = 0.28, 2.5
@@ -22,9 +23,12 @@ _FLOOR_M = 0.05
 _SPAN = 1 << 20
 _OFFSET = _SPAN // 2
 _STRIDES = np.array([_SPAN**2, _SPAN, 1])
+_THINNED, _VIEWS_KEPT = 8, 32
 
 Cells = NDArray[np.int64]
 Run = tuple[int, int]
+View = tuple[Image, RigidTransform]
+"""A depth picture and the X_WO of its time."""
 
 
 def with_picture(
@@ -49,7 +53,7 @@ def solid_boxes(
 
     What is behind a cell, up to 32 cm, is unknown and counts as solid, too: of a board only the edge is seen.
     """
-    middles, origin_W = (cells + 0.5) * CELL_M, X_WB.translation()
+    middles, origin_W = _middles(cells), X_WB.translation()
     middles = middles[np.linalg.norm((middles - origin_W)[:, :2], axis=1) < reach_m]
     middles = middles[~left_out(middles)]
     if len(middles) == 0:
@@ -62,26 +66,69 @@ def solid_boxes(
     return [_box(low, high, X_BW) for low, high in merged(solid)]
 
 
+def boxes_of(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArray], NDArray[np.bool_]]) -> list[Box]:
+    """Boxes in the body frame about those cells alone whose middles p_W (N, 3) are `chosen`."""
+    X_BW = X_WB.inverse()
+    return [_box(low, high, X_BW) for low, high in merged(cells[chosen(_middles(cells))])]
+
+
+def _middles(cells: Cells) -> FloatArray:
+    """The middles (N, 3) of cells, m."""
+    return np.asarray((cells + 0.5) * CELL_M, dtype=np.float64)
+
+
 def _unique(cells: Cells) -> tuple[Cells, NDArray[np.int64]]:
     """Each cell once, in order, and how often it was there."""
     keys, counts = np.unique(((cells + _OFFSET) * _STRIDES).sum(axis=1), return_counts=True)
     return np.stack([keys // _STRIDES[0], keys // _STRIDES[1] % _SPAN, keys % _SPAN], axis=1) - _OFFSET, counts
 
 
+def with_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tuple[View, ...]:
+    """The last views with one more, of which each eighth row and column of the depth is kept."""
+    lens, thin = image.depth_intrinsics, _THINNED
+    depth_m = image.depth_m[thin // 2 :: thin, thin // 2 :: thin]
+    kept = Intrinsics(
+        width=depth_m.shape[1],
+        height=depth_m.shape[0],
+        fx=lens.fx / thin,
+        fy=lens.fy / thin,
+        cx=(lens.cx - thin // 2) / thin,
+        cy=(lens.cy - thin // 2) / thin,
+    )
+    nothing = np.empty((0, 0), dtype=np.uint8)
+    thinned = replace(image, colour=None, grey=nothing, depth_m=depth_m, depth_intrinsics=kept)
+    return (*views[1 - _VIEWS_KEPT :], (thinned, X_WO))
+
+
+def never_seen(points_W: FloatArray, views: Iterable[View]) -> NDArray[np.bool_]:
+    """Which world points (N, 3) lie in no view, or far behind what it shows: just behind it all counts as solid."""
+    unseen = np.ones(len(points_W), dtype=np.bool_)
+    for image, X_WO in views:
+        inside, z, depth = _at_pixels(points_W, image, X_WO)
+        unseen &= ~(inside & ((depth == 0.0) | (depth > z - _SHADOW_CELLS * CELL_M)))
+    return unseen
+
+
 def _seen_past(cells: Cells, image: Image, X_WO: RigidTransform) -> NDArray[np.bool_]:
     """Which cells lie clearly before what the picture shows at their pixel."""
-    if len(cells) == 0:
-        return np.zeros(0, dtype=np.bool_)
+    inside, z, depth = _at_pixels(_middles(cells), image, X_WO)
+    return np.asarray(inside & (depth > z + _SEEN_PAST_M))
+
+
+def _at_pixels(
+    points_W: FloatArray, image: Image, X_WO: RigidTransform
+) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+    """Which points (N, 3) a depth picture covers, how far ahead of the camera they are, and its depth there (m)."""
     X_CW = camera_pose_W(image, X_WO).inverse()
-    p_C = ((cells + 0.5) * CELL_M) @ X_CW.rotation().matrix().T + X_CW.translation()
+    p_C = points_W @ X_CW.rotation().matrix().T + X_CW.translation()
     lens = image.depth_intrinsics
     z = np.maximum(p_C[:, 2], 1e-6)
     u = np.rint(p_C[:, 0] / z * lens.fx + lens.cx).astype(np.int64)
     v = np.rint(p_C[:, 1] / z * lens.fy + lens.cy).astype(np.int64)
     inside = (p_C[:, 2] > _NEAREST_M) & (u >= 0) & (u < lens.width) & (v >= 0) & (v < lens.height)
-    depth = np.zeros(len(cells))
+    depth = np.zeros(len(points_W))
     depth[inside] = image.depth_m[v[inside], u[inside]]
-    return np.asarray(inside & (depth > z + _SEEN_PAST_M))
+    return inside, z, depth
 
 
 def merged(cells: Cells) -> list[tuple[Cells, Cells]]:

@@ -227,10 +227,10 @@ def _top_grip(half_depth_m: float, tilt_rad: float, gripper: GripperCapabilities
 
 def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationMatrix:
     """R_BH of a hand whose fingers point tilt_rad below level towards azimuth_rad; side (1, -1) turns it over."""
-    c, s = np.cos(azimuth_rad), np.sin(azimuth_rad)
-    x_axis = np.array([np.cos(tilt_rad) * c, np.cos(tilt_rad) * s, -np.sin(tilt_rad)])
-    z_axis = side * np.array([-s, c, 0.0])
-    return RotationMatrix(np.stack([x_axis, np.cross(z_axis, x_axis), z_axis], axis=1))
+    c, s, ahead, down = np.cos(azimuth_rad), np.sin(azimuth_rad), np.cos(tilt_rad), np.sin(tilt_rad)
+    x_axis, z_axis = [ahead * c, ahead * s, -down], [-side * s, side * c, 0.0]
+    y_axis = [-side * down * c, -side * down * s, -side * ahead]
+    return RotationMatrix(np.array([x_axis, y_axis, z_axis]).T)
 
 
 def _low_grip(

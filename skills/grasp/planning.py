@@ -20,7 +20,7 @@ PREGRASPS_M = (0.12, 0.07, 0.045)
 """How far before the grasp the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0), (0.03, 0.0))
 """Ways to lift, up and back towards the shoulder, the best first."""
-_SLOW_POINTS, _OTHERS_TRIED, _OUT_OF_REACH = 3, 3, "out of reach"
+_SLOW_POINTS, _OTHERS_TRIED, _ASKED, _OUT_OF_REACH = 3, 3, 40, "out of reach"
 _OFF_M = 0.015
 
 
@@ -128,10 +128,13 @@ class GeometricGraspPlanner:
         around: Surroundings,
         arm_planner: ArmPlanner,
     ) -> tuple[Obstacle, ...]:
-        """The other object, or all that are near, without which there were a grasp; empty: none is in the way."""
+        """The other object, or all that are near, without which there were a grasp; empty: none is in the way.
+
+        Only the best candidates are asked again.
+        """
 
         def graspable(space: Surroundings) -> bool:
-            for candidate in candidates:
+            for candidate in candidates[:_ASKED]:
                 try:
                     self._reached(scene, q_near_rad, candidate, space, arm_planner)
                 except PlanningError:

@@ -9,16 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any, Final
 
 import numpy as np
-from pydrake.math import RigidTransform
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import ObjectObservation, Surface
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
+from skills.arm.solid_cells import boxes_of
 from skills.detect.viewpoints import surface_boxes
 from skills.grasp.candidates import GraspCandidate, Target
 from skills.grasp.planning import PREGRASPS_M, lifts, within_reach
@@ -31,9 +33,13 @@ _OTHER_HEIGHT_COST: Final = 0.15
 _PADDING_M, _MARGIN_RAD = -0.002, 0.08
 """Fingertips end 1 mm above the surface where something thin lies."""
 _LOOKED_AT = 60
+_PARTS, _ABOVE_ARM_M = 9, 0.1
+_BESIDE_COST, _OWN_M, _LOW_M, _LESS_M = 0.8, 0.05, 0.05, 0.01
 _SURFACE_AROUND_M, _SURFACE_BAND_M, _KNOWN_ABOVE_M = 0.2, 0.06, 0.34
 WIDE: Final = 0.9
 """How far the gripper is open, as a part of all that it opens, as it reaches for an object."""
+_NARROW: Final = 0.6
+"""The same among neighbours."""
 
 CandidatesOf = Callable[[Target], list[GraspCandidate]]
 
@@ -50,7 +56,8 @@ class Reached:
 class ReachCheck:
     """What is needed to say how an object is reached from a pose of the body.
 
-    The boxes that stand around, without the object, are given in the body frame of the moment at X_WB.
+    The boxes that stand around, without the object, are given in the body frame of the moment at X_WB; `beside` are
+    those of its neighbours, which cells show larger than they are: a grasp that touches only them is a last choice.
     """
 
     scene: ArmScene
@@ -58,6 +65,8 @@ class ReachCheck:
     X_WB: RigidTransform
     seen: ObjectObservation
     candidates_of: CandidatesOf
+    open_rad: float
+    beside: Sequence[Box] = ()
 
     def best(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> Reached | None:
         """The best height, the first of which is the usual one; None where no grasp is reached from any.
@@ -79,30 +88,48 @@ class ReachCheck:
             found.append(Reached(cost + (0.0 if height_m == heights_m[0] else _OTHER_HEIGHT_COST), height_m))
         return found
 
+    def arm_W(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> FloatArray:
+        """Points (N, 3) in the world along the arm and above it at the best grasp, before it and after a lift."""
+        reached = self.best(at, heights_m)
+        X_WB = None if reached is None else at(reached.height_m)
+        best = None if X_WB is None else self._best(X_WB)[0]
+        if X_WB is None or best is None:
+            return np.empty((0, 3))
+        model = self.scene.model
+        along_B = np.concatenate([_along(model.points_B(q)) for q in _postures(self.scene, best, _up_B(X_WB))])
+        along_W = along_B @ X_WB.rotation().matrix().T + X_WB.translation()
+        return np.concatenate([along_W, along_W + [0.0, 0.0, _ABOVE_ARM_M]])
+
     def _cost(self, X_WB: RigidTransform) -> float | None:
-        up_B = _up_B(X_WB)
+        best, beyond = self._best(X_WB)
+        return None if best is None else beyond
+
+    def _best(self, X_WB: RigidTransform) -> tuple[GraspCandidate | None, float]:
+        """The best grasp that is reached from X_WB, and what it costs beyond the best there is."""
+        reached, least = reached_grasps(self.scene.model, self.candidates_of, X_WB, self.seen)
         self.scene.set_padding(_PADDING_M)
-        self.scene.set_boxes(self.boxes, X_WB.inverse() @ self.X_WB)
-        return grasp_cost(
-            self.scene.model, self.candidates_of, X_WB, self.seen, lambda each: _free(self.scene, each, up_B)
-        )
+        spaces = [(self.boxes, WIDE, _BESIDE_COST if self.beside else 0.0)]
+        if self.beside:
+            spaces = [((*self.boxes, *self.beside), _NARROW, 0.0), *spaces]
+        for boxes, opening, extra in spaces:
+            self.scene.set_boxes(boxes, X_WB.inverse() @ self.X_WB)
+            self.scene.set_opening(opening * self.open_rad)
+            best = next((each for each in reached if _postures(self.scene, each, _up_B(X_WB))), None)
+            if best is not None:
+                return best, best.cost - least + extra
+        return None, np.inf
 
 
-def grasp_cost(
-    model: ArmModel,
-    candidates_of: CandidatesOf,
-    X_WB: RigidTransform,
-    seen: ObjectObservation,
-    free: Callable[[GraspCandidate], bool] = lambda candidate: True,
-) -> float | None:
-    """Cost of the best grasp that the arm reaches with the body at X_WB and that is `free`, beyond the best there is.
+def reached_grasps(
+    model: ArmModel, candidates_of: CandidatesOf, X_WB: RigidTransform, seen: ObjectObservation
+) -> tuple[list[GraspCandidate], float]:
+    """Grasps that the arm reaches with the body at X_WB, best first, and the cost of the best there is.
 
-    None when there is no such grasp.
+    Contact is not looked at.
     """
     candidates = candidates_of(observed_target(seen, X_WB))
     reached = (each for each in candidates if within_reach(model, each, _up_B(X_WB), _MARGIN_RAD))
-    best = next((each for each in islice(reached, _LOOKED_AT) if free(each)), None)
-    return None if best is None else best.cost - candidates[0].cost
+    return list(islice(reached, _LOOKED_AT)), candidates[0].cost if candidates else np.inf
 
 
 def _up_B(X_WB: RigidTransform) -> FloatArray:
@@ -110,17 +137,23 @@ def _up_B(X_WB: RigidTransform) -> FloatArray:
     return np.asarray(X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
 
 
-def _free(scene: ArmScene, candidate: GraspCandidate, up_B: FloatArray) -> bool:
-    """Whether the arm touches nothing at a grasp, before it and after a lift."""
+def _postures(scene: ArmScene, candidate: GraspCandidate, up_B: FloatArray) -> list[FloatArray]:
+    """Arm angles at a grasp, before it and after a lift at which it touches nothing; empty when there are none."""
     X_BH = candidate.X_BH
-    if not (_any_free(scene, X_BH) and any(_any_free(scene, candidate.retreated(m)) for m in PREGRASPS_M)):
-        return False
     lifted = (RigidTransform(X_BH.rotation(), X_BH.translation() + way_B) for way_B in lifts(scene.model, X_BH, up_B))
-    return any(_any_free(scene, X) for X in lifted)
+    found = list[FloatArray]()
+    for ways in ([X_BH], map(candidate.retreated, PREGRASPS_M), lifted):
+        q_rad = next((q for X in ways for q in scene.model.inverse(X, _MARGIN_RAD) if scene.free(q)), None)
+        if q_rad is None:
+            return []
+        found.append(q_rad)
+    return found
 
 
-def _any_free(scene: ArmScene, X_BH: RigidTransform) -> bool:
-    return any(scene.free(q) for q in scene.model.inverse(X_BH, _MARGIN_RAD))
+def _along(points_B: FloatArray) -> FloatArray:
+    """Points (N, 3) along the segments between points, a few on each."""
+    parts = np.linspace(0.0, 1.0, _PARTS)[:, None]
+    return np.concatenate([a + parts * (b - a) for a, b in pairwise(points_B)])
 
 
 def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ...]:
@@ -161,6 +194,22 @@ def space_about(
     return low, np.array([x + half_m, y + half_m, base_m + _KNOWN_ABOVE_M])
 
 
+def _beside(seen: ObjectObservation, p_W: FloatArray) -> NDArray[np.bool_]:
+    """Which points (N, 3) are in the space about an object, but neither its own nor just above its surface."""
+    base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
+    low, high = space_about(seen.position_W, base_m)
+    inside = np.all((p_W > low) & (p_W < high), axis=1) & (p_W[:, 2] > base_m + _LOW_M)
+    turn = RotationMatrix.MakeZRotation(-seen.yaw_rad).matrix()
+    off = np.abs((p_W - np.array(seen.position_W)) @ turn.T)[:, :2]
+    return np.asarray(inside & np.any(off > 0.5 * np.array(seen.size_m[:2]) + _OWN_M, axis=1))
+
+
+def _less(box: Box) -> Box:
+    """A little less of a box, since cells are larger than what is in them."""
+    x, y, z = (max(side - 2.0 * _LESS_M, 0.01) for side in box.size_m)
+    return Box(box.X_FG, (x, y, z))
+
+
 def reach_check(
     skill: ArmSkill[Any], seen: ObjectObservation, surfaces: Sequence[Surface], beyond_m: float = 0.0
 ) -> Callable[[], ReachCheck]:
@@ -173,12 +222,12 @@ def reach_check(
     boxes = [*surface_boxes(surfaces, X_WB), *skill.seen_boxes(beyond_m)]
     skill.known_W = known_W
     candidates = partial(skill.context.stack.grasp_planner.candidates, p_BS=skill.model.p_BS, gripper=skill.gripper)
-    scene_now, opening_rad = skill.scene_now(boxes), WIDE * skill.open_rad
+    cells = skill.context.solid.cells
+    beside = [_less(box) for box in boxes_of(cells, X_WB, partial(_beside, seen))]
+    scene_now, open_rad = skill.scene_now(boxes), skill.open_rad
 
     def check() -> ReachCheck:
         """The check, with a collision scene of its own boxes."""
-        scene = scene_now()
-        scene.set_opening(opening_rad)
-        return ReachCheck(scene, boxes, X_WB, seen, candidates)
+        return ReachCheck(scene_now(), boxes, X_WB, seen, candidates, open_rad, beside)
 
     return check

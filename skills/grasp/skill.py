@@ -31,16 +31,16 @@ from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.grasp.servo import seen_shift, shifted
+from skills.grasp.unseen import look_into_unseen
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
-from skills.perception.point_cloud import camera_pose_W
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import ArmTrajectory, FloatArray
 
 _CLOSED_RAD = 0.06
 _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95
-_RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.014, 0.12, 0.8
+_RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.026, 0.12, 0.8
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
 _AIM_LATENCY_S, _AIMED_M, _FAR_OFF_M, _LEAST_OVERLAP = 0.1, 0.003, 0.05, 0.5
@@ -153,7 +153,7 @@ class Grasp(ArmSkill[GraspInputs]):
         """
         message = f"reaching for the {thing}"
         image = yield from self.picture(message, settle_s=0.0)
-        X_BC = self.X_WB().inverse() @ camera_pose_W(image, self.context.localiser.estimate().X_WO)
+        X_BC = image.frames.pose("body").inverse() @ image.frames.pose(image.camera_frame)
         scene_now, closing_B = self.scene_now([*view.boxes, *self.seen_boxes()]), plan.candidate.X_BH.rotation().col(2)
 
         def aim() -> tuple[FloatArray, tuple[ArmTrajectory, ArmTrajectory] | None] | None:
@@ -200,21 +200,27 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def _heights(self, seen: ObjectObservation) -> Routine[list[float]]:
         """Body heights (m) from which the arm seems to reach the object, the best first; at least the usual one."""
-        base_m, pose = seen.position_W[2] - 0.5 * seen.size_m[2], self.context.pose()
+        base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
         heights_m = body_heights_m(base_m, self.context.robot.capabilities())
-        if len(heights_m) == 1:
-            return list(heights_m)
+        chosen, arm_W = yield from self._suiting(seen, base_m, heights_m)
+        if (yield from look_into_unseen(self, seen, arm_W)):
+            chosen, _ = yield from self._suiting(seen, base_m, heights_m)
+        return chosen or [heights_m[0]]
+
+    def _suiting(
+        self, seen: ObjectObservation, base_m: float, heights_m: Sequence[float]
+    ) -> Routine[tuple[list[float], FloatArray]]:
+        """Those heights (m) from which the arm seems to reach, the best first; where (points, world) it would be."""
+        pose = self.context.pose()
         check_now = reach_check(self, seen, [square(seen.position_W, base_m, "guess", SURFACE_AROUND_M)])
 
-        def choose() -> list[float]:
-            """The heights by what the best grasp from each costs."""
-            found = check_now().all(pose.transform, heights_m)
-            return [each.height_m for each in sorted(found, key=lambda each: each.cost)][:_HEIGHTS_TRIED]
+        def choose() -> tuple[list[float], FloatArray]:
+            check = check_now()
+            found = sorted(check.all(pose.transform, heights_m), key=lambda each: each.cost)
+            return [each.height_m for each in found][:_HEIGHTS_TRIED], check.arm_W(pose.transform, heights_m)
 
-        chosen = yield from self.compute(
-            choose, latency_s=0.1, name="choose a height", message=f"choosing how high to stand before the {seen.thing}"
-        )
-        return chosen or [heights_m[0]]
+        message = f"choosing how high to stand before the {seen.thing}"
+        return (yield from self.compute(choose, latency_s=0.1, name="choose a height", message=message))
 
     _watch: HoldWatch | None = None
 
@@ -319,7 +325,8 @@ class Grasp(ArmSkill[GraspInputs]):
         if aside_rad != 0.0 or not (open_wide and sees_closely(X_BC, p_BT)):
             yield from self.look_from(goal, message)
         image = yield from self.picture(message)
-        place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
+        place, detector = self.context.localiser.estimate(), self.context.detector
+        X_WB = place.X_WO @ image.frames.pose("body")
 
         def look() -> CloseView | None:
             found = detections_in(detector, image)
@@ -344,18 +351,18 @@ class Grasp(ArmSkill[GraspInputs]):
 
         around = Surroundings((*view.boxes, *seen), view.target_box, up_B, view.others, thing, reach_m)
 
-        def planned(scene: ArmScene, opening_rad: float) -> tuple[GraspPlan, float]:
+        def planned(scene: ArmScene, opening_rad: float, space: Surroundings) -> tuple[GraspPlan, float]:
             """A plan for a gripper that is open so far, and that opening."""
             scene.set_opening(opening_rad)
-            return stack.grasp_planner.plan(scene, q, candidates, around, stack.arm_planner, self._rng), opening_rad
+            return stack.grasp_planner.plan(scene, q, candidates, space, stack.arm_planner, self._rng), opening_rad
 
         def plan() -> tuple[GraspPlan, float]:
             """A plan for the first opening for which there is one."""
             scene, (*first_rad, last_rad) = scene_now(), openings_rad
             for opening_rad in first_rad:
-                with suppress(PlanningError):
-                    return planned(scene, opening_rad)
-            return planned(scene, last_rad)
+                with suppress(PlanningError):  # why there is none is not asked: another opening is left
+                    return planned(scene, opening_rad, replace(around, others=()))
+            return planned(scene, last_rad, around)
 
         found, opening_rad = yield from self.compute(
             plan, latency_s=0.6, name="plan grasp", message=f"planning how to take the {thing}"

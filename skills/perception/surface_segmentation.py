@@ -31,6 +31,7 @@ _LEAST_OVERLAP = 0.2
 _LEAST_PART = 0.15
 _GAP_PX = 11
 _APART_M = 0.035
+_COLUMN_M, _UNDER_HANGING_M, _LOWEST_HIDDEN_M = 0.04, 0.12, 0.28
 
 
 @dataclass(frozen=True)
@@ -81,9 +82,27 @@ def _view(cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: float
     if plane is None:
         return None
     height = cloud.p_W[:, 2] - plane.z(cloud.p_W[:, :2])
-    standing = cloud.where(height > max(_LOWEST_M, 3.0 * plane.noise_m))
+    raised = height > max(_LOWEST_M, 3.0 * plane.noise_m)
+    standing = cloud.where(raised).where(resting(cloud.p_W[raised, :2], height[raised]))
     clusters = tuple(_cluster(points, surface.name, plane, p_WC) for points in _groups(standing))
     return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
+
+
+def resting(xy: FloatArray, height_m: FloatArray) -> NDArray[np.bool_]:
+    """Which points at places (N, 2) and heights (N,) over a surface may belong to something that rests on it.
+
+    What hangs over it does not, as the board above on a shelf: there is a gap below it.
+    """
+    columns = np.unique(np.floor(xy / _COLUMN_M).astype(int), axis=0, return_inverse=True)[1].reshape(-1)
+    order = np.lexsort((height_m, columns))
+    column, height = columns[order], height_m[order]
+    first = np.diff(column, prepend=-1) > 0
+    gap = np.where(first, height > _LOWEST_HIDDEN_M, np.diff(height, prepend=0.0) > _UNDER_HANGING_M)
+    gaps = np.cumsum(gap)
+    before = np.maximum.accumulate(np.where(first, gaps - gap, 0))
+    found = np.empty(len(order), dtype=np.bool_)
+    found[order] = gaps == before
+    return found
 
 
 def fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:

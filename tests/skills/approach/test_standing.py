@@ -10,7 +10,7 @@ from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 from skills.api import ObjectObservation, Thing
 from skills.approach.standing import free_places, is_comfortable, reachable
 from skills.grasp.planning import GeometricGraspPlanner
-from skills.grasp.reach import grasp_cost, observed_target
+from skills.grasp.reach import observed_target, reached_grasps
 from skills.navigate.footprint import Footprint
 from skills.robot import Pose2D
 
@@ -26,6 +26,11 @@ class _Table:
 
     def update(self, robot, localisation):
         pass
+
+
+def _grasp_cost(X_WB, seen):
+    reached, least = reached_grasps(MODEL, CANDIDATES, X_WB, seen)
+    return reached[0].cost - least if reached else None
 
 
 def _poses(reach_cost=lambda pose: 0.0):
@@ -54,8 +59,8 @@ def test_places_out_of_reach_are_left_out():
 
 def test_a_can_is_within_reach_from_the_best_place_but_not_from_afar():
     best = _poses()[0].pose
-    assert grasp_cost(MODEL, CANDIDATES, best.transform(0.52), CAN) == 0.0
-    assert grasp_cost(MODEL, CANDIDATES, Pose2D(0.0, 0.0, 0.0).transform(0.52), CAN) is None
+    assert _grasp_cost(best.transform(0.52), CAN) == 0.0
+    assert _grasp_cost(Pose2D(0.0, 0.0, 0.0).transform(0.52), CAN) is None
 
 
 @pytest.mark.parametrize(
@@ -82,7 +87,7 @@ def test_an_observation_keeps_its_axes_when_the_body_is_turned():
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 1.57, 2.4])
 def test_a_hammer_lying_any_way_is_within_reach_from_some_place(yaw):
     hammer = ObjectObservation(0.0, Thing("hammer"), (2.15, 0.0, 0.765), (0.33, 0.12, 0.03), yaw, 1.0, "bench")
-    found = _poses(lambda pose: grasp_cost(MODEL, CANDIDATES, pose.transform(0.52), hammer))
+    found = _poses(lambda pose: _grasp_cost(pose.transform(0.52), hammer))
     assert found
 
 
@@ -90,3 +95,8 @@ def test_a_place_with_a_better_grasp_is_preferred():
     nearest = _poses()[0].pose
     best = _poses(lambda pose: 1.0 if pose == nearest else 0.0)[0].pose
     assert best != nearest
+
+
+def test_a_place_is_left_for_a_nearer_one_where_stopping_short_of_it_is_out_of_reach():
+    best = _poses(lambda pose: 0.0 if math.hypot(pose.x_m - 2.15, pose.y_m) < 0.91 else None)[0].pose
+    assert math.hypot(best.x_m - 2.15, best.y_m) < 0.88

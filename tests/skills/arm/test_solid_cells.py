@@ -2,9 +2,9 @@
 
 import numpy as np
 from pydrake.math import RigidTransform
-from table_scene import TABLE, Can, scene
+from table_scene import CAMERA, TABLE, Can, scene
 
-from skills.arm.solid_cells import CELL_M, merged, solid_boxes, with_picture
+from skills.arm.solid_cells import CELL_M, boxes_of, merged, never_seen, solid_boxes, with_picture, with_view
 
 NOTHING = np.empty((0, 3), dtype=np.int64)
 BODY = RigidTransform([0.0, 0.0, 0.5])
@@ -64,3 +64,27 @@ def test_a_wall_is_one_box():
     wall = np.stack(np.meshgrid([4], np.arange(30), np.arange(20), indexing="ij"), axis=-1).reshape(-1, 3)
     assert len(merged(wall)) == 1
     assert CELL_M < 0.05
+
+
+def test_what_is_above_every_picture_and_far_behind_what_it_shows_was_never_seen():
+    views = with_view((), picture(), RigidTransform())
+    on_the_table = np.array([1.05, 0.0, TABLE.height_m])
+    over_the_camera, under_the_table = CAMERA + [0.0, 0.0, 0.5], CAMERA + 1.6 * (on_the_table - CAMERA)
+    points = np.array([on_the_table + [0.0, 0.0, 0.1], over_the_camera, under_the_table])
+    assert never_seen(points, views).tolist() == [False, True, True]
+    assert never_seen(points, ()).all()
+
+
+def test_only_the_last_views_are_kept():
+    views = ()
+    for _ in range(40):
+        views = with_view(views, picture(), RigidTransform())
+    assert len(views) == 32
+
+
+def test_boxes_of_chosen_cells_have_nothing_behind_them():
+    can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
+    cells = with_picture(NOTHING, picture(can), RigidTransform(), nothing_of)
+    boxes = boxes_of(cells, BODY, lambda p: p[:, 2] > 0.85)
+    assert inside(boxes, (0.97, 0.0, 0.9))
+    assert not inside(boxes, (1.15, 0.0, 0.9))

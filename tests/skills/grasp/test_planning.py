@@ -54,3 +54,21 @@ def test_what_stands_close_behind_it_is_too_near():
 def test_what_is_no_object_is_not_named_as_one():
     wall = _obstacle("wall", 0.74, 0.0, width=0.5)
     assert "would touch something" in _why((_obstacle("cube", 0.85, 0.6),), boxes=wall.boxes)
+
+
+def test_why_there_is_no_grasp_is_asked_of_a_bounded_number_of_candidates():
+    asked = []
+
+    class Counted(GeometricGraspPlanner):
+        def _reached(self, *args):
+            asked.append(args)
+            raise PlanningError("the hand would touch something before the grasp")
+
+    target = Target(np.full((40, 3), 0.3), (0.85, 0.0), 0.0, 0.066, 0.066, 0.115, 0.2, True)
+    candidates = PLANNER.candidates(target, MODEL.p_BS, CAPABILITIES.gripper)[:1] * 100
+    box = Box(RigidTransform([0.85, 0.0, 0.26]), (0.07, 0.07, 0.12))
+    around = Surroundings((), box, UP, (_obstacle("coke", 0.74, 0.0),))
+    scene = ArmScene(CAPABILITIES, MODEL, {})
+    with pytest.raises(PlanningError):
+        Counted().plan(scene, MODEL.stowed_rad, candidates, around, RrtConnect(), np.random.default_rng(0))
+    assert 100 < len(asked) < 200

@@ -38,7 +38,9 @@ def test_a_body_of_one_height_has_one():
 
 
 def _check(boxes):
-    return ReachCheck(ArmScene(CAPABILITIES, MODEL, {}), boxes, HERE.transform(USUAL_M), CAN, CANDIDATES)
+    return ReachCheck(
+        ArmScene(CAPABILITIES, MODEL, {}), boxes, HERE.transform(USUAL_M), CAN, CANDIDATES, GRIPPER.open_rad
+    )
 
 
 def test_a_can_that_stands_free_is_reached_from_the_usual_height_and_no_other_is_looked_at():
@@ -71,3 +73,21 @@ def test_what_stands_is_taken_for_square_to_the_fingers_of_a_hand_that_tilts_lit
     now = turned_in_hand(X_BH, p_HT)
     assert bool(abs(now.rotation().matrix()[2, 0]) < 1e-9) is turns
     assert np.allclose(now @ p_HT, X_BH @ p_HT)
+
+
+def test_a_grasp_beside_a_neighbour_is_a_last_choice_but_a_choice():
+    wall = Box(RigidTransform([0.7, 0.0, 0.2]), (0.04, 2.0, 2.0))
+    free = _check(()).best(HERE.transform, (USUAL_M,))
+    beside = replace(_check(()), beside=[wall]).best(HERE.transform, (USUAL_M,))
+    assert beside.cost > free.cost + 0.5
+
+
+def test_the_arm_at_the_best_grasp_goes_from_the_shoulder_to_the_object():
+    arm_W = _check(()).arm_W(HERE.transform, (USUAL_M,))
+    assert np.min(np.linalg.norm(arm_W - HERE.transform(USUAL_M) @ MODEL.p_BS, axis=1)) < 0.01
+    assert np.min(np.linalg.norm(arm_W - CAN.position_W, axis=1)) < 0.3
+
+
+def test_without_a_grasp_the_arm_goes_nowhere():
+    wall = Box(RigidTransform([0.7, 0.0, 0.2]), (0.04, 2.0, 2.0))
+    assert len(_check([wall]).arm_W(HERE.transform, (USUAL_M,))) == 0

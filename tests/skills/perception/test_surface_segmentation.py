@@ -7,7 +7,7 @@ from table_scene import BLUE, CAMERA, COKE, RED, TABLE, Can, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate, Surface
 from skills.perception.detection_3d import detections_3d
-from skills.perception.surface_segmentation import cluster_of, parted, view_surface
+from skills.perception.surface_segmentation import cluster_of, parted, resting, view_surface
 from skills.robot import Image
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
@@ -115,3 +115,24 @@ def test_a_box_that_leaves_out_the_top_of_a_thing_does_not_part_it():
 
 def test_the_camera_is_where_the_scene_has_it():
     assert scene([]).frames.pose("hand_camera").translation() == pytest.approx(CAMERA)
+
+
+# heights over the surface (m) of points in one column -> which of them may rest on it
+@pytest.mark.parametrize(
+    ("heights_m", "rest"),
+    [
+        ((0.02, 0.06, 0.11), (True, True, True)),
+        ((0.39, 0.395), (False, False)),
+        ((0.03, 0.39, 0.395), (True, False, False)),
+        ((0.2, 0.25), (True, True)),
+    ],
+    ids=["what stands", "a board above", "a thing below a board", "a thing whose foot is hidden"],
+)
+def test_what_hangs_over_a_surface_does_not_rest_on_it(heights_m, rest):
+    xy = np.tile([0.51, 0.31], (len(heights_m), 1))
+    assert tuple(resting(xy, np.array(heights_m))) == rest
+
+
+def test_columns_beside_each_other_are_judged_alone():
+    xy = np.array([[0.5, 0.3], [0.9, 0.3], [0.5, 0.3], [0.9, 0.3]])
+    assert resting(xy, np.array([0.39, 0.02, 0.4, 0.06])).tolist() == [False, True, False, True]

@@ -48,14 +48,14 @@ class Trigger:
 class Recovery:
     """When a recovery is due: after failures that fit one of the triggers, `uses` times at most.
 
-    With `given`, only while the blackboard holds something under that key. Why it failed is `told` at the end, also
-    when others came after it.
+    With `given`, only while the blackboard holds something under that key. After one that is `final` and failed there
+    is no other.
     """
 
     triggers: tuple[Trigger, ...]
     uses: int = 1
     given: str | None = None
-    told: bool = False
+    final: bool = False
 
     def fits(self, attempt: Behaviour, board: Board) -> bool:
         """Whether it is for the failure of an attempt."""
@@ -87,8 +87,7 @@ class Recover(MemoryComposite):
     attempt starts anew. Recovery FAILURE: the next that fits; none: FAILURE. No attempts left: FAILURE.
     A failure has the cause and the sentence of the attempt that came farthest, the last of those: when a grasp slips
     and the object is then not seen any more, the slip is decisive. An attempt comes as far as children of it succeeded.
-    After it stand the last attempt's sentence and a failed recovery's (its cause counts when it is ERROR), and those of
-    earlier ones that are `told`.
+    After it stand the last attempt's sentence and a failed recovery's (its cause counts when it is ERROR).
     When it starts anew, recoveries are counted from zero and the blackboard keys in `forgets` are empty.
     """
 
@@ -100,7 +99,6 @@ class Recover(MemoryComposite):
     _uses: list[int] = field(default_factory=list, init=False)
     _due: list[int] = field(default_factory=list, init=False)
     _farthest: _AttemptFailure | None = field(default=None, init=False)
-    _told: list[str] = field(default_factory=list, init=False)
 
     def tick(self) -> Iterator[Behaviour]:
         """Tick the attempt or the recovery that is under way, and see what comes of it."""
@@ -119,7 +117,6 @@ class Recover(MemoryComposite):
     def _restart(self) -> None:
         super()._restart()
         self.attempt, self._uses, self._due, self._farthest = 1, [0] * len(self.recoveries), [], None
-        self._told = []
         self.board.forget(self.forgets)
 
     def _attempt_ended(self) -> None:
@@ -154,20 +151,16 @@ class Recover(MemoryComposite):
             self._index = 0
             said = f"attempt {self.attempt}, since {message_of(self.children[0])}"
             self.status, self.cause, self.message = Status.RUNNING, None, said
-            return
-        why = f"; {recovery.name}: {message_of(recovery)}"
-        error = Cause.ERROR if cause_of(recovery) is Cause.ERROR else None
-        told = self.recoveries[self._index - 1].told
-        self._told += [why] if told else []
-        if not self._next_recovery():
-            self._fail("" if told else why, error)
+        elif self.recoveries[self._index - 1].final or not self._next_recovery():
+            error = Cause.ERROR if cause_of(recovery) is Cause.ERROR else None
+            self._fail(f"; {recovery.name}: {message_of(recovery)}", error)
 
     def _fail(self, addition: str, cause: Cause | None = None) -> None:
         """End with what is decisive, and what came last."""
         last = _AttemptFailure.of(self.children[0])
         decisive = self._farthest or last
         then = "" if decisive.message == last.message else f", then {last.message}"
-        self._end(Status.FAILURE, cause or decisive.cause, f"{decisive.message}{then}{addition}{''.join(self._told)}")
+        self._end(Status.FAILURE, cause or decisive.cause, f"{decisive.message}{then}{addition}")
 
     def _end(self, status: Status, cause: Cause | None, message: str) -> None:
         self.cause, self.message = cause, message

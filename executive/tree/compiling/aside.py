@@ -8,7 +8,7 @@ from executive.mission.command import Thing
 from executive.tree.behaviours.board import FromBoard
 from executive.tree.compiling.builder import PlanBuilder
 from executive.tree.node import NodeSpec
-from skills.api import Surface
+from skills.api import Cause, Surface
 
 SETTLE_S: Final = 0.5
 
@@ -20,13 +20,18 @@ def can_move_aside(builder: PlanBuilder) -> bool:
 
 
 def move_aside_plan(
-    builder: PlanBuilder, thing: Thing, wanted: str, blocking: str, surfaces: tuple[Surface, ...] | FromBoard
+    below: PlanBuilder,
+    thing: Thing,
+    wanted: str,
+    blocking: str,
+    surfaces: tuple[Surface, ...] | FromBoard,
+    tuck: NodeSpec,
 ) -> NodeSpec:
     """Take the first object under the key `blocking`, and put it where it is not in the way of the one under `wanted`.
 
-    What finds no room there is set down again anywhere on its surface, so that the gripper is free.
+    `tuck` draws the arm in between. What finds no room there is set down again anywhere on its surface, so that the
+    gripper is free.
     """
-    below = builder.at("aside")
     obstacle, surface, clear = (f"{below.path_id}/{key}" for key in ("obstacle", "surface", "clear"))
     what = below.node(
         "in the way",
@@ -38,7 +43,7 @@ def move_aside_plan(
         obstacle_key=obstacle,
         surface_key=surface,
         clear_key=clear,
-        surfaces=tuple(map(builder.surface, builder.knowledge.surfaces)),
+        surfaces=tuple(map(below.surface, below.knowledge.surfaces)),
     )
     before = below.skill(
         "approach", {"observation": FromBoard(obstacle), "surfaces": surfaces}, {"observation": obstacle}
@@ -46,11 +51,16 @@ def move_aside_plan(
     stay = below.pause("stay", "take it from here", SETTLE_S)
     put = below.skill("place", {"surface": FromBoard(surface), "clear_of": FromBoard(clear)})
     back = below.at("back").skill("place", {"surface": FromBoard(surface)})
+    near = below.node("selector", "stand before it, or stay", before, stay, part="near")
+    grasp = below.skill("grasp", {"observation": FromBoard(obstacle)})
+    take = below.node("sequence", "take it", near, grasp, part="take")
+    causes = frozenset({Cause.EXECUTION, Cause.POSTCONDITION})
+    twice = below.node("retry", "take it, twice if need be", take, part="twice", attempts=2, causes=causes)
     return below.sequence(
         "move it aside",
         what,
-        below.node("selector", "stand before it, or stay", before, stay, part="near"),
-        below.skill("grasp", {"observation": FromBoard(obstacle)}),
+        twice,
+        tuck,
         below.node(
             "afterwards", "set it down again if there is no room", put, back, part="put", only_after_failure=True
         ),

@@ -84,12 +84,13 @@ def pick_up_plan(
         (builder.pause("look-again", "look again", LOOK_AGAIN_S), Recovery(missed, uses=2)),
         (builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S), Recovery((untaken,))),
     )
-    clear = Recovery((untaken,), uses=builder.move_aside, given=blocking, told=True)
+    clear = Recovery((untaken,), uses=builder.move_aside, given=blocking, final=True)
+    beside = builder.at("aside")
     most = ATTEMPTS + builder.move_aside if aside else ATTEMPTS
     attempts = builder.recover(
         f"up to {most} attempts",
         attempt,
-        *(((move_aside_plan(builder, thing, near, blocking, surfaces), clear),) if aside else ()),
+        *(((move_aside_plan(beside, thing, near, blocking, surfaces, tuck_plan(beside)), clear),) if aside else ()),
         *(((search, Recovery((*missed, untaken), uses=3)),) if seen else look_again),
         (around.skill("clear_costmap"), Recovery((unplanned,))),
         (around.skill("back_off"), Recovery((untaken, unplanned))),

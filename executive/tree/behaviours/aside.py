@@ -27,8 +27,8 @@ class InTheWay(ExplainedLeaf):
 
     Reads from the blackboard: the objects that are in the way (`blocking_key`), of which the first is meant, and the
     wanted one (`wanted_key`). Writes: that first one (`obstacle_key`), the surface on which it stands (`surface_key`),
-    and the circles of `clear_m` about the wanted object and the way from the robot to it (`clear_key`), where it would
-    be in the way again. FAILURE with PRECONDITION: it is not known on which surface it stands.
+    the robot's pose (`pose_key`), and the circles of `clear_m` about the wanted object and the way from the robot to it
+    (`clear_key`), where it would be in the way again. FAILURE with PRECONDITION: nobody knows what it stands on.
     """
 
     thing: str
@@ -37,6 +37,7 @@ class InTheWay(ExplainedLeaf):
     obstacle_key: str
     surface_key: str
     clear_key: str
+    pose_key: str
     surfaces: Sequence[Surface]
     context: RunContext
     clear_m: float = 0.25
@@ -54,6 +55,7 @@ class InTheWay(ExplainedLeaf):
             return Status.FAILURE
         board.put(self.obstacle_key, obstacle)
         board.put(self.surface_key, surface)
+        board.put(self.pose_key, self.context.pose())
         board.put(self.clear_key, _way_circles(wanted, self.context.pose(), self.clear_m))
         self.cause = None
         self.message = f"the {obstacle.thing} is in the way of the {self.thing}; it is moved aside"
@@ -69,11 +71,12 @@ def _way_circles(wanted: ObjectObservation, pose: Pose2D, radius_m: float) -> tu
 
 
 def _written(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The keys of the object, its surface and the circles."""
+    """The keys of the object, its surface, the pose and the circles."""
     circles = tuple[Circle, ...]
     return {
         options["obstacle_key"]: ObjectObservation,
         options["surface_key"]: Surface,
+        options["pose_key"]: Pose2D,
         options["clear_key"]: circles,
     }
 

@@ -30,9 +30,9 @@ def move_aside_plan(
     """Take the first object under the key `blocking`, and put it where it is not in the way of the one under `wanted`.
 
     `tuck` draws the arm in between. What finds no room there is set down again anywhere on its surface, so that the
-    gripper is free.
+    gripper is free. In the end the robot goes back to where it stood, since from there a grasp was found without it.
     """
-    obstacle, surface, clear = (f"{below.path_id}/{key}" for key in ("obstacle", "surface", "clear"))
+    obstacle, surface, clear, pose = (f"{below.path_id}/{key}" for key in ("obstacle", "surface", "clear", "pose"))
     what = below.node(
         "in the way",
         f"what is in the way of the {thing}?",
@@ -43,6 +43,7 @@ def move_aside_plan(
         obstacle_key=obstacle,
         surface_key=surface,
         clear_key=clear,
+        pose_key=pose,
         surfaces=tuple(map(below.surface, below.knowledge.surfaces)),
     )
     before = below.skill(
@@ -56,6 +57,8 @@ def move_aside_plan(
     take = below.node("sequence", "take it", near, grasp, part="take")
     causes = frozenset({Cause.EXECUTION, Cause.POSTCONDITION})
     twice = below.node("retry", "take it, twice if need be", take, part="twice", attempts=2, causes=causes)
+    there = below.navigate(FromBoard(pose), "where it stood", exactly=True)
+    here = below.pause("here", "go on from here", SETTLE_S)
     return below.sequence(
         "move it aside",
         what,
@@ -64,4 +67,5 @@ def move_aside_plan(
         below.node(
             "afterwards", "set it down again if there is no room", put, back, part="put", only_after_failure=True
         ),
+        below.node("selector", "go back to where it stood, or go on from here", there, here, part="there"),
     )

@@ -13,12 +13,13 @@ from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, ObjectObservation, Succeeded, Surface, Thing
 from skills.quantities import Coordinate, Length
+from skills.robot import Pose2D
 
 GRASP = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [beer]")
 BEER = ObjectObservation(0.0, Thing("beer"), (1.0, 2.0, 0.9), (0.06, 0.06, 0.2), 0.0, 0.9, "counter")
 COKE = replace(BEER, thing=Thing("coke"), position_W=(0.9, 2.0, 0.9))
 ROUND = ["detect", "approach", "grasp"]
-MOVED = ["approach", "grasp", "stow", "place"]
+MOVED = ["approach", "grasp", "stow", "place", "navigate"]
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,29 @@ def test_it_is_put_clear_of_the_object_and_of_the_way_from_the_robot_to_it(play,
     assert max(steps) < 0.25
 
 
+def test_the_robot_goes_back_to_where_it_stood_since_a_grasp_was_found_from_there(play, script, table, robot):
+    goals, usual = [], script.ends["approach"]
+
+    def approaches(skill):
+        robot.standing = Pose2D(0.3 if skill.inputs.observation.thing.name == "beer" else 0.5, 0.0, 0.0)
+        return usual(skill)
+
+    def goes(skill):
+        goals.append(skill.inputs.goal)
+        return Succeeded("gone")
+
+    script.ends |= {"approach": approaches, "navigate": goes}
+    assert play(1).outcome is Outcome.SUCCESS
+    assert goals[1:] == [Pose2D(0.3, 0.0, 0.0)]
+
+
+def test_where_the_way_back_is_blocked_it_goes_on_from_where_it_stands(play, script, table):
+    script.ends["navigate"] = lambda skill: (
+        Failed(Cause.PLANNING, "blocked") if "place" in script.begun else Succeeded("gone")
+    )
+    assert play(1).outcome is Outcome.SUCCESS
+
+
 @pytest.mark.parametrize(("own", "mission", "moved"), [(None, None, 0), (None, 1, 1), (0, 1, 0), (2, None, 1)])
 def test_whether_it_is_allowed_is_the_steps_to_say_or_the_missions(
     compile_step, run_tree, table, script, own, mission, moved
@@ -197,7 +221,7 @@ def test_skills_that_do_not_tell_what_is_in_the_way_are_not_asked(compile_step, 
     assert not [node for node in tree.root.walk() if node.kind == "in the way"]
 
 
-@pytest.mark.parametrize(("step", "index"), [("approach", 5), ("grasp", 6), ("stow", 7), ("place", 8)])
+@pytest.mark.parametrize(("step", "index"), [("approach", 5), ("grasp", 6), ("stow", 7), ("place", 8), ("navigate", 9)])
 def test_cancelled_at_any_step_of_it_the_skill_ends_and_nothing_more_begins(play, table, script, step, index):
     control = Control(pace=None)
 

@@ -47,7 +47,11 @@ class Cause(enum.Enum):
 
 
 class PlanningError(Exception):
-    """No plan was found; the message is one plain sentence."""
+    """No plan was found; the message is one plain sentence, `outputs` is what was learnt (see `Failed`)."""
+
+    def __init__(self, message: str, outputs: Mapping[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.outputs: Mapping[str, Any] = outputs or {}
 
 
 @dataclass(frozen=True)

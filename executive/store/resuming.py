@@ -86,7 +86,7 @@ class _Change:
             return self._skill(spec)
         if spec.kind in _CONDITIONAL and self._was_reached(path):
             self.made[path] = lambda node: _applies_as_before(node, self._begun(path))
-        elif spec.kind in _FORGETTING and step is not None and step.status is Status.RUNNING:
+        elif spec.kind in _FORGETTING and step is not None and step.status in (Status.RUNNING, Status.SUCCESS):
             return _with_options(spec, forgets=())
         elif step is None or not step.ended:
             return spec

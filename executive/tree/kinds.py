@@ -10,6 +10,7 @@ from py_trees.behaviour import Behaviour
 
 from executive.tree.behaviours import (
     answer,
+    aside,
     composites,
     decorators,
     fallen,
@@ -28,7 +29,19 @@ __all__ = ["KINDS", "Changes", "build", "writes"]
 Changes = Mapping[str, Callable[[Any], object]]
 """By path id, what is done to a node once it is built."""
 
-_HOMES: Final = (answer, composites, decorators, fallen, interrupts, leaves, policies, recovery, rounds, skill_leaf)
+_HOMES: Final = (
+    answer,
+    aside,
+    composites,
+    decorators,
+    fallen,
+    interrupts,
+    leaves,
+    policies,
+    recovery,
+    rounds,
+    skill_leaf,
+)
 KINDS: Final[Mapping[str, NodeKind]] = {name: k for home in _HOMES for name, k in home.KINDS.items()}
 _NO_CHANGES: Final[Changes] = MappingProxyType({})
 

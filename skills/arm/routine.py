@@ -172,7 +172,7 @@ class RoutineSkill(Skill[InputsT]):
                 yield Running(message)
             return job.result()
         except PlanningError as error:
-            raise SkillFailure(Cause.PLANNING, str(error)) from error
+            raise SkillFailure(Cause.PLANNING, str(error), error.outputs) from error
         finally:
             job.withdraw()
 

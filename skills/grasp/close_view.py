@@ -9,7 +9,7 @@ from functools import reduce
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import LocalisationEstimate, ObjectObservation, Surface
+from skills.api import LocalisationEstimate, ObjectObservation, Surface, Thing
 from skills.arm.collision import Box
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.grasp.candidates import Target
@@ -71,9 +71,9 @@ def examine(
     cluster = _same_thing(view, seen, own, within_m)
     if cluster is None:
         return None
-    names = {id(cluster_of(view.clusters, each)): each.detection.class_name for each in found}
+    names = {id(cluster_of(view.clusters, each)): each.class_name for each in found}
     others = tuple(
-        Obstacle(names.get(id(each), THING), tuple(cluster_boxes([each], X_WB)))
+        Obstacle(_observed(each, names.get(id(each), THING), seen, image), tuple(cluster_boxes([each], X_WB)))
         for each in view.clusters
         if each is not cluster
     )
@@ -113,6 +113,20 @@ def _same_thing(
         if near:
             return min(near, key=off)
     return None
+
+
+def _observed(cluster: Cluster, name: str, beside: ObjectObservation, image: Image) -> ObjectObservation:
+    """Another object than the one looked at, as it was seen; it rests on the same surface."""
+    (x, y), shape = cluster.shape.centre, cluster.shape
+    return ObjectObservation(
+        stamp_s=image.stamp_s,
+        thing=Thing(name),
+        position_W=(float(x), float(y), cluster.base_m + 0.5 * shape.height_m),
+        size_m=(shape.length_m, shape.width_m, shape.height_m),
+        yaw_rad=shape.yaw_rad,
+        score=1.0,
+        surface=beside.surface,
+    )
 
 
 def _target(cluster: Cluster, X_WB: RigidTransform) -> Target:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import PlanningError
+from skills.api import ObjectObservation, PlanningError
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import ArmModel
 from skills.grasp.candidates import GraspCandidate, Target, grasp_candidates
@@ -16,6 +16,8 @@ from skills.quantities import Margin, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
 from skills.stack import ArmPlanner
 
+IN_THE_WAY = "in_the_way"
+"""The output port of what stands in the way, also in a `PlanningError`."""
 PREGRASPS_M = (0.12, 0.07, 0.045)
 """How far before the grasp the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0), (0.03, 0.0))
@@ -37,9 +39,9 @@ class GraspPlan:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """An object beside the one to grasp: its class, or "thing", and its boxes in B."""
+    """An object beside the one to grasp, as it was seen, its class or "thing", and its boxes in B."""
 
-    name: str
+    seen: ObjectObservation
     boxes: tuple[Box, ...]
 
     @property
@@ -116,7 +118,8 @@ class GeometricGraspPlanner:
             raise PlanningError(_out_of_reach(scene.model, around))
         in_the_way = self._in_the_way(scene, q_start_rad, candidates, around, arm_planner)
         if in_the_way:
-            raise PlanningError(_behind(scene.model, around, in_the_way))
+            outputs = {IN_THE_WAY: tuple(other.seen for other in in_the_way)}
+            raise PlanningError(_behind(scene.model, around, in_the_way), outputs)
         last = f": {max(sorted(set(reasons)), key=reasons.count)}" if reasons else ""
         raise PlanningError(f"none of {len(candidates)} grasps of the {around.thing} is within reach and free{last}")
 
@@ -130,7 +133,7 @@ class GeometricGraspPlanner:
     ) -> tuple[Obstacle, ...]:
         """The other object, or all that are near, without which there were a grasp; empty: none is in the way.
 
-        Only the best candidates are asked again.
+        The nearest come first; only the best candidates are asked again.
         """
 
         def graspable(space: Surroundings) -> bool:
@@ -186,7 +189,7 @@ def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -
     """Which other objects are in the way: before the object as the shoulder sees it, or close beside it."""
     p_ST = around.target.X_FG.translation() - model.p_BS
     before = any((other.centre_B - model.p_BS) @ p_ST < p_ST @ p_ST for other in others)
-    names = " and ".join(f"the {other.name}" for other in others)
+    names = " and ".join(f"the {other.seen.thing}" for other in others)
     return f"the {around.thing} is {'behind' if before else 'too near'} {names}"
 
 

@@ -27,7 +27,7 @@ from skills.grasp.candidates import THIN_M, GraspCandidate
 from skills.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseView, examine, square
 from skills.grasp.in_hand import held_box, turned_in_hand
 from skills.grasp.memory import TriedGrasp, others_first, tried_grasp
-from skills.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts
+from skills.grasp.planning import IN_THE_WAY, PREGRASPS_M, GraspPlan, Surroundings, lifts
 from skills.grasp.reach import WIDE, body_heights_m, reach_check, space_about
 from skills.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.grasp.servo import seen_shift, shifted
@@ -77,14 +77,18 @@ class GraspOptions:
 class Grasp(ArmSkill[GraspInputs]):
     """Grasps an object and holds it near the body. On failure it opens the gripper and stows the arm.
 
-    The output `tried` is `avoid` and the grasp of this attempt, after a failure, too.
+    The output `tried` is `avoid` and the grasp of this attempt, after a failure, too. After a failure for want of a
+    plan `in_the_way` are the objects without which there were a grasp, the nearest first; else it is empty.
     """
 
     name = "grasp"
     Inputs = GraspInputs
     Options: ClassVar[type] = GraspOptions
     options: GraspOptions
-    outputs: ClassVar[Mapping[str, type]] = {"tried": tuple[TriedGrasp, ...]}
+    outputs: ClassVar[Mapping[str, type]] = {
+        "tried": tuple[TriedGrasp, ...],
+        IN_THE_WAY: tuple[ObjectObservation, ...],
+    }
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the object is not where it was seen or too heavy, the gripper is full, or there is no arm",
         Cause.PLANNING: "no grasp is within reach and free",
@@ -118,7 +122,7 @@ class Grasp(ArmSkill[GraspInputs]):
             yield from self.stand_at(self.context.robot.capabilities().standing_height_m, f"carrying the {thing}")
         except SkillFailure as failure:
             raise self._telling(failure) from failure
-        return Succeeded(f"holding the {thing}", {"tried": self._tried})
+        return Succeeded(f"holding the {thing}", self._learnt())
 
     def _take_where_it_is(self, inputs: GraspInputs) -> Routine[tuple[CloseView, GraspPlan]]:
         """Look, plan and take; what moved meanwhile is looked at once more. Raises SkillFailure."""
@@ -248,8 +252,12 @@ class Grasp(ArmSkill[GraspInputs]):
         return SkillFailure(Cause.POSTCONDITION, "the object fell out of the gripper while it was lifted")
 
     def _telling(self, failure: SkillFailure) -> SkillFailure:
-        """A failure that says which grasps were tried."""
-        return SkillFailure(failure.cause, failure.message, {"tried": self._tried})
+        """A failure that says which grasps were tried, and what was in the way."""
+        return SkillFailure(failure.cause, failure.message, {**self._learnt(), **failure.outputs})
+
+    def _learnt(self) -> Mapping[str, object]:
+        """The outputs while nothing is in the way."""
+        return {"tried": self._tried, IN_THE_WAY: ()}
 
     def run_again(self, inputs: GraspInputs) -> Routine[Succeeded]:
         """An object in the gripper is taken along; with an empty gripper all begins anew."""
@@ -261,7 +269,7 @@ class Grasp(ArmSkill[GraspInputs]):
                 yield from self._let_go()
             return (yield from self.run(inputs))
         yield from self._take_along(seen, at_thing)
-        return Succeeded(f"the {seen.thing} was in the gripper already; holding it", {"tried": self._tried})
+        return Succeeded(f"the {seen.thing} was in the gripper already; holding it", self._learnt())
 
     def _take_along(self, seen: ObjectObservation, at_thing: bool) -> Routine[None]:
         """Clamp, lift and draw back what the gripper grips, carry it near the body, and check that it is held."""

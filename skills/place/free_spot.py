@@ -28,6 +28,13 @@ def spots(surface: Surface) -> FloatArray:
     return kept if len(kept) else np.asarray([np.mean(surface.polygon_W, axis=0)])
 
 
+def clear_spots(candidates: FloatArray, circles_W: Sequence[tuple[float, float, float]]) -> FloatArray:
+    """Candidates (N, 2) that lie in none of the circles (x, y, radius)."""
+    for x, y, radius_m in circles_W:
+        candidates = candidates[np.linalg.norm(candidates - [x, y], axis=1) > radius_m]
+    return candidates
+
+
 def free_spots(view: SurfaceView, candidates: FloatArray, avoid_W: Sequence[FloatArray] = ()) -> FloatArray:
     """Candidates (N, 2) around which the surface is seen, with nothing on it within CLEARANCE_M.
 

@@ -27,8 +27,8 @@ from skills.grasp.reach import body_heights_m
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, view_surface
-from skills.place.free_spot import free_spots, roomiest_first, spots, unseen_view
-from skills.quantities import Length, Tries, TurnRate
+from skills.place.free_spot import clear_spots, free_spots, roomiest_first, spots, unseen_view
+from skills.quantities import Coordinate, Length, Tries, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 from skills.stack import ArmPlanner
 
@@ -62,9 +62,10 @@ _ASIDE_M = 0.018
 
 @dataclass(frozen=True)
 class PlaceInputs:
-    """The surface to put the object on."""
+    """The surface to put the object on; its middle comes to rest on none of the circles (x, y, radius) of the world."""
 
     surface: Surface
+    clear_of: tuple[tuple[Coordinate, Coordinate, Length], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -108,9 +109,12 @@ class Place(ArmSkill[PlaceInputs]):
         surface = inputs.surface
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
+        self._clear_of = inputs.clear_of
+        if len(self._spots(surface)) == 0:
+            raise SkillFailure(Cause.PLANNING, f"the {surface.name} has no room out of the way")
         carried = self._carried()
         held = self._held(carried)
-        yield from self._go_near(_nearest_spot(surface, self.X_WB()), surface, held)
+        yield from self._go_near(self._nearest_spot(surface), surface, held)
         try:
             yield from self._put_down(surface, held, carried)
         except SkillFailure:
@@ -165,19 +169,19 @@ class Place(ArmSkill[PlaceInputs]):
 
         Gives the joint angles that the arm is to have there.
         """
-        spot_W, gone_to = _nearest_spot(surface, self.X_WB()), list[FloatArray]()
+        spot_W, gone_to = self._nearest_spot(surface), list[FloatArray]()
         heights_m, standing = self._heights_m(surface), f"standing up to the {surface.name}"
         while True:
             yield from self.stand_at(heights_m[0], standing)
             on_floor, standing_W = surface.height_m < _FLOOR_M, self._standing_W(surface)
             view = yield from self._look_at_floor(surface) if on_floor else self._look(surface, spot_W)
-            if view is None or (on_floor and len(free_spots(view, spots(surface))) == 0):
+            if view is None or (on_floor and len(free_spots(view, self._spots(surface))) == 0):
                 view = unseen_view(surface, standing_W)
             try:
                 above = partial(self._go_above, surface, view, held)
                 return (yield from self.from_a_height(heights_m, standing, above))
             except SkillFailure as failure:
-                others = roomiest_first(free_spots(view, spots(surface)), view, [*gone_to, spot_W])
+                others = roomiest_first(free_spots(view, self._spots(surface)), view, [*gone_to, spot_W])
                 if failure.cause is not Cause.PLANNING or len(others) == 0 or len(gone_to) >= self.options.moves:
                     raise
             gone_to.append(spot_W)
@@ -186,6 +190,16 @@ class Place(ArmSkill[PlaceInputs]):
             yield from self.move_to(lambda scene, q: carry_configuration(scene, carried, q), message, speed_rad_s=0.9)
             yield from self._stand_as_usual()
             yield from self._go_before(spot_W, surface, held)
+
+    _clear_of: tuple[tuple[float, float, float], ...] = ()
+
+    def _spots(self, surface: Surface) -> FloatArray:
+        """The spots (N, 2) of a surface that the inputs do not rule out."""
+        return clear_spots(spots(surface), self._clear_of)
+
+    def _nearest_spot(self, surface: Surface) -> FloatArray:
+        """The spot on the surface nearest to the robot."""
+        return np.asarray(_by_distance(self._spots(surface), self.X_WB())[0])
 
     def _standing_W(self, surface: Surface) -> FloatArray:
         """What the LiDAR and earlier pictures show above a surface, (N, 3) in the world.
@@ -275,7 +289,7 @@ class Place(ArmSkill[PlaceInputs]):
         hidden = near > _HIDDEN and robot.gripper().holding and robot.scan() is not None
         if view is None and not hidden:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
-        return None if view is None or (hidden and len(free_spots(view, spots(surface))) == 0) else view
+        return None if view is None or (hidden and len(free_spots(view, self._spots(surface))) == 0) else view
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
         """What the cameras at the body's front see of the floor: the object hides it from the hand camera."""
@@ -294,7 +308,7 @@ class Place(ArmSkill[PlaceInputs]):
     def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[FloatArray]:
         """Bring the object above the best free spot; gives the joint angles that the arm is to have there."""
         X_WB = self.X_WB()
-        free = free_spots(view, spots(surface))
+        free = free_spots(view, self._spots(surface))
         if len(free) == 0:
             raise SkillFailure(Cause.PLANNING, f"no free spot is seen on the {surface.name}")
         X_BW = X_WB.inverse()
@@ -474,11 +488,6 @@ def _can_put_down(scene: ArmScene, q_rad: FloatArray, planner: ArmPlanner, relea
     except PlanningError:
         return False
     return True
-
-
-def _nearest_spot(surface: Surface, X_WB: RigidTransform) -> FloatArray:
-    """The spot on the surface nearest to the robot."""
-    return np.asarray(_by_distance(spots(surface), X_WB)[0])
 
 
 def _by_distance(points_W: FloatArray, X_WB: RigidTransform) -> FloatArray:

@@ -76,6 +76,7 @@ class StepPolicy:
     """How a step or a mission runs: a limit for each attempt, further attempts, guards, and what if it fails.
 
     `pick_ups` is how often an object that falls on the way is picked up again; None: as the mission says, else twice.
+    `move_aside` is how many objects may be moved aside that stand in the way; None: as the mission says, else none.
     """
 
     timeout_s: float | None = None
@@ -84,6 +85,7 @@ class StepPolicy:
     question: OperatorQuestion = OperatorQuestion()
     guards: StepGuards = StepGuards()
     pick_ups: int | None = None
+    move_aside: int | None = None
 
 
 @dataclass(frozen=True)

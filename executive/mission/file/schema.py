@@ -32,7 +32,7 @@ __all__ = ["AskFile", "GuardsFile", "MissionFile", "PolicyFile", "StepFile", "mi
 Seconds = Annotated[Duration, Field(strict=True)]
 Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
 Attempts = Annotated[StrictInt, Field(ge=0, le=100)]
-PickUps = Annotated[StrictInt, Field(ge=0, le=10)]
+Objects = Annotated[StrictInt, Field(ge=0, le=10)]
 Scalar = str | StrictBool | StrictInt | Annotated[float, Field(strict=True)] | None
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
 FORMS: Final = "'say', some of 'take', 'to', 'do' and 'object', 'skill', or 'use'"
@@ -80,8 +80,13 @@ class PolicyFile(_Strict):
     )
     ask: AskFile | None = Field(None, description="The question for `on_failure: ask`.")
     guards: GuardsFile | None = Field(None, description="What must hold while it runs.")
-    pick_ups: PickUps | None = Field(
+    pick_ups: Objects | None = Field(
         None, description="How often an object that falls on the way is picked up again; by default, twice."
+    )
+    move_aside: Objects | None = Field(
+        None,
+        description="How many objects that stand in the way of one that is to be taken may be moved aside, on the "
+        "surface where they stand; by default, none.",
     )
 
     @model_validator(mode="after")
@@ -105,6 +110,7 @@ class PolicyFile(_Strict):
             if guards is None
             else StepGuards(guards.battery, bool(guards.localised), guards.time, guards.stale),
             pick_ups=self._own_or(below, "pick_ups"),
+            move_aside=self._own_or(below, "move_aside"),
         )
 
     def _own_or(self, below: PolicyFile | None, key: str) -> Any:

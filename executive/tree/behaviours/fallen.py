@@ -54,7 +54,7 @@ class Fallen(ExplainedLeaf):
         pose, board = self.context.pose(), self.context.board
         here = (pose.x_m, pose.y_m)
         near = (surface for surface in self.surfaces if distance_m(surface.polygon_W, here) <= self.within_m)
-        floor = _floor(pose, self.ahead_m, self.half_m)
+        floor = floor_square(pose, self.ahead_m, self.half_m)
         board.put(self.pose_key, pose)
         spot = compose(pose, Pose2D(self.ahead_m, 0.0, 0.0))
         board.put(self.spot_key, (spot.x_m, spot.y_m, 0.0))
@@ -66,7 +66,7 @@ class Fallen(ExplainedLeaf):
         if self.context.clock.now() < self._end_s:
             self.message = f"feels whether the {self.thing} is still held"
             return Status.RUNNING
-        here = _floor(self.context.pose(), self.set_down_ahead_m, self.set_down_half_m)
+        here = floor_square(self.context.pose(), self.set_down_ahead_m, self.set_down_half_m)
         self.context.board.put(self.set_down_key, here)
         slipped = self.context.robot.gripper().holding
         happened = "slips in the gripper" if slipped else "fell"
@@ -75,7 +75,7 @@ class Fallen(ExplainedLeaf):
         return Status.SUCCESS
 
 
-def _floor(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:
+def floor_square(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:
     """A square of floor about a point before the body."""
     corners = (compose(pose, Pose2D(ahead_m + x * half_m, y * half_m, 0.0)) for x, y in _CORNERS)
     return Surface(FLOOR, tuple((corner.x_m, corner.y_m) for corner in corners), 0.0)

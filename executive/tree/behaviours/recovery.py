@@ -46,13 +46,21 @@ class Trigger:
 
 @dataclass(frozen=True)
 class Recovery:
-    """When a recovery is due: after failures that fit one of the triggers, `uses` times at most."""
+    """When a recovery is due: after failures that fit one of the triggers, `uses` times at most.
+
+    With `given`, only while the blackboard holds something under that key. After one that is `final` and failed there
+    is no other.
+    """
 
     triggers: tuple[Trigger, ...]
     uses: int = 1
+    given: str | None = None
+    final: bool = False
 
-    def fits(self, attempt: Behaviour) -> bool:
+    def fits(self, attempt: Behaviour, board: Board) -> bool:
         """Whether it is for the failure of an attempt."""
+        if self.given is not None and not (self.given in board and board.get(self.given)):
+            return False
         return any(trigger.fits(attempt) for trigger in self.triggers)
 
 
@@ -120,7 +128,7 @@ class Recover(MemoryComposite):
         failure = _AttemptFailure.of(attempt)
         if self._farthest is None or failure.steps >= self._farthest.steps:
             self._farthest = failure
-        fitting = [i for i, r in enumerate(self.recoveries) if self._uses[i] < r.uses and r.fits(attempt)]
+        fitting = [i for i, r in enumerate(self.recoveries) if self._uses[i] < r.uses and r.fits(attempt, self.board)]
         self._due = fitting if self.attempt < self.attempts else []
         if not self._next_recovery():
             tried = f" (after {self.attempt} attempts)" if self.attempt > 1 else ""
@@ -143,7 +151,7 @@ class Recover(MemoryComposite):
             self._index = 0
             said = f"attempt {self.attempt}, since {message_of(self.children[0])}"
             self.status, self.cause, self.message = Status.RUNNING, None, said
-        elif not self._next_recovery():
+        elif self.recoveries[self._index - 1].final or not self._next_recovery():
             error = Cause.ERROR if cause_of(recovery) is Cause.ERROR else None
             self._fail(f"; {recovery.name}: {message_of(recovery)}", error)
 

@@ -82,7 +82,8 @@ def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> t
     """
     base = f"{slug(mission.robot_name)}/{slug(mission.name)}"
     pick_ups = PICK_UPS if mission.policy.pick_ups is None else mission.policy.pick_ups
-    assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name), pick_ups)
+    move_aside = mission.policy.move_aside or 0
+    assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name), pick_ups, move_aside)
     builder = assembler.builder(base, mission.source)
     steps = assembler.level(mission, base)
     remember = [builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)]
@@ -108,14 +109,15 @@ def step_name(command: Command) -> str:
 class _Assembler:
     """Makes the subtrees of one mission.
 
-    `pick_ups` counts for steps that do not say otherwise; `names` are the outputs of the skills so far, with their
-    blackboard keys, and `held` is what the gripper holds by then.
+    `pick_ups` and `move_aside` count for steps that do not say otherwise; `names` are the outputs of the skills so far,
+    with their blackboard keys, and `held` is what the gripper holds by then.
     """
 
     knowledge: Knowledge
     registry: Registry
     start_key: str
     pick_ups: int = PICK_UPS
+    move_aside: int = 0
     names: dict[str, str] = field(default_factory=dict)
     held: InGripper | None = None
 
@@ -213,9 +215,14 @@ class _Assembler:
         if command is None:
             raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
         builder = self.builder(f"{base}/{item.number}-{step_name(command)}", item.step.source)
-        own = item.step.policy.pick_ups
-        pick_ups = self.pick_ups if own is None else own
-        return replace(builder, command=command, anywhere=item.step.elsewhere, pick_ups=pick_ups)
+        own = item.step.policy
+        return replace(
+            builder,
+            command=command,
+            anywhere=item.step.elsewhere,
+            pick_ups=self.pick_ups if own.pick_ups is None else own.pick_ups,
+            move_aside=self.move_aside if own.move_aside is None else own.move_aside,
+        )
 
 
 def _go_together(get: Command, bring: Command) -> bool:

@@ -52,7 +52,8 @@ class PlanBuilder:
     `anywhere` says whether an object that is not in its place is looked for elsewhere, too, but never on the surfaces
     in `avoided`: what lies there is where it is to go. With `in_gripper` an earlier step has grasped the object;
     `carried` is what an earlier step has grasped, whatever this one is about.
-    What falls on the way is picked up again `pick_ups` times at most.
+    What falls on the way is picked up again `pick_ups` times at most; of what stands in the way of an object that is to
+    be taken, `move_aside` others are moved aside at most.
     """
 
     knowledge: Knowledge
@@ -66,6 +67,7 @@ class PlanBuilder:
     in_gripper: bool = False
     carried: Thing | None = None
     pick_ups: int = PICK_UPS
+    move_aside: int = 0
 
     def at(self, *parts: str) -> PlanBuilder:
         """The builder of a subtree below."""

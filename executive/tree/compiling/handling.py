@@ -8,6 +8,7 @@
 | standing before it | others | look again |
 | grasping | POSTCONDITION (slipped) | look again, take another grasp |
 | grasping | PLANNING | look again; back off and stand anew |
+| grasping | PLANNING, behind another object | move that one aside, where the mission allows it (`aside`) |
 | grasping | PRECONDITION, EXECUTION | look again |
 | tucking the arm in | the object was lost | look again, on the floor as well |
 | carrying | the object was lost | see `executive.tree.compiling.fallen` |
@@ -22,6 +23,7 @@ from executive.mission.geometry import inside
 from executive.tree.behaviours.board import BesideBoard, FromBoard, FromBoardOr, beside
 from executive.tree.behaviours.conditions import Holds
 from executive.tree.behaviours.recovery import Recovery
+from executive.tree.compiling.aside import can_move_aside, move_aside_plan
 from executive.tree.compiling.builder import PlanBuilder, after
 from executive.tree.node import NodeSpec
 from skills.api import Cause, Surface
@@ -67,9 +69,10 @@ def pick_up_plan(
     A failure ends with the arm stowed. With `seen`, an earlier node has just written `key`: only further attempts begin
     with the search.
     """
-    near, tried = f"{builder.path_id}/near-detection", f"{builder.path_id}/tried-grasps"
+    near, tried, blocking = (f"{builder.path_id}/{key}" for key in ("near-detection", "tried-grasps", "in-the-way"))
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
-    grasp = _grasp_plan(builder, near, tried)
+    aside = not seen and can_move_aside(builder)
+    grasp = _grasp_plan(builder, near, tried, blocking if aside else None)
     tuck = builder.node("guard", f"holding {thing}", tuck_plan(builder), part="held", condition=Holds(str(thing)))
     steps = (approach, grasp, tuck) if seen else (search, approach, grasp, tuck)
     attempt = builder.at("pick-up").sequence(f"pick up {thing}", *steps)
@@ -81,24 +84,29 @@ def pick_up_plan(
         (builder.pause("look-again", "look again", LOOK_AGAIN_S), Recovery(missed, uses=2)),
         (builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S), Recovery((untaken,))),
     )
+    clear = Recovery((untaken,), uses=builder.move_aside, given=blocking, final=True)
+    beside = builder.at("aside")
+    most = ATTEMPTS + builder.move_aside if aside else ATTEMPTS
     attempts = builder.recover(
-        f"up to {ATTEMPTS} attempts",
+        f"up to {most} attempts",
         attempt,
+        *(((move_aside_plan(beside, thing, near, blocking, surfaces, tuck_plan(beside)), clear),) if aside else ()),
         *(((search, Recovery((*missed, untaken), uses=3)),) if seen else look_again),
         (around.skill("clear_costmap"), Recovery((unplanned,))),
         (around.skill("back_off"), Recovery((untaken, unplanned))),
-        attempts=ATTEMPTS,
+        attempts=most,
         part="attempts",
-        forgets=(near, tried) if seen else (key, near, tried),
+        forgets=(near, tried) if seen else (key, near, tried, blocking),
     )
     return tidied(builder.at("tidy"), attempts, only_after_failure=True)
 
 
-def _grasp_plan(builder: PlanBuilder, near: str, tried: str) -> NodeSpec:
-    """The grasp, told of those that were tried where the skill can be told."""
+def _grasp_plan(builder: PlanBuilder, near: str, tried: str, blocking: str | None) -> NodeSpec:
+    """The grasp, told of those that were tried where the skill can be told; what is in the way goes to `blocking`."""
     memory = builder.has_ports("grasp", ("avoid",), ("tried",))
     inputs = {"observation": FromBoard(near), **({"avoid": FromBoardOr(tried, ())} if memory else {})}
-    return builder.skill("grasp", inputs, {"tried": tried} if memory else {})
+    outputs = {"tried": tried} if memory else {}
+    return builder.skill("grasp", inputs, outputs if blocking is None else {**outputs, "in_the_way": blocking})
 
 
 def tuck_plan(builder: PlanBuilder) -> NodeSpec:

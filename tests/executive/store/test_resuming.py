@@ -1,12 +1,13 @@
 """A mission is broken off at every moment and taken up by another process: nothing is done twice."""
 
 import dataclasses
+from typing import ClassVar
 
 import pytest
 from py_trees.common import Status
 
 from executive.mission.command import parse_command
-from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep
+from executive.mission.file.model import DEFAULT_WORLD, Mission, MissionStep, StepPolicy
 from executive.mission.request import Request
 from executive.run.outcome import Outcome
 from executive.run.runner import RunEntry, RunSettings, run
@@ -17,7 +18,8 @@ from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
 from executive.tree.node import NodeSpec
 from executive.tree.registry import installed_skills
-from skills.api import Cause, Failed, Running, Succeeded
+from skills.api import Cause, Failed, ObjectObservation, Running, Succeeded, Surface, Thing
+from skills.quantities import Coordinate, Length
 
 TIDY = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
@@ -40,11 +42,18 @@ class KilledError(BaseException):
 
 
 class World:
-    """What outlives the process: what the gripper holds and where the thing is."""
+    """What outlives the process: what the gripper holds, where the thing is and what is in the way of it."""
 
     def __init__(self):
         self.grasps = self.places = 0
+        self.in_the_way = ()
         self.work = []
+
+
+@dataclasses.dataclass(frozen=True)
+class PlaceInputs:
+    surface: Surface
+    clear_of: tuple[tuple[Coordinate, Coordinate, Length], ...] = ()
 
 
 @pytest.fixture
@@ -67,10 +76,17 @@ def handling(world, robot, script, registry):
             self.count += 1
             if self.count == 4:
                 self.change()
-            return Succeeded(f"{self.name} done") if self.count == 6 else Running(f"{self.name} goes on")
+            done = Succeeded(f"{self.name} done", dict.fromkeys(self.outputs, ()))
+            return done if self.count == 6 else Running(f"{self.name} goes on")
 
     class Grasp(Handling):
         name, Inputs = "grasp", registry["grasp"].Inputs
+        outputs: ClassVar = {"in_the_way": tuple[ObjectObservation, ...]}
+
+        def step(self):
+            if world.in_the_way and self.count == 3 and self.inputs.observation.thing.name == "coke":
+                return Failed(Cause.PLANNING, "it is behind another", {"in_the_way": world.in_the_way})
+            return super().step()
 
         def change(self):
             assert not robot.holding, "grasped what is in the gripper"
@@ -84,12 +100,13 @@ def handling(world, robot, script, registry):
             return None if robot.holding else "the gripper is empty"
 
     class Place(Handling):
-        name, Inputs = "place", registry["place"].Inputs
+        name, Inputs = "place", PlaceInputs
 
         def change(self):
             assert robot.holding, "put down what is not held"
             robot.let_go()
             world.places += 1
+            world.in_the_way = () if self.inputs.clear_of else world.in_the_way
 
         def step(self):
             step = super().step()
@@ -115,13 +132,12 @@ def store(tmp_path):
 def live(store, clock, robot, make, world, script, handling, knowledge):
     """One life of the executive: it ends by itself, or is killed in some tick, before or after that was noted."""
 
-    def one_life(texts, *, kill_after=None, kill_when=None, lag=0):
+    def one_life(texts, *, kill_after=None, kill_when=None, lag=0, policy=StepPolicy()):  # noqa: B008 - frozen
         missions = store.missions()
         mission = missions[0] if missions else store.add(REQUEST, queued=False)
         steps = [MissionStep((parse_command(text),)) for text in texts]
-        tree = compile_mission(
-            Mission("fetch drink", DEFAULT_WORLD, "Alice", tuple(steps)), knowledge=knowledge, registry=handling
-        )
+        mission_file = Mission("fetch drink", DEFAULT_WORLD, "Alice", tuple(steps), policy)
+        tree = compile_mission(mission_file, knowledge=knowledge, registry=handling)
         journal, recollection = store.journal(mission.id), None
         if missions:
             tree, recollection = resumed_tree(tree, store.memory(mission.id))
@@ -208,6 +224,22 @@ def test_a_kill_in_any_round_moves_each_object_once(live, store, robot, world, s
         assert result.outcome is Outcome.SUCCESS, told
         assert (world.grasps, world.places, robot.holding) == (2, 2, False), told
         assert result.worst.message.startswith("moved two cokes"), told
+
+
+def test_a_kill_while_something_is_moved_aside_moves_it_once(live, store, robot, world, script, make):
+    script.ends["approach"] = lambda skill: Succeeded("near", {"observation": skill.inputs.observation})
+    cube, allowed = dataclasses.replace(make.COKE, thing=Thing("cube")), StepPolicy(move_aside=1)
+    world.in_the_way = (cube,)
+    result, ticks, _ = live(TIDY, policy=allowed)
+    assert (result.outcome, world.grasps, world.places) == (Outcome.SUCCESS, 2, 2)
+    for moment in range(1, ticks, 2):
+        store.remove(store.missions()[0].id)
+        robot.holding, world.grasps, world.places, world.in_the_way = False, 0, 0, (cube,)
+        assert live(TIDY, kill_after=moment, policy=allowed)[0] is None
+        result, _, recollection = live(TIDY, policy=allowed)
+        told = (moment, result.worst.message, recollection.told, world.work)
+        assert result.outcome is Outcome.SUCCESS, told
+        assert (world.grasps, world.places, robot.holding) == (2, 2, False), told
 
 
 def test_what_was_finished_is_told_and_not_done_again(live, script, world):

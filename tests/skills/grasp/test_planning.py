@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from plant.spot.capabilities import spot_capabilities
-from skills.api import PlanningError
+from skills.api import ObjectObservation, PlanningError, Thing
 from skills.arm.collision import ArmScene, Box
 from skills.arm.kinematics import arm_model
 from skills.arm.motion import RrtConnect
@@ -19,10 +19,11 @@ PLANNER = GeometricGraspPlanner()
 
 
 def _obstacle(name, x, y, *, width=0.1, height=0.5):
-    return Obstacle(name, (Box(RigidTransform([x, y, 0.2]), (0.06, width, height)),))
+    seen = ObjectObservation(0.0, Thing(name), (x, y, 0.2), (0.06, width, height), 0.0, 1.0, "table")
+    return Obstacle(seen, (Box(RigidTransform([x, y, 0.2]), (0.06, width, height)),))
 
 
-def _why(others=(), x=0.85, boxes=()):
+def _refused(others=(), x=0.85, boxes=()):
     points = np.column_stack([np.full(40, x), np.zeros(40), np.full(40, 0.3)])
     target = Target(points, (x, 0.0), 0.0, 0.066, 0.066, 0.115, 0.2, True)
     box = Box(RigidTransform([x, 0.0, 0.26]), (0.07, 0.07, 0.12))
@@ -32,7 +33,11 @@ def _why(others=(), x=0.85, boxes=()):
     scene = ArmScene(CAPABILITIES, MODEL, {})
     with pytest.raises(PlanningError) as error:
         PLANNER.plan(scene, MODEL.stowed_rad, candidates, around, RrtConnect(), np.random.default_rng(0))
-    return str(error.value)
+    return error.value
+
+
+def _why(*args, **kwargs):
+    return str(_refused(*args, **kwargs))
 
 
 def test_out_of_reach_says_how_far():
@@ -44,6 +49,20 @@ def test_of_two_others_the_one_that_stands_before_it_is_named():
     assert (
         _why((_obstacle("coke", 0.74, 0.0, width=0.5), _obstacle("cube", 0.85, 0.6))) == "the beer is behind the coke"
     )
+
+
+def test_the_refusal_tells_what_is_in_the_way_as_it_was_seen():
+    coke, cube = _obstacle("coke", 0.74, 0.0, width=0.5), _obstacle("cube", 0.85, 0.6)
+    assert _refused((cube, coke)).outputs == {"in_the_way": (coke.seen,)}
+
+
+def test_of_two_that_are_in_the_way_together_the_nearest_comes_first():
+    near, far = _obstacle("coke", 0.74, 0.0, width=0.5), _obstacle("cube", 0.66, 0.0, width=0.5)
+    assert _refused((far, near)).outputs == {"in_the_way": (near.seen, far.seen)}
+
+
+def test_without_another_object_in_the_way_nothing_is_told():
+    assert _refused(x=1.9).outputs == {}
 
 
 def test_what_stands_close_behind_it_is_too_near():

@@ -1,13 +1,14 @@
 """What the grasp skill does when things go wrong."""
 
 import numpy as np
-from scripted_robot import MODEL, ScriptedRobot, context_of, failed
+from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 
-from skills.api import Cause, Failed, ObjectObservation, Running, Succeeded, Thing
+from skills.api import Cause, Failed, ObjectObservation, PlanningError, Running, Succeeded, Thing
 from skills.grasp.skill import Grasp, GraspInputs
 from skills.robot import CommandState, CommandStatus
 
 SEEN = GraspInputs(ObjectObservation(0.0, Thing("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table"))
+BEER = ObjectObservation(0.0, Thing("beer"), (0.8, 0.0, 0.8), (0.066, 0.066, 0.2), 0.0, 1.0, "table")
 
 
 def test_a_full_gripper_is_a_failed_precondition():
@@ -105,3 +106,23 @@ def test_what_the_gripper_has_lost_is_undone():
     assert skill.undone(SEEN) == "the coke is not in the gripper"
     robot.holding = True
     assert skill.undone(SEEN) is None
+
+
+class Behind(Grasp):
+    """Finds no grasp because of another object."""
+
+    def _plan_from_a_height(self, seen, avoid):
+        def plan():
+            raise PlanningError("the coke is behind the beer", {"in_the_way": (BEER,)})
+
+        return (yield from self.compute(plan, latency_s=0.1, name="plan grasp", message="planning"))
+
+
+def test_a_failure_to_plan_tells_what_is_in_the_way():
+    step = outcome(Behind(context_of(ScriptedRobot())), SEEN)
+    assert (step.cause, step.message) == (Cause.PLANNING, "the coke is behind the beer")
+    assert step.outputs == {"tried": (), "in_the_way": (BEER,)}
+
+
+def test_another_failure_tells_that_nothing_is_in_the_way():
+    assert outcome(Grasp(context_of(ScriptedRobot())), SEEN).outputs == {"tried": (), "in_the_way": ()}

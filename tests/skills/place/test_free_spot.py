@@ -8,7 +8,7 @@ from skills.perception.plane import LevelPlane
 from skills.perception.point_cloud import PointCloud
 from skills.perception.shape import SeenShape
 from skills.perception.surface_segmentation import Cluster, SurfaceView
-from skills.place.free_spot import CLEARANCE_M, EDGE_M, free_spots, roomiest_first, spots, unseen_view
+from skills.place.free_spot import CLEARANCE_M, EDGE_M, clear_spots, free_spots, roomiest_first, spots, unseen_view
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)
 PLANE = LevelPlane((1.3, 0.0), 0.7, (0.0, 0.0), 0.002)
@@ -34,6 +34,13 @@ def test_spots_keep_off_the_edges():
     found = spots(TABLE)
     assert found[:, 0].min() >= 1.0 + EDGE_M - 1e-9
     assert found[:, 0].max() <= 1.6 - EDGE_M + 1e-9
+
+
+def test_spots_within_a_circle_that_is_kept_clear_are_none():
+    found = clear_spots(spots(TABLE), [(1.3, 0.0, 0.25), (1.1, -0.4, 0.1)])
+    assert 0 < len(found) < len(spots(TABLE))
+    assert np.linalg.norm(found - [1.3, 0.0], axis=1).min() > 0.25
+    assert np.linalg.norm(found - [1.1, -0.4], axis=1).min() > 0.1
 
 
 def test_a_small_surface_has_its_middle_as_spot():

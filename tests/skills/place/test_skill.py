@@ -31,6 +31,13 @@ def test_a_surface_that_is_not_seen_is_a_failed_planning_and_the_thing_is_kept()
     assert robot.opening_rad == 0.3
 
 
+def test_a_surface_without_a_spot_out_of_the_way_is_a_failed_planning_before_anything_moves():
+    robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening_rad=0.3)
+    inputs = PlaceInputs(TABLE, clear_of=((1.0, 0.0, 2.0),))
+    failed(Place(context_of(robot)), inputs, Cause.PLANNING, "the kitchen table has no room out of the way")
+    assert (robot.arm_commands, robot.holding) == ([], True)
+
+
 def resumed(robot, checkpoint):
     """Go on to the end of putting down, which a restart broke off."""
     skill = Place(context_of(robot))

@@ -42,8 +42,8 @@ def recover(attempt, *recoveries, attempts=5, forgets=(), board=None):
     )  # fmt: skip
 
 
-def recovery(leaf, *causes, node=None, own=False, uses=1):
-    return leaf, Recovery((Trigger(frozenset(causes), node, own),), uses)
+def recovery(leaf, *causes, node=None, own=False, uses=1, given=None, final=False):
+    return leaf, Recovery((Trigger(frozenset(causes), node, own),), uses, given, final)
 
 
 def table(root, ticks):
@@ -73,6 +73,26 @@ def test_without_a_recovery_for_the_cause_it_fails_at_once_with_that_cause():
     root = recover(Leaf("go", EXECUTION), recovery(Leaf("clear", S), PLANNING))
     assert table(root, 1) == [(F, F, N)]
     assert (root.cause, root.message) == (EXECUTION, "go 1")
+
+
+@pytest.mark.parametrize(("held", "begun"), [(None, 0), ((), 0), (("cube",), 1)])
+def test_a_recovery_that_needs_something_given_is_due_only_while_the_board_holds_it(held, begun):
+    board, clear = Board("alice"), Leaf("clear", S)
+    if held is not None:
+        board.put("alice/given", held)
+    root = recover(Leaf("go", PLANNING, S), recovery(clear, PLANNING, given="alice/given"), board=board)
+    assert table(root, 1)[0][0] == (R if begun else F)
+    root.tick_once()
+    assert clear.begun == begun
+
+
+def test_after_a_failed_recovery_that_is_final_there_is_no_other():
+    back = Leaf("back", S)
+    root = recover(
+        Leaf("go", PLANNING), recovery(Leaf("clear", EXECUTION), PLANNING, final=True), recovery(back, PLANNING)
+    )
+    table(root, 2)
+    assert (root.status, root.message, back.begun) == (F, "go 1; clear: clear 1", 0)
 
 
 def test_a_recovery_is_used_so_often_and_no_more_then_the_next_one():

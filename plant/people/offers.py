@@ -81,15 +81,10 @@ class Offers:
         """Where a robot's fingers grip."""
         return np.asarray(self._plant.EvalBodyPoseInWorld(self._context, self._links[robot][0]) @ self._p_HT)
 
-    def slip_m_s(self, offer: Offer) -> float:
-        """How fast an object moves against the hand."""
-        hand = self._links[offer.robot][0]
-        X_WH = self._plant.EvalBodyPoseInWorld(self._context, hand)
-        V_WH = self._plant.EvalBodySpatialVelocityInWorld(self._context, hand)
-        p_WO = self._plant.EvalBodyPoseInWorld(self._context, offer.body).translation()
-        v_WO = self._plant.EvalBodySpatialVelocityInWorld(self._context, offer.body).translational()
-        with_hand = V_WH.translational() + np.cross(V_WH.rotational(), p_WO - X_WH.translation())
-        return float(np.linalg.norm(v_WO - with_hand))
+    def in_hand(self, offer: Offer) -> FloatArray:
+        """Where an object is in the hand (3,), m."""
+        X_WH = self._plant.EvalBodyPoseInWorld(self._context, self._links[offer.robot][0])
+        return np.asarray(X_WH.inverse() @ self.place_W(offer))
 
     def opening_rad(self, robot: str) -> float:
         """How far a robot's gripper is open."""

@@ -13,7 +13,7 @@ from pydrake.systems.framework import Context
 
 from plant.diagram import X_PT_HOME, WorldDiagram
 from plant.people.offers import Offer, Offers
-from plant.snapshot.values import State, transform_state
+from plant.snapshot.values import State, array_of, transform_state
 from plant.worlds.placement import Receiving
 from skills.robot import FloatArray
 
@@ -26,8 +26,8 @@ SPEED_M_S, TURN_RAD_S = 0.3, 1.5
 PULL_S, RAMP_S, PAUSE_S = 6.0, 0.6, 4.0
 DOWN = 0.25
 """The share of the pull that goes down, beside that towards the person."""
-GIVES_M_S, GIVES_RAD = 0.05, 0.03
-"""The gripper gives way: the object moves against the hand, or the fingers open."""
+GIVES_M, GIVES_RAD = 0.01, 0.03
+"""The gripper gives way: the object has moved so far in the hand since the pull began, or the fingers have opened."""
 SETTLE_S = 1.5
 ON_TRAY_M = 0.25
 _NEAR_M, _ASIDE_M = 0.004, 0.05
@@ -55,6 +55,7 @@ class Receiver:
         self.phase = Phase.IDLE
         self.offer: Offer | None = None
         self._since_s, self._opening_rad = 0.0, 0.0
+        self._p_HO = np.zeros(3)
         self._home, self._X_WT = True, self._home_W()
 
     @property
@@ -87,6 +88,7 @@ class Receiver:
         under = off_m < _NEAR_M
         if (self.phase is Phase.BRINGING and under) or (self.phase is Phase.PAUSING and for_s > PAUSE_S):
             self._opening_rad = self._offers.opening_rad(self.offer.robot)
+            self._p_HO = self._offers.in_hand(self.offer)
             self._turn_to(Phase.PULLING, now_s)
 
     def pull_W(self, now_s: float) -> FloatArray | None:
@@ -94,7 +96,8 @@ class Receiver:
         if self.offer is None or self.phase not in (Phase.PULLING, Phase.PAUSING):
             return None
         opened = self._offers.opening_rad(self.offer.robot) - self._opening_rad > GIVES_RAD
-        if opened or self._offers.slip_m_s(self.offer) > GIVES_M_S:
+        slipped = float(np.linalg.norm(self._offers.in_hand(self.offer) - self._p_HO)) > GIVES_M
+        if opened or slipped:
             self._turn_to(Phase.RECEIVING, now_s)
         if self.phase is not Phase.PULLING:
             return None
@@ -172,14 +175,20 @@ class Receiver:
         """What the person does."""
         taken = None if self.offer is None else [self.offer.robot, self.offer.thing]
         return {
-            **{"phase": self.phase.value, "offer": taken, "since_s": self._since_s},
-            **{"opening_rad": self._opening_rad, "home": self._home, "X_WT": transform_state(self._X_WT)},
+            "phase": self.phase.value,
+            "offer": taken,
+            "since_s": self._since_s,
+            "opening_rad": self._opening_rad,
+            "p_HO": self._p_HO.tolist(),
+            "home": self._home,
+            "X_WT": transform_state(self._X_WT),
         }
 
     def restore(self, state: State) -> None:
         """Go on from such a state. Raises KeyError: an object is not there."""
         self.phase, self._since_s, self._home = Phase(state["phase"]), state["since_s"], state["home"]
-        self._opening_rad, self._X_WT = state["opening_rad"], RigidTransform(np.array(state["X_WT"]))
+        self._opening_rad, self._p_HO = state["opening_rad"], array_of(state["p_HO"])
+        self._X_WT = RigidTransform(np.array(state["X_WT"]))
         robot, thing = state["offer"] or (None, None)
         self.offer = None if thing is None else Offer(robot, thing, self._offers.loose[thing])
 

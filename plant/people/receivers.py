@@ -1,8 +1,8 @@
 """Moves the people who take what a robot holds out: each brings a tray under it, pulls at it, and holds the tray still.
 
-A person knows the plant's truth. The tray is a free body without weight whose pose and velocity are set, whatever is laid
-on it; it touches robots and loose objects. While it is not in use it is out of sight within the torso. The pull is a
-force on the object, and ends as soon as the gripper gives way.
+A person knows the plant's truth. The tray is a free body without weight whose pose and velocity are set, whatever is
+laid on it; it touches robots and loose objects. While it is not in use it is out of sight within the torso. The pull
+is a force on the object, and ends as soon as the gripper gives way.
 """
 
 from __future__ import annotations

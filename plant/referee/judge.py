@@ -20,7 +20,7 @@ _STATE_KINDS = (GoalKind.WENT, GoalKind.PLACED, GoalKind.HANDED_OVER)
 
 @dataclass(frozen=True)
 class Truth:
-    """The record: histories of the objects, where robots and people are now (m, world), paths, what trays have borne."""
+    """The record: histories of the objects, where robots and people are now (m, world), paths, what was on trays."""
 
     histories: tuple[ObjectHistory, ...]
     bases: Mapping[str, FloatArray]

@@ -16,11 +16,16 @@ _DAMPING_M = 0.12
 """Levers (m) far below this tell nothing of a force: an arm that is stretched out hardly feels a pull along itself."""
 
 
+def levers_m(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray) -> FloatArray:
+    """How far (m, body frame) each joint moves the point p_HO of the hand per radian, (3, J)."""
+    steps = _STEP_RAD * np.eye(len(q_rad))
+    ways = [model.X_BH(q_rad + step) @ p_HO - model.X_BH(q_rad - step) @ p_HO for step in steps]
+    return np.asarray(np.array(ways).T / (2.0 * _STEP_RAD))
+
+
 def hand_force_n(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> FloatArray:
     """The force (3,), N, body frame, at p_HO of the hand against which the joints hold with extra_nm (J,) more."""
-    steps = _STEP_RAD * np.eye(len(q_rad))
-    levers = [(model.X_BH(q_rad + step) @ p_HO - model.X_BH(q_rad - step) @ p_HO) / (2.0 * _STEP_RAD) for step in steps]
-    J = np.array(levers).T
+    J = levers_m(model, q_rad, p_HO)
     force: FloatArray = -np.linalg.solve(J @ J.T + _DAMPING_M**2 * np.eye(3), J @ extra_nm)
     return force
 

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.api import Asked, Cause, PlanningError, Question, Running, Succeeded
+from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.approach.standing import go_to_one
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
@@ -83,7 +83,6 @@ class HandOver(ArmSkill[HandOverInputs]):
     gripper_before = True
     gripper_after = False
     _watch: HoldWatch | None = None
-    _asked: Asked | None = None
 
     def begin(self, inputs: HandOverInputs) -> None:
         """Forget an earlier attempt."""
@@ -94,13 +93,6 @@ class HandOver(ArmSkill[HandOverInputs]):
         """Go on after a pause or a restart; what happened meanwhile is no slip."""
         self._watch = None if self._watch is None else HoldWatch()
         super().resume(inputs)
-
-    def end(self) -> None:
-        """Drop the attempt, and take the question back."""
-        super().end()
-        if self._asked is not None:
-            self._asked.withdraw()
-        self._asked = None
 
     def trouble(self) -> SkillFailure | None:
         """That the object is lost while it is held out; what begins to slip is gripped again."""
@@ -150,16 +142,18 @@ class HandOver(ArmSkill[HandOverInputs]):
         watch = PullWatch(self.model, self.p_HT, self.options.pull_n)
         text = f"{robot.name} holds the {inputs.thing} out to {inputs.person}. Let go?"
         question = Question(f"hand-over/{robot.name}", text, (_LETS_GO, _KEEPS), _KEEPS, self.options.wait_s)
-        self._asked, end_s = self.context.ask(question), self.context.clock.now() + self.options.wait_s
-        while self.context.clock.now() < end_s:
-            joints = robot.joints()
-            efforts_nm = np.array([joints.effort_nm[name] for name in self.model.names])
-            if watch.felt(joints.stamp_s, self.q_rad(), efforts_nm):
-                return True
-            if self._asked.done() and self._asked.result() == _LETS_GO:
-                return True
-            yield Running(message)
-        return False
+        asked, end_s = self.context.ask(question), self.context.clock.now() + self.options.wait_s
+        try:
+            while self.context.clock.now() < end_s:
+                joints = robot.joints()
+                efforts_nm = np.array([joints.effort_nm[name] for name in self.model.names])
+                confirmed = asked.done() and asked.result() == _LETS_GO
+                if confirmed or watch.felt(joints.stamp_s, self.q_rad(), efforts_nm):
+                    return True
+                yield Running(message)
+            return False
+        finally:
+            asked.withdraw()
 
     def _let_go(self, inputs: HandOverInputs) -> Routine[None]:
         """Open, wait until the gripper feels nothing, and draw the hand back along its fingers."""

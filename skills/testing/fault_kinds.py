@@ -11,6 +11,8 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
+from skills.arm.kinematics import arm_model
+from skills.arm.pull import levers_m
 from skills.robot import CommandState, CommandStatus, Image, Robot
 
 THIEF: Final = "the tablet"
@@ -196,6 +198,21 @@ def _nan_like(value: Any) -> Any:
     return value
 
 
+def _pulled(match: re.Match[str]) -> Effect:
+    """The joints hold against a force ahead at the hand."""
+    force_B = np.array([float(match["force"]), 0.0, 0.0])
+
+    def act(call: Call) -> Any:
+        joints, capabilities = call.proceed(), call.robot.capabilities()
+        model, gripper = arm_model(capabilities), capabilities.gripper
+        p_HT = np.array([0.0 if gripper is None else gripper.grip_x_m, 0.0, 0.0])
+        q_rad = np.array([joints.position_rad[name] for name in model.names])
+        extra_nm = dict(zip(model.names, (-force_B @ levers_m(model, q_rad, p_HT)).tolist(), strict=True))
+        return replace(joints, effort_nm={name: nm + extra_nm.get(name, 0.0) for name, nm in joints.effort_nm.items()})
+
+    return Effect(frozenset(("joints",)), act)
+
+
 def _jumps(match: re.Match[str]) -> Effect:
     ahead = RigidTransform(np.array([float(match["metres"]), 0.0, 0.0]))
     return _reads("odometry", lambda reading: replace(reading, X_OB=reading.X_OB @ ahead))
@@ -271,6 +288,12 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
     FaultKind(r"(?:image|camera) is black", "camera is black from 1 s", "pictures show nothing, depth stays", _black),
     FaultKind(r"(?:scan|lidar) is missing", "scan is missing", "there is no scan", _missing),
     FaultKind(r"(?P<verb>\w+) returns garbage", "joints returns garbage", "a sensor's numbers are NaN", _garbage),
+    FaultKind(
+        r"hand is pulled with (?P<force>\d+(?:\.\d+)?) N",
+        "hand is pulled with 15 N at 6 s",
+        "the arm's joints feel somebody who pulls straight ahead at what the hand holds",
+        _pulled,
+    ),
     FaultKind(
         r"odometry jumps (?P<metres>-?\d+(?:\.\d+)?) m",
         "odometry jumps 0.5 m at 2 s",

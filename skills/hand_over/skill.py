@@ -34,7 +34,7 @@ _STILL_S = 0.5
 _OPEN_SHARE = 0.75
 _FREE_S = 2.0
 _LETS_GO, _KEEPS = "let go", "hold on"
-_BACK_M = (0.2, 0.12)
+_BACK_M = (0.3, 0.2, 0.12)
 
 
 @dataclass(frozen=True)

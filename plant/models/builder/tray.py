@@ -1,7 +1,8 @@
 """The tray on which a person receives what is handed over. Its origin is the middle of the plate's upper side.
 
-The plate lies level, its handle is along -x. Its mass is that of the tray with the arms that bear it: a person's hands
-hardly give way to what is laid on it. Parked upright in the torso (see `plant/people/tray.py`) it is out of sight.
+The plate lies level, its handle is along -x. Its mass is that of the tray with the arms that bear it, which hardly give
+way to what is laid on it. Its collision shape reaches deeper than the plate that is seen: a thin one would let through
+what falls by a centimetre in one step of the plant. Upright in a person's torso it is out of sight.
 """
 
 from __future__ import annotations
@@ -11,16 +12,16 @@ from plant.models.builder.mesh import Material, Mesh
 from plant.models.builder.sdf import Model
 from plant.models.builder.shapes import Box, Shape, together
 
-SIZE_M, PLATE_M = (0.36, 0.31), 0.008
+SIZE_M, PLATE_M, DEEP_M = (0.36, 0.31), 0.008, 0.04
 RIM_M, RIM_HEIGHT_M = 0.006, 0.010
 HANDLE_M = (0.30, 0.035, 0.018)
-TRAY_KG = 20.0
+TRAY_KG = 15.0
 MATERIALS = {"tray": Material((0.42, 0.29, 0.19)), "lining": Material((0.72, 0.66, 0.55))}
 
 
 def tray() -> Model:
     """Collision shapes of the tray: plate and rim; the handle is only seen."""
-    plate = Box(size=(*SIZE_M, PLATE_M), p=(0, 0, -PLATE_M / 2))
+    plate = Box(size=(*SIZE_M, DEEP_M), p=(0, 0, -DEEP_M / 2))
     shapes: list[Shape] = [plate, *_rim()]
     return Model("tray", "tray.obj", shapes, together([plate.mass_properties(TRAY_KG)]), comment="a person's tray")
 

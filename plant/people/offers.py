@@ -18,7 +18,7 @@ from plant.spot.capabilities import spot_capabilities
 from skills.robot import FloatArray
 
 LEAST_HEIGHT_M = 0.5
-STILL_M_S = 0.03
+STILL_M_S, MOVES_M_S = 0.03, 0.15
 BEYOND_OUTLINE_M = 0.05
 _AT_HAND_M = 0.5
 _GRIPPER_LINKS = ("arm_wr1", "arm_f1x")
@@ -72,10 +72,10 @@ class Offers:
         return None
 
     def holds(self, offer: Offer) -> bool:
-        """Whether an object is still held out, be it that the arm gives way to a pull."""
+        """Whether an object is still held out, be it that the arm gives way to a pull; what is moved faster is not."""
         p_WO = self._plant.EvalBodyPoseInWorld(self._context, offer.body).translation()
         at_hand = float(np.linalg.norm(p_WO - self.grip_W(offer.robot))) < _AT_HAND_M
-        return at_hand and self._before_outline(offer.robot)
+        return at_hand and self._before_outline(offer.robot) and self._hand_m_s(offer.robot) < MOVES_M_S
 
     def grip_W(self, robot: str) -> FloatArray:
         """Where a robot's fingers grip."""
@@ -111,10 +111,13 @@ class Offers:
 
     def _holds_out(self, robot: str) -> bool:
         """Whether a robot that holds something keeps its hand still before itself, high enough."""
-        V_WH = self._plant.EvalBodySpatialVelocityInWorld(self._context, self._links[robot][0])
-        if float(np.linalg.norm(V_WH.translational())) > STILL_M_S:
+        if self._hand_m_s(robot) > STILL_M_S:
             return False
         return self.grip_W(robot)[2] >= LEAST_HEIGHT_M and self._before_outline(robot)
+
+    def _hand_m_s(self, robot: str) -> float:
+        V_WH = self._plant.EvalBodySpatialVelocityInWorld(self._context, self._links[robot][0])
+        return float(np.linalg.norm(V_WH.translational()))
 
     def _before_outline(self, robot: str) -> bool:
         X_WB = self._plant.EvalBodyPoseInWorld(self._context, self._bodies[robot])
@@ -158,9 +161,6 @@ def _reach_m(kind: ShapeKind, half_m: FloatArray, down: FloatArray) -> float:
         return float(half_m @ down)
     if kind is ShapeKind.ELLIPSOID:
         return float(np.linalg.norm(half_m * down))
-    rim = float(half_m[0] * math.hypot(down[0], down[1]))
-    return (
-        float(half_m[0] + (half_m[2] - half_m[0]) * down[2])
-        if kind is ShapeKind.CAPSULE
-        else rim + float(half_m[2] * down[2])
-    )
+    if kind is ShapeKind.CAPSULE:
+        return float(half_m[0] + (half_m[2] - half_m[0]) * down[2])
+    return float(half_m[0] * math.hypot(down[0], down[1]) + half_m[2] * down[2])

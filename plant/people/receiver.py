@@ -30,7 +30,7 @@ GIVES_M, GIVES_RAD = 0.01, 0.03
 """The gripper gives way: the object has moved so far in the hand since the pull began, or the fingers have opened."""
 SETTLE_S = 1.5
 ON_TRAY_M = 0.25
-_NEAR_M, _ASIDE_M = 0.004, 0.05
+_NEAR_M, _ASIDE_M, _DOWN_M = 0.004, 0.05, 0.05
 _MOVED = 1e-9
 
 
@@ -66,40 +66,45 @@ class Receiver:
     def look(self, now_s: float) -> None:
         """Decide what to do next."""
         if self.offer is None:
-            offer = self._offers.near(self._X_WP().translation(), REACH_M, now_s - self._receiving.reaction_s)
-            if offer is not None:
-                self.offer = offer
+            self.offer = self._offers.near(self._X_WP().translation(), REACH_M, now_s - self._receiving.reaction_s)
+            if self.offer is not None:
+                self._grip(self.offer)
                 self._turn_to(Phase.BRINGING, now_s)
         elif self.phase is Phase.RECEIVING:
-            if not self._on_tray() and now_s - self._since_s > SETTLE_S:
-                self._give_up(now_s)
+            if not self._on_tray(self.offer) and now_s - self._since_s > SETTLE_S:
+                self._go_home(now_s)
+        elif self._gives(self.offer):
+            self._turn_to(Phase.RECEIVING, now_s)
         elif not self._offers.holds(self.offer):
-            self._give_up(now_s)
+            self._go_home(now_s)
         else:
-            self._go_on(now_s)
+            self._go_on(self.offer, now_s)
 
-    def _go_on(self, now_s: float) -> None:
+    def _go_on(self, offer: Offer, now_s: float) -> None:
         """The next phase while something is held out."""
-        assert self.offer is not None
         for_s = now_s - self._since_s
+        off_m = float(np.linalg.norm(self._under(offer).translation() - self._X_WT.translation()))
         if self.phase is Phase.PULLING and for_s > PULL_S:
             self._turn_to(Phase.PAUSING, now_s)
-        off_m = float(np.linalg.norm(self._under(self.offer).translation() - self._X_WT.translation()))
-        under = off_m < _NEAR_M
-        if (self.phase is Phase.BRINGING and under) or (self.phase is Phase.PAUSING and for_s > PAUSE_S):
-            self._opening_rad = self._offers.opening_rad(self.offer.robot)
-            self._p_HO = self._offers.in_hand(self.offer)
+        elif (self.phase is Phase.BRINGING and off_m < _NEAR_M) or (self.phase is Phase.PAUSING and for_s > PAUSE_S):
+            self._grip(offer)
             self._turn_to(Phase.PULLING, now_s)
+
+    def _grip(self, offer: Offer) -> None:
+        """Note how the gripper has the object, against which it is seen to give way."""
+        self._opening_rad, self._p_HO = self._offers.opening_rad(offer.robot), self._offers.in_hand(offer)
+
+    def _gives(self, offer: Offer) -> bool:
+        """Whether the gripper gives way."""
+        opened = self._offers.opening_rad(offer.robot) - self._opening_rad > GIVES_RAD
+        return opened or float(np.linalg.norm(self._offers.in_hand(offer) - self._p_HO)) > GIVES_M
 
     def pull_W(self, now_s: float) -> FloatArray | None:
         """The force (N, world) on the object; it ends for good when the gripper gives way."""
-        if self.offer is None or self.phase not in (Phase.PULLING, Phase.PAUSING):
+        if self.offer is None or self.phase is not Phase.PULLING:
             return None
-        opened = self._offers.opening_rad(self.offer.robot) - self._opening_rad > GIVES_RAD
-        slipped = float(np.linalg.norm(self._offers.in_hand(self.offer) - self._p_HO)) > GIVES_M
-        if opened or slipped:
+        if self._gives(self.offer):
             self._turn_to(Phase.RECEIVING, now_s)
-        if self.phase is not Phase.PULLING:
             return None
         to_person = self._X_WP().translation()[:2] - self._offers.place_W(self.offer)[:2]
         along = to_person / max(float(np.linalg.norm(to_person)), 1e-6)
@@ -116,12 +121,14 @@ class Receiver:
         here, goal = self._X_WT, self._goal()
         self._X_WT, velocity = _towards(here, goal, dt_s)
         self._set(here, velocity)
-        self._home = self.phase is Phase.IDLE and self._X_WT.IsNearlyEqualTo(goal, _MOVED)
+        self._home = self.phase is Phase.IDLE and self._X_WT.IsNearlyEqualTo(self._home_W(), _MOVED)
+        if self._home:
+            self._set(self._X_WT, SpatialVelocity.Zero())
 
     def _goal(self) -> RigidTransform:
         """Where the tray is to go."""
         if self.phase is Phase.IDLE or self.offer is None:
-            return self._home_W()
+            return self._way_home()
         if self.phase is Phase.RECEIVING:
             return self._X_WT
         under = self._under(self.offer)
@@ -129,6 +136,13 @@ class Receiver:
         if self.phase is Phase.BRINGING and aside_m > _ASIDE_M:
             return RigidTransform(under.rotation(), under.translation() - [0.0, 0.0, UNDER_M])
         return under
+
+    def _way_home(self) -> RigidTransform:
+        """First back to the body, level and a little down, as something may be above the tray; then into the torso."""
+        home, here = self._home_W(), self._X_WT
+        p_W = np.array([*home.translation()[:2], here.translation()[2] - _DOWN_M])
+        aside_m = float(np.linalg.norm((p_W - here.translation())[:2]))
+        return RigidTransform(here.rotation(), p_W) if aside_m > _ASIDE_M else home
 
     def _under(self, offer: Offer) -> RigidTransform:
         """Where the tray is just below what is held out, its handle towards the person."""
@@ -138,21 +152,16 @@ class Receiver:
         level_m = self._offers.lowest_m(offer) - BELOW_M
         return RigidTransform(RotationMatrix.MakeZRotation(yaw_rad), np.array([x, y, level_m]))
 
-    def _on_tray(self) -> bool:
+    def _on_tray(self, offer: Offer) -> bool:
         """Whether the object is on the tray or just above it."""
-        if self.offer is None:
-            return False
-        x, y, z = self._X_WT.inverse() @ self._offers.place_W(self.offer)
+        x, y, z = self._X_WT.inverse() @ self._offers.place_W(offer)
         return math.hypot(x, y) < ON_TRAY_M and -BELOW_M < z < ON_TRAY_M
 
     def _turn_to(self, phase: Phase, now_s: float) -> None:
         self.phase, self._since_s, self._home = phase, now_s, False
 
-    def _give_up(self, now_s: float) -> None:
-        """What was held out is gone: keep the tray still where it is on that, else put it away."""
-        if self._on_tray():
-            self._turn_to(Phase.RECEIVING, now_s)
-            return
+    def _go_home(self, now_s: float) -> None:
+        """What was held out is gone: put the tray away."""
         self.offer = None
         self._turn_to(Phase.IDLE, now_s)
 

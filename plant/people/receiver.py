@@ -198,8 +198,10 @@ class Receiver:
         self.phase, self._since_s, self._home = Phase(state["phase"]), state["since_s"], state["home"]
         self._opening_rad, self._p_HO = state["opening_rad"], array_of(state["p_HO"])
         self._X_WT = RigidTransform(np.array(state["X_WT"]))
-        robot, thing = state["offer"] or (None, None)
-        self.offer = None if thing is None else Offer(robot, thing, self._offers.loose[thing])
+        self.offer = None
+        if state["offer"] is not None:
+            robot, thing = state["offer"]
+            self.offer = Offer(robot, thing, self._offers.loose[thing])
 
 
 def _towards(X: RigidTransform, goal: RigidTransform, dt_s: float) -> tuple[RigidTransform, SpatialVelocity]:

@@ -26,8 +26,7 @@ def levers_m(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray) -> FloatArray
 def hand_force_n(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> FloatArray:
     """The force (3,), N, body frame, at p_HO of the hand against which the joints hold with extra_nm (J,) more."""
     J = levers_m(model, q_rad, p_HO)
-    force: FloatArray = -np.linalg.solve(J @ J.T + _DAMPING_M**2 * np.eye(3), J @ extra_nm)
-    return force
+    return np.asarray(-np.linalg.solve(J @ J.T + _DAMPING_M**2 * np.eye(3), J @ extra_nm))
 
 
 @dataclass

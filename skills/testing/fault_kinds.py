@@ -11,9 +11,8 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.arm.kinematics import arm_model
-from skills.arm.pull import levers_m
 from skills.robot import CommandState, CommandStatus, Image, Robot
+from skills.testing.pulling import pulled
 
 THIEF: Final = "the tablet"
 """Who takes the lease in "lease taken"."""
@@ -199,18 +198,9 @@ def _nan_like(value: Any) -> Any:
 
 
 def _pulled(match: re.Match[str]) -> Effect:
-    """The joints hold against a force ahead at the hand."""
-    force_B = np.array([float(match["force"]), 0.0, 0.0])
-
-    def act(call: Call) -> Any:
-        joints, capabilities = call.proceed(), call.robot.capabilities()
-        model, gripper = arm_model(capabilities), capabilities.gripper
-        p_HT = np.array([0.0 if gripper is None else gripper.grip_x_m, 0.0, 0.0])
-        q_rad = np.array([joints.position_rad[name] for name in model.names])
-        extra_nm = dict(zip(model.names, (-force_B @ levers_m(model, q_rad, p_HT)).tolist(), strict=True))
-        return replace(joints, effort_nm={name: nm + extra_nm.get(name, 0.0) for name, nm in joints.effort_nm.items()})
-
-    return Effect(frozenset(("joints",)), act)
+    """The joints hold against a force at the hand."""
+    force_n = float(match["force"])
+    return Effect(frozenset(("joints",)), lambda call: pulled(call.proceed(), call.robot.capabilities(), force_n))
 
 
 def _jumps(match: re.Match[str]) -> Effect:

@@ -86,7 +86,7 @@ class HandOver(ArmSkill[HandOverInputs]):
 
     def begin(self, inputs: HandOverInputs) -> None:
         """Forget an earlier attempt."""
-        self._watch = None
+        self._watch, self.checkpoint = None, {}
         super().begin(inputs)
 
     def resume(self, inputs: HandOverInputs) -> None:

@@ -169,6 +169,16 @@ def test_paused_at_any_tick_it_goes_on_and_gives_it():
         assert not robot.holding
 
 
+def test_after_a_restart_what_was_let_go_is_given():
+    robot = _before_robin(holding=False)
+    skill = HandOver(context_of(robot))
+    skill.checkpoint = {"lets_go": True}
+    skill.resume(BEER)
+    while isinstance(step := skill.step(), Running):
+        robot.advance(0.1)
+    assert step == Succeeded("gave the beer to Robin")
+
+
 def test_poses_before_a_person_face_them_and_the_nearest_comes_first():
     here = Pose2D(0.0, 0.0, 0.0)
     poses = facing_poses((3.0, 0.0), here, 1.5)

@@ -19,10 +19,10 @@ from pydrake.geometry import (
     RenderEngineVtkParams,
     SceneGraph,
 )
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
-from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInstanceIndex, PlanarJoint
+from pydrake.multibody.tree import BodyIndex, FixedOffsetFrame, Frame, ModelInstanceIndex, PlanarJoint, RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.locomotion.floating_base import FloatingBaseLimits
@@ -36,6 +36,11 @@ NEAR_RIGID = 0.1
 80 N press a fingertip 3 cm into a cube of 50 g."""
 PACKAGE = "errand"
 FLOOR_TOP_M = 0.01
+TRAY_PATH = Path(__file__).parent / "models" / "tray" / "tray.sdf"
+X_PT_HOME = RigidTransform(
+    RotationMatrix(np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])), np.array([0.0, 0.0, 1.08])
+)
+"""Where a person P keeps a tray T that is not in use: upright within the torso, the handle up."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,7 @@ class LooseModel:
     """A model put into the world at the beginning: X_WM is the pose of its base.
 
     A fixed one is welded there. One that `slides` moves upright in x, y and yaw, as somebody moves it, and touches
-    nothing that is fixed.
+    nothing that is fixed. A person who `receives` has a tray.
     """
 
     name: str
@@ -51,13 +56,15 @@ class LooseModel:
     X_WM: RigidTransform
     fixed: bool = False
     slides: bool = False
+    receives: bool = False
 
 
 @dataclass(frozen=True)
 class WorldDiagram:
     """The finished Diagram and handles to its parts.
 
-    `scenery` names the model that each collision shape of the world body comes from. `scene` renders it, where that
+    `trays` are those of people who receive, by the people's names, and are none of `models`. `scenery` names the model
+    that each collision shape of the world body comes from. `scene` renders it, where that
     was wanted; `rebuild` makes the same once more, shown in a Meshcat.
     """
 
@@ -66,6 +73,7 @@ class WorldDiagram:
     scene_graph: SceneGraph
     robots: Mapping[str, SpotModel]
     models: Mapping[str, ModelInstanceIndex]
+    trays: Mapping[str, RigidBody]
     scenery: Mapping[GeometryId, str]
     scene: Scene | None
     rebuild: Callable[[Meshcat], WorldDiagram]
@@ -110,6 +118,7 @@ def build_diagram(
     parser = parser_of(plant)
     scenery = {} if directives is None else add_scenery(plant, directives, parser_of)
     instances = {model.name: _add_model(plant, parser, model) for model in models}
+    trays = {model.name: _add_tray(plant, parser, model) for model in models if model.receives}
     robots = {
         name: SpotModel(plant, name, visuals=visuals, carried=carried, limits=locomotion)
         for name in sorted(robot_names)
@@ -123,15 +132,24 @@ def build_diagram(
     floor = GeometrySet(_floor_geometries(plant, scene_graph))
     for robot in robots.values():
         robot.filter_collisions(filters, floor)
-    sliding = GeometrySet([*_shapes_of(plant, [instances[model.name] for model in models if model.slides])])
-    anchored = GeometrySet([*_anchored_shapes(plant)])
-    filters.Apply(CollisionFilterDeclaration().ExcludeWithin(sliding).ExcludeBetween(sliding, anchored))
+    moved = [instances[model.name] for model in models if model.slides]
+    moved += [tray.model_instance() for tray in trays.values()]
+    prescribed, anchored = GeometrySet([*_shapes_of(plant, moved)]), GeometrySet([*_anchored_shapes(plant)])
+    filters.Apply(CollisionFilterDeclaration().ExcludeWithin(prescribed).ExcludeBetween(prescribed, anchored))
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
     scene = Scene(diagram, plant, scene_graph, renderer_parameters) if render else None
     return WorldDiagram(
-        diagram, plant, scene_graph, robots, instances, scenery, scene, lambda shown_in: rebuild(meshcat=shown_in)
+        diagram,
+        plant,
+        scene_graph,
+        robots,
+        instances,
+        trays,
+        scenery,
+        scene,
+        lambda shown_in: rebuild(meshcat=shown_in),
     )
 
 
@@ -153,6 +171,17 @@ def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> Mode
     elif model.slides:
         _let_slide(plant, frame, model)
     return instance
+
+
+def _add_tray(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> RigidBody:
+    """A tray out of sight in the body of a person, without weight, since it is moved as the person wants."""
+    instance = add_model(parser, TRAY_PATH)
+    plant.RenameModelInstance(instance, f"{model.name}'s tray")
+    plant.set_gravity_enabled(instance, False)
+    (index,) = plant.GetBodyIndices(instance)
+    tray = plant.get_body(index)
+    plant.SetDefaultFloatingBaseBodyPose(tray, model.X_WM @ X_PT_HOME)
+    return tray
 
 
 def _let_slide(plant: MultibodyPlant, frame: Frame, model: LooseModel) -> None:

@@ -18,6 +18,7 @@ from plant.carried import Carried
 from plant.diagram import TIME_STEP_S, LooseModel, WorldDiagram, build_diagram
 from plant.live_scene import LiveScene
 from plant.locomotion.floating_base import FloatingBaseLimits
+from plant.people.receivers import Receivers
 from plant.people.walkers import Walkers
 from plant.recording import Recorder, View, save_html
 from plant.referee.referee import Referee
@@ -29,7 +30,7 @@ from plant.spot.model import SpotModel
 from plant.spot.robot import SpotRobot
 from plant.spot.sensing import HAND_LINK, SpotSensors
 from plant.worlds.lights import render_parameters
-from plant.worlds.placement import Placement, place_objects, place_people
+from plant.worlds.placement import Placement, Receiving, place_objects, place_people
 from plant.worlds.route import Route
 from plant.worlds.world import World
 from skills.robot import FloatArray, Pose2D, Robot
@@ -52,11 +53,13 @@ class Engine:
         dock: Pose2D | None = None,
         charge: float = 1.0,
         routes: Mapping[str, Route] = MappingProxyType({}),
+        receiving: Mapping[str, Receiving] = MappingProxyType({}),
     ) -> None:
         """`starts`: where each robot stands at time 0, in the world frame; `seed` gives the sensors' noise.
 
         Batteries begin at `charge` (0 to 1) and charge at `dock`. `routes` are those of people who walk, by the names
-        of their models. Raises WorldError: a route leads through what stands fast.
+        of their models; `receiving` says how those with a tray take what is held out to them. Raises WorldError: a
+        route leads through what stands fast.
         """
         self.world, self._dock, self._charge = world, dock, charge
         self._simulator = Simulator(world.diagram)
@@ -75,6 +78,7 @@ class Engine:
         loose = [plant.get_body(index) for model in world.models.values() for index in plant.GetBodyIndices(model)]
         self._carried = Carried(plant, self.context, loose)
         self._hands = {name: plant.GetBodyByName(HAND_LINK, model.instance) for name, model in world.robots.items()}
+        self.receivers = Receivers(world, self.context, receiving)
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
         self._after_advance: list[Callable[[], None]] = []
@@ -119,12 +123,13 @@ class Engine:
                 self._carried.limit_spin()
             if self._steps % CONTROL_STEPS == 0:
                 self._command_robots()
-            self.walkers.before_step(TIME_STEP_S)
+            holding = [name for name, spot in self._spots.items() if spot.gripper().holding]
+            self.walkers.before_step(TIME_STEP_S, standing=self.receivers.busy)
+            self.receivers.before_step(self.now(), TIME_STEP_S, holding)
             self._steps += 1
             self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
-            for name, spot in self._spots.items():
-                if spot.gripper().holding:
-                    self._carried.after_step(self._hands[name], TIME_STEP_S)
+            for name in holding:
+                self._carried.after_step(self._hands[name], TIME_STEP_S)
             self.work["plant_steps"] += 1
             for every, observer in self._observers:
                 if self._steps % every == 0:
@@ -139,9 +144,10 @@ class Engine:
         self._after_advance.append(listener)
 
     def state(self) -> State:
-        """Time, what the robots keep, and how far the people have walked."""
+        """Time, what the robots keep, how far the people have walked, and what they are about to take."""
         robots = {name: spot.state() for name, spot in self._spots.items()}
-        return {"steps": self._steps, "robots": robots, "walkers": self.walkers.state()}
+        people = {"walkers": self.walkers.state(), "receivers": self.receivers.state()}
+        return {"steps": self._steps, "robots": robots, **people}
 
     def world_state(self) -> Mapping[str, FloatArray]:
         """Positions and velocities of all that moves."""
@@ -162,6 +168,7 @@ class Engine:
         self.root_context.SetTime(self.now())
         for group, values in world.items():
             self.root_context.get_mutable_discrete_state(int(group)).SetFromVector(values)
+        self.receivers.restore(state["receivers"])
         for name, spot in self._spots.items():
             spot.restore(state["robots"][name], self.now())
         self._command_robots()
@@ -216,6 +223,7 @@ class Simulation:
             dock=world.dock,
             charge=charge,
             routes={each.name: each.route for each in people if each.route is not None},
+            receiving={each.name: each.receiving for each in people if each.receiving is not None},
         )
         self.referee = Referee(
             built.plant,
@@ -331,7 +339,7 @@ def _loose(placement: Placement) -> LooseModel:
 def _person(placement: Placement) -> LooseModel:
     """Somebody who stands is welded to the world and costs nothing."""
     walks = placement.route is not None
-    return replace(_loose(placement), fixed=not walks, slides=walks)
+    return replace(_loose(placement), fixed=not walks, slides=walks, receives=placement.receiving is not None)
 
 
 def _starts(start: Pose2D, robot_names: Sequence[str]) -> Mapping[str, Pose2D]:

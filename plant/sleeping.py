@@ -1,7 +1,8 @@
 """Loose objects at rest sleep: they float where they are, without weight and contacts, until something comes near.
 
 A sleeping object costs the solver nothing. It wakes when a link, or an object that moves, is about to reach it; when it
-is put elsewhere; and when an object beside it wakes, on which it may lie. All this is read off positions, so the same
+is put elsewhere; and when an object beside it wakes, on which it may lie. A person's tray, which only what a hand holds
+can come to lie on, wakes nothing. All this is read off positions, so the same
 run sleeps and wakes at the same times. Joints are not locked for this: beside a locked joint, Drake's SAP
 crashes on any other body's contact with the world body.
 """
@@ -82,8 +83,8 @@ class Sleepers:
         self._filters = world.scene_graph.collision_filter_manager(geometry_context)
         self._all_shapes = GeometrySet([*_all_shapes(plant)])
         self._objects = tuple(_objects(plant, world.models))
-        own = {int(each.body.index()) for each in self._objects}
-        others = [body for body in _moving_bodies(plant) if int(body.index()) not in own]
+        passed_over = {int(body.index()) for body in (*(each.body for each in self._objects), *world.trays.values())}
+        others = [body for body in _moving_bodies(plant) if int(body.index()) not in passed_over]
         self._links = _Spheres(plant, inspector, others)
         of_robots = {int(instance) for robot in world.robots.values() for instance in robot.instances()}
         sliding = [body for body in others if _slides(body, world.models)]

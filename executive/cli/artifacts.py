@@ -26,6 +26,8 @@ _MOST_LOOKS: Final = 12
 _SMALL_PX: Final = (320, 240)
 _ROW: Final = 4
 _MOMENTS: Final[Mapping[str, str]] = MappingProxyType({"hand-over": "hand_over", "place": "place"})
+_AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
+"""So far before the hand, which is drawn in by then, lies what the picture is of."""
 
 
 class Artifacts:
@@ -81,7 +83,7 @@ def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robot_name: str
     last = simulation.referee.lifts(robot_name)[-1:]
     lifts = [("grasp", lift.time_s) for lift in last if lift.time_s >= begun_s]
     for name, time_s in (*lifts, *artifacts.moments.items()):
-        pictures[name] = _view(simulation, robot_name, time_s)
+        pictures[name] = _view(simulation, robot_name, time_s, _AHEAD_M.get(name, 0.0))
     paths = [folder / f"{name}.png" for name in pictures]
     for path, picture in zip(paths, pictures.values(), strict=True):
         save_png(path, picture)
@@ -128,9 +130,10 @@ def _bounds(points: Sequence[tuple[float, float]]) -> Bounds:
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
-def _view(simulation: Simulation, robot_name: str, time_s: float) -> Picture:
+def _view(simulation: Simulation, robot_name: str, time_s: float, ahead_m: float) -> Picture:
     query = simulation.query_at(time_s)
     X_WH = simulation.hand_pose_at(robot_name, time_s)
     across = X_WH.rotation().matrix() @ np.array([0.2, 1.0, 0.0])
-    X_WC = best_view(query, X_WH.translation(), facing_W=(float(across[0]), float(across[1])), distance_m=1.5)
+    facing_W = (float(across[0]), float(across[1]))
+    X_WC = best_view(query, X_WH @ [ahead_m, 0.0, 0.0], facing_W=facing_W, distance_m=1.5 + ahead_m)
     return render_view(query, X_WC)

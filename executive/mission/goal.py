@@ -32,7 +32,7 @@ class GoalKind(enum.Enum):
     """What is to have happened, or to be so at the end."""
 
     GRASPED = "grasped"  # taken from a source area and lifted, at some time
-    HANDED_OVER = "handed over"  # held out near a person
+    HANDED_OVER = "handed over"  # let go, on what a person receives it with
     PLACED = "placed"  # resting in a goal area, let go
     WENT = "went"  # the robot in a goal area
     ANSWERED = "answered"  # the answer is what is true of the source areas

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from executive.mission.command import START, Command, Task, Thing
+from executive.mission.command import Command, Task, Thing
 from executive.mission.knowledge import Knowledge
 
 __all__ = ["UNNAMED", "InGripper", "after_command", "cannot_take", "is_same", "objection"]
@@ -13,11 +13,9 @@ __all__ = ["UNNAMED", "InGripper", "after_command", "cannot_take", "is_same", "o
 
 @dataclass(frozen=True)
 class InGripper:
-    """What is held; `thing` is None where only that something is held is known. `offered_to` names who it is held out
-    to: it stays in the gripper then, since the robot cannot let go into a hand."""
+    """What is held; `thing` is None where only that something is held is known."""
 
     thing: Thing | None = None
-    offered_to: str | None = None
 
     def __str__(self) -> str:
         return "an object" if self.thing is None else f"the {self.thing}"
@@ -30,18 +28,12 @@ def after_command(command: Command, held: InGripper | None, knowledge: Knowledge
     """What is held after a command that went well; None for nothing."""
     if command.task is Task.GRASP:
         return held if is_same(held, command.object, knowledge) else InGripper(command.object)
-    carried = _carried(command)
-    if carried is None:
-        return held
-    to_person = command.goal == START or (command.goal is not None and knowledge.person(command.goal) is not None)
-    return InGripper(carried, command.goal) if to_person else None
+    return held if _carried(command) is None else None
 
 
 def is_same(held: InGripper | None, thing: Thing | None, knowledge: Knowledge) -> bool:
-    """Whether what is held, and not held out to somebody, is what `thing` asks for."""
-    if held is None or held.offered_to is not None:
-        return False
-    return _fits(held, thing, knowledge)
+    """Whether what is held is what `thing` asks for."""
+    return held is not None and _fits(held, thing, knowledge)
 
 
 def objection(command: Command, held: InGripper | None, knowledge: Knowledge) -> tuple[str, str] | None:
@@ -62,14 +54,7 @@ def objection(command: Command, held: InGripper | None, knowledge: Knowledge) ->
 
 def cannot_take(held: InGripper, what: str) -> tuple[str, str]:
     """Why nothing can be grasped while something is held, and a hint."""
-    if held.offered_to is None:
-        return f"{what} cannot be grasped: the gripper holds {held} then", f"put {held} down before"
-    to = "you" if held.offered_to == START else held.offered_to
-    return (
-        f"{what} cannot be grasped: {held} stays in the gripper when it is held out to {to}, "
-        "since the robot cannot let go into a hand",
-        "ask for one at a time, or have them put on a table",
-    )
+    return f"{what} cannot be grasped: the gripper holds {held} then", f"put {held} down before"
 
 
 def _carried(command: Command) -> Thing | None:

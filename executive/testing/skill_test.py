@@ -55,6 +55,9 @@ class RobotSetup(_Strict):
     in_gripper: float | None = Field(
         default=None, description="opening (rad) at which a closing gripper holds something (scripted only)"
     )
+    pulled_at_s: float | None = Field(
+        default=None, ge=0.0, description="from then on somebody pulls at what it holds (scripted only)"
+    )
     docked: bool = Field(default=False, description="it stands on a dock and charges (scripted only)")
     charge: float = Field(default=0.9, ge=0.0, le=1.0, description="battery, 0 to 1 (scripted only)")
     lost: bool = Field(default=False, description="it does not know where it is (scripted only)")

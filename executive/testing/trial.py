@@ -58,7 +58,7 @@ def scripted(capabilities: Capabilities, setup: RobotSetup, world: WorldSetup) -
     """A bench with a scripted robot, and that robot."""
     clock, blocks = VirtualClock(), blocks_of(world)
     pose = Pose2D(setup.pose.x, setup.pose.y, setup.pose.yaw)
-    start = Start(pose, setup.arm, setup.in_gripper, setup.holding, setup.charge, setup.docked)
+    start = Start(pose, setup.arm, setup.in_gripper, setup.holding, setup.charge, setup.docked, setup.pulled_at_s)
     robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
     place = KnownPlace(pose)
     place.localised = not setup.lost

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 from pydrake.multibody.tree import SpatialInertia
@@ -64,11 +64,16 @@ class Walkers:
         """The walk of one of them. Raises KeyError."""
         return self._walks[name]
 
-    def before_step(self, dt_s: float) -> None:
-        """Put everybody where they are, with the velocity that leads to where they will be after dt_s."""
+    def before_step(self, dt_s: float, standing: Collection[str] = ()) -> None:
+        """Put everybody where they are, with the velocity that leads to where they will be after dt_s.
+
+        Those `standing` stay where they are.
+        """
         for name, walk in self._walks.items():
             before = (*walk.place_W, walk.yaw_rad)
-            if walk.walks and self._held(name, walk):
+            if name in standing:
+                pass
+            elif walk.walks and self._held(name, walk):
                 self._wait(name, walk, dt_s)
             else:
                 self._held_s[name] = 0.0

@@ -20,6 +20,7 @@ class Kind(enum.Enum):
 
     SCENERY = "scenery"
     PERSON = "person"
+    TRAY = "tray"
     OBJECT = "object"
     BODY = "body"
     LEG = "leg"
@@ -86,6 +87,9 @@ class Entities:
         entities = {int(body.index()): _scenery(plant, body) for body in _all_bodies(plant)} | roles
         for name in persons:
             entities |= {int(body.index()): Entity(Kind.PERSON, name, name) for body in _bodies(plant, name)}
+            tray = f"{name}'s tray"
+            if plant.HasModelInstanceNamed(tray):
+                entities[int(_first_body(plant, tray).index())] = Entity(Kind.TRAY, name, tray)
         for name in robots:
             for body in _bodies(plant, name):
                 kind = _kind(body.name())

@@ -13,7 +13,7 @@ class GoalKind(enum.Enum):
     """What is to have happened, or to be so at the end."""
 
     GRASPED = "grasped"  # taken from a source region and lifted, at some time
-    HANDED_OVER = "handed over"  # held out in the gripper near a person
+    HANDED_OVER = "handed over"  # on the tray of a person, let go
     PLACED = "placed"  # resting in a goal region, let go
     WENT = "went"  # the robot's body in a goal region
     ANSWERED = "answered"  # the answer is what is true of the source regions

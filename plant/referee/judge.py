@@ -12,8 +12,6 @@ from plant.referee.goal import GoalCondition, GoalKind, Region, Verdict
 from plant.referee.object_history import Lift, ObjectHistory
 from skills.robot import FloatArray
 
-REACH_OF_PERSON_M = 1.0
-OFFER_HEIGHT_M = 0.4
 NEAR_PERSON_M = 2.0
 NAMED_REGIONS = 3
 PERSON = "person"
@@ -22,13 +20,13 @@ _STATE_KINDS = (GoalKind.WENT, GoalKind.PLACED, GoalKind.HANDED_OVER)
 
 @dataclass(frozen=True)
 class Truth:
-    """The record: histories of the objects, where robots and people are now (m, world), paths, past offers."""
+    """The record: histories of the objects, where robots and people are now (m, world), paths, what was on trays."""
 
     histories: tuple[ObjectHistory, ...]
     bases: Mapping[str, FloatArray]
     paths: Mapping[str, FloatArray]
     persons: Mapping[str, FloatArray]
-    offers: frozenset[tuple[str, str]]
+    given: frozenset[tuple[str, str]]
 
 
 @dataclass(frozen=True)
@@ -37,13 +35,6 @@ class Finding:
 
     holds: bool
     sentence: str
-
-
-def offered(history: ObjectHistory, p_WP: FloatArray) -> bool:
-    """Whether an object is held out, high enough and near enough to a person standing at p_WP."""
-    if not history.held_out or history.last.p_WO[2] < OFFER_HEIGHT_M:
-        return False
-    return _apart_m(history.last.p_WO, p_WP) <= REACH_OF_PERSON_M
 
 
 def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[Collision], drops: int) -> Verdict:
@@ -87,32 +78,33 @@ def _judge_grasped(condition: GoalCondition, truth: Truth, past: bool) -> Findin
 
 
 def _judge_handed_over(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
-    """Held out near the person."""
+    """Resting on the person's tray, let go."""
     people = {name: p for name, p in truth.persons.items() if condition.person in (None, name)}
     if not people:
         return Finding(False, f"There is no person {condition.person or ''} to hand anything to.".replace("  ", " "))
     objects = [history for history in _of_class(condition, truth) if _lift(history, condition) is not None]
     if past:
-        done = [history for history in objects if any((history.name, person) in truth.offers for person in people)]
+        done = [history for history in objects if any((history.name, person) in truth.given for person in people)]
     else:
-        done = [history for history in objects if any(offered(history, p) for p in people.values())]
+        done = [history for history in objects if history.on_tray_of in people]
     if len(done) >= condition.needed:
-        return Finding(True, f"{_names(done)} {'was' if past else 'is'} held out to {_either(people)}.")
+        verb = _were(done) + " put" if past else "rests" if len(done) == 1 else "rest"
+        return Finding(True, f"{_names(done)} {verb} on {_either(people)}'s tray.")
     return Finding(False, _why_not_handed(condition, objects, people))
 
 
 def _why_not_handed(
     condition: GoalCondition, objects: Sequence[ObjectHistory], people: Mapping[str, FloatArray]
 ) -> str:
-    """The sentence on a hand-over that failed: of the object in a gripper, or else of what was wanted."""
-    held = [history for history in objects if history.held_by is not None]
-    if not held:
-        return f"No {_wanted(condition)}{_out_of(condition.source)} is in a gripper."
-    history = held[0]
-    if not history.held_out:
-        return f"The {history.name} is in the gripper but not held out free."
+    """The sentence on a hand-over that failed: where the object is, or else what was wanted."""
+    if not objects:
+        return f"No {_wanted(condition)} was brought{_out_of(condition.source)}."
+    history = next((one for one in objects if one.held_by is not None), objects[0])
     apart = min(_apart_m(history.last.p_WO, p) for p in people.values())
-    return f"The {history.name} is held {history.last.p_WO[2]:.2f} m high, {apart:.2f} m from {_either(people)}."
+    where = f"{history.last.p_WO[2]:.2f} m high, {apart:.2f} m from {_either(people)}"
+    if history.held_by is not None:
+        return f"The {history.name} is still in the gripper, {where}."
+    return f"The {history.name} {'rests' if history.resting else 'moves'} {where}, not on the tray."
 
 
 def _judge_placed(condition: GoalCondition, truth: Truth, past: bool) -> Finding:

@@ -20,7 +20,7 @@ REST_S = 0.2
 FLICKER_S = 0.15
 _PLAIN = (
     *("events", "drops", "touches", "speed_m_s", "_grip_s", "_grip_robot", "_grip_z_m", "_supported_s"),
-    *("_still_since_s", "_carried", "_left_z_m", "_dropped"),
+    *("_still_since_s", "_carried", "_left_z_m", "_dropped", "_tray_s", "_tray_of"),
 )
 
 
@@ -29,7 +29,7 @@ class ObjectSample:
     """An object at one moment: its place, what touches it.
 
     `gripper` names the robot whose gripper touches it, `X_WH` is that hand's pose; `supported` tells contact with
-    anything that is no part of a robot, `on_floor` that the floor is among it.
+    anything that is no part of a robot, `on_floor` that the floor is among it; `tray_of` names whose tray is.
     """
 
     time_s: float
@@ -38,17 +38,18 @@ class ObjectSample:
     X_WH: RigidTransform | None
     supported: bool
     on_floor: bool
+    tray_of: str | None = None
 
     def state(self) -> list[Any]:
         """The sample as plain values."""
         X_WH = transform_state(self.X_WH)
-        return [self.time_s, self.p_WO.tolist(), self.gripper, X_WH, self.supported, self.on_floor]
+        return [self.time_s, self.p_WO.tolist(), self.gripper, X_WH, self.supported, self.on_floor, self.tray_of]
 
     @staticmethod
     def of(state: list[Any]) -> ObjectSample:
         """The sample of such values."""
-        time_s, p_WO, gripper, X_WH, supported, on_floor = state
-        return ObjectSample(time_s, array_of(p_WO), gripper, transform_of(X_WH), supported, on_floor)
+        time_s, p_WO, gripper, X_WH, *rest = state
+        return ObjectSample(time_s, array_of(p_WO), gripper, transform_of(X_WH), *rest)
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,8 @@ class ObjectHistory:
     _carried: bool = False
     _left_z_m: float | None = None
     _dropped: bool = False
+    _tray_s: float = float("-inf")
+    _tray_of: str | None = None
 
     @property
     def last(self) -> ObjectSample:
@@ -100,9 +103,9 @@ class ObjectHistory:
         return self._grip_robot if self.last.time_s - self._grip_s <= FLICKER_S else None
 
     @property
-    def held_out(self) -> bool:
-        """Carried in a gripper and touching nothing but the robot."""
-        return self._carried and self.held_by is not None and not self._supported
+    def on_tray_of(self) -> str | None:
+        """The person on whose tray it rests."""
+        return self._tray_of if self.resting and self.last.time_s - self._tray_s <= FLICKER_S else None
 
     @property
     def _supported(self) -> bool:
@@ -118,6 +121,8 @@ class ObjectHistory:
             self._grip_s, self._grip_robot = sample.time_s, sample.gripper
         if sample.supported:
             self._supported_s = sample.time_s
+        if sample.tray_of is not None:
+            self._tray_s, self._tray_of = sample.time_s, sample.tray_of
         self._last = sample
         if not self.rests_W:
             self.rests_W.append(sample.p_WO)
@@ -173,12 +178,14 @@ class ObjectHistory:
             self._carried = True
 
     def _note_leaving(self, sample: ObjectSample, with_hand: bool) -> None:
-        """Remember the height at which a carried object left the gripper."""
+        """Remember the height at which a carried object left the gripper, or lies on a tray: it may sink that far."""
         if sample.gripper is not None and with_hand:
             self._left_z_m, self._dropped = None, False
             self._grip_z_m = float(sample.p_WO[2])
         elif self._carried and self._left_z_m is None:
             self._left_z_m = self._grip_z_m
+        if self._left_z_m is not None and sample.tray_of is not None:
+            self._left_z_m = float(sample.p_WO[2])
 
     def _note_fall(self, sample: ObjectSample) -> None:
         """Count a drop once it is clear that it falls, or lies on the floor."""

@@ -17,7 +17,7 @@ from pydrake.systems.framework import Context
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
 from plant.referee.entities import Entities, Kind
 from plant.referee.goal import GoalCondition, Verdict
-from plant.referee.judge import Truth, judge, offered
+from plant.referee.judge import Truth, judge
 from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
 from plant.snapshot.values import State, array_of
 from skills.robot import FloatArray
@@ -51,7 +51,7 @@ class Referee:
         self._counter = CollisionCounter(self._entities.all)
         self._histories = {name: ObjectHistory(name, self._entities.classes[name]) for name in self._entities.objects}
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
-        self._offers: dict[tuple[str, str], float] = {}
+        self._given: dict[tuple[str, str], float] = {}
         self.contact_points = 0
         self._bases: dict[str, FloatArray] = {}
         self._persons: dict[str, FloatArray] = {}
@@ -105,7 +105,7 @@ class Referee:
                 history.take(replace(history.last, time_s=time_s))
             else:
                 history.take(self._sample(plant_context, time_s, self._position(plant_context, body), touches))
-        self._note_offers(time_s)
+        self._note_given(time_s)
 
     def judge(self, conditions: Sequence[GoalCondition]) -> Verdict:
         """Whether all conditions hold now. Raises ValueError before the first sample."""
@@ -116,7 +116,7 @@ class Referee:
             bases=self._bases,
             paths={name: self.path(name) for name in self._paths},
             persons=self._persons,
-            offers=frozenset(self._offers),
+            given=frozenset(self._given),
         )
         return judge(conditions, truth, bumps=self._counter.collisions, drops=self.drops)
 
@@ -125,7 +125,7 @@ class Referee:
         return {
             "bumps": self._counter.state(),
             "histories": {name: history.state() for name, history in self._histories.items()},
-            "offers": [[*pair, time_s] for pair, time_s in self._offers.items()],
+            "given": [[*pair, time_s] for pair, time_s in self._given.items()],
             "bases": {name: p_W.tolist() for name, p_W in self._bases.items()},
             "persons": {name: p_W.tolist() for name, p_W in self._persons.items()},
         }
@@ -135,14 +135,14 @@ class Referee:
         self._counter.restore(state["bumps"])
         for name, history in self._histories.items():
             history.restore(state["histories"][name])
-        self._offers = {(name, person): time_s for name, person, time_s in state["offers"]}
+        self._given = {(name, person): time_s for name, person, time_s in state["given"]}
         self._bases = {name: array_of(p_W) for name, p_W in state["bases"].items()}
         self._persons = {name: array_of(p_W) for name, p_W in state["persons"].items()}
         self._paths = {name: list(path) for name, path in paths.items()}
 
     def forget_past(self) -> None:
         """Another mission is judged by what happens from now on."""
-        self._counter.collisions, self._offers = [], {}
+        self._counter.collisions, self._given = [], {}
         self._paths = {name: [] for name in self._paths}
         for history in self._histories.values():
             history.forget_past()
@@ -185,7 +185,7 @@ class Referee:
         """An object now, with the bodies that touch it."""
         entities = {index: self._entities.all[index] for index in touches}
         gripper = next((entity.owner for entity in entities.values() if entity.kind is Kind.GRIPPER), None)
-        still = (Kind.SCENERY, Kind.PERSON, Kind.OBJECT)
+        still = (Kind.SCENERY, Kind.PERSON, Kind.TRAY, Kind.OBJECT)
         return ObjectSample(
             time_s=time_s,
             p_WO=p_WO,
@@ -193,6 +193,7 @@ class Referee:
             X_WH=self._hand_pose(plant_context, gripper),
             supported=any(entity.kind in still for entity in entities.values()),
             on_floor=any(entities[i].kind is Kind.SCENERY and z < FLOOR_Z_M for i, z in touches.items()),
+            tray_of=next((entity.owner for entity in entities.values() if entity.kind is Kind.TRAY), None),
         )
 
     def _hand_pose(self, plant_context: Context, robot: str | None) -> RigidTransform | None:
@@ -200,12 +201,11 @@ class Referee:
             return None
         return self._plant.EvalBodyPoseInWorld(plant_context, self._entities.hands[robot])
 
-    def _note_offers(self, time_s: float) -> None:
-        """Remember which object was held out to whom, and when last."""
+    def _note_given(self, time_s: float) -> None:
+        """Remember which object came to rest on whose tray, and when it last did."""
         for history in self._histories.values():
-            for person, p_WP in self._persons.items():
-                if offered(history, p_WP):
-                    self._offers[history.name, person] = time_s
+            if history.on_tray_of is not None:
+                self._given[history.name, history.on_tray_of] = time_s
 
 
 def _extend(path: list[FloatArray], p_W: FloatArray) -> None:

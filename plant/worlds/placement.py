@@ -21,10 +21,19 @@ _OBJECT_STREAM, _PEOPLE_STREAM, _FORM_STREAM = 1, 2, 3
 
 
 @dataclass(frozen=True)
+class Receiving:
+    """How a person takes what is held out: how hard they pull at it (N), once it has been still for so long (s)."""
+
+    pull_n: float = 15.0
+    reaction_s: float = 1.0
+
+
+@dataclass(frozen=True)
 class Placement:
     """A model in the world: X_WO is its pose at the start.
 
-    Loose objects rest on `surface`; people are welded, but those who walk on a `route`.
+    Loose objects rest on `surface`; people are welded, but those who walk on a `route`, and take what is held out to
+    them as `receiving` says.
     """
 
     name: str
@@ -33,6 +42,7 @@ class Placement:
     X_WO: RigidTransform
     surface: str | None = None
     route: Route | None = None
+    receiving: Receiving | None = None
 
     @property
     def model_path(self) -> Path:
@@ -128,7 +138,8 @@ def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, in
         assert rule.ranges is not None
         x, y, yaw = _before_start(world, rule.ranges, np.random.default_rng([seed, _PEOPLE_STREAM, index]))
     X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m], dtype=np.float64))
-    return Placement(rule.name, rule.model, form, X_WO, route=route)
+    receiving = Receiving(rule.pull_n, rule.reaction_s) if rule.receives else None
+    return Placement(rule.name, rule.model, form, X_WO, route=route, receiving=receiving)
 
 
 def _before_start(

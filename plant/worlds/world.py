@@ -9,7 +9,7 @@ import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -86,6 +86,9 @@ class PersonRule(_Strict):
     bearing_rad: Span | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
     turned_rad: Span | None = Field(default=None, description="least and greatest turn away from facing the robot")
     route: RouteRule | None = Field(default=None, description="where the person walks")
+    receives: bool = Field(default=True, description="whether the person takes what is held out to them")
+    pull_n: float = Field(default=15.0, gt=0.0, le=100.0, description="how hard the person pulls at it, N")
+    reaction_s: float = Field(default=1.0, ge=0.0, le=60.0, description="how long it is held out still before, s")
 
     @model_validator(mode="after")
     def _walks_or_stands(self) -> PersonRule:
@@ -202,7 +205,9 @@ class World:
         """
         rules = self.seed_rules
         before = {rule.name: rule for rule in rules.people}
-        walking = {name: PersonRule(name=name, route=route) for name, route in routes.items()}
+        walking = {
+            name: PersonRule(name=name, route=route, **_hands_of(before.get(name))) for name, route in routes.items()
+        }
         changed = rules.model_copy(update={"people": tuple({**before, **walking}.values())})
         _check_people(changed, self.standing)
         return replace(self, seed_rules=changed)
@@ -397,6 +402,11 @@ def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
             close = difflib.get_close_matches(rule.model, known, n=1)
             hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(known)}"
             raise WorldError(f"no model {rule.model!r} for {rule.name}; {hint}")
+
+
+def _hands_of(rule: PersonRule | None) -> dict[str, Any]:
+    """How somebody takes what is held out."""
+    return {} if rule is None else rule.model_dump(include={"receives", "pull_n", "reaction_s"})
 
 
 def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:

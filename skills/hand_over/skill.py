@@ -1,4 +1,4 @@
-"""The hand-over skill: hold the object out to a person, near enough to be taken, and keep holding it."""
+"""The hand-over skill: hold the object out to a person, and let go when they pull at it or the operator says so."""
 
 from __future__ import annotations
 
@@ -11,30 +11,38 @@ from typing import ClassVar
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.api import Cause, PlanningError, Running, Succeeded
+from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.approach.standing import go_to_one
-from skills.arm.arm_skill import ArmSkill
+from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
+from skills.arm.hold import Grip, HoldWatch, grip_again
+from skills.arm.pull import PullWatch
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
 from skills.navigate.skill import NavigateInputs
 from skills.perception.people import SeenPerson, people_in_scan
-from skills.quantities import Height, Length
+from skills.quantities import Duration, Force, Height, Length
 from skills.robot import FloatArray, Pose2D
 
 _FACING_RAD = 0.5
 _SCANS = 3
 _SCAN_PATIENCE_S = 2.0
 _PERSON_SIZE_M = (0.6, 0.6, 1.8)
+_STILL_S = 0.5
+_OPEN_SHARE = 0.75
+_FREE_S = 2.0
+_LETS_GO, _KEEPS = "let go", "hold on"
+_BACK_M = (0.3, 0.2, 0.12)
 
 
 @dataclass(frozen=True)
 class HandOverInputs:
-    """The person's name, for messages; the skill takes the nearest person in sight."""
+    """Names of the person and of the object, for messages; the skill takes the nearest person in sight."""
 
     person: str
+    thing: str = "object"
 
 
 @dataclass(frozen=True)
@@ -42,7 +50,8 @@ class HandOverOptions:
     """Where the robot stands and holds the object.
 
     The robot stands `stand_off_m` from the person's axis, or stays within `stand_off_range_m`. The object is held out
-    at `height_m`, at the first of `gaps_m` from the person's axis that the arm can reach, `furthest_m` at most.
+    at `height_m`, at the first of `gaps_m` from the person's axis that the arm can reach, `furthest_m` at most. It lets
+    go when the hand feels a pull beyond `pull_n`, and draws the object in when nobody has taken it within `wait_s`.
     """
 
     stand_off_m: Length = 1.5
@@ -50,10 +59,12 @@ class HandOverOptions:
     height_m: Height = 1.0
     gaps_m: tuple[Length, ...] = (0.55, 0.5, 0.45, 0.62, 0.7, 0.8)
     furthest_m: Length = 0.85
+    pull_n: Force = 7.0
+    wait_s: Duration = 20.0
 
 
 class HandOver(ArmSkill[HandOverInputs]):
-    """Finds a person by LiDAR, goes there and holds the object out to them; the gripper stays closed."""
+    """Finds a person by LiDAR, goes there, holds the object out to them and lets go when they take it."""
 
     name = "hand_over"
     Inputs = HandOverInputs
@@ -63,23 +74,103 @@ class HandOver(ArmSkill[HandOverInputs]):
         Cause.PRECONDITION: "nothing is held, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free path for the arm",
         Cause.EXECUTION: "the robot or its arm did not reach its goal",
-        Cause.POSTCONDITION: "the object is no longer held, or not near the person",
+        Cause.POSTCONDITION: "the object was lost, is not near the person, or is still in the open gripper",
+        Cause.TIMEOUT: "the person did not take the object",
     }
     default_timeout_s = 120.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
     changes_world = True
     gripper_before = True
+    gripper_after = False
+    _watch: HoldWatch | None = None
+
+    def begin(self, inputs: HandOverInputs) -> None:
+        """Forget an earlier attempt."""
+        self._watch, self.checkpoint = None, {}
+        super().begin(inputs)
+
+    def resume(self, inputs: HandOverInputs) -> None:
+        """Go on after a pause or a restart; what happened meanwhile is no slip."""
+        self._watch = None if self._watch is None else HoldWatch()
+        super().resume(inputs)
+
+    def trouble(self) -> SkillFailure | None:
+        """That the object is lost while it is held out; what begins to slip is gripped again."""
+        if self._watch is None:
+            return None
+        context = self.context
+        grip = self._watch.judge(context.robot.gripper(), context.clock.now())
+        if grip is Grip.SLIPPING:
+            self.issue(grip_again(context.robot, self._watch.force_n, clock=context.clock, lease=context.lease))
+        if grip is not Grip.LOST:
+            return None
+        self._watch = None
+        return SkillFailure(Cause.POSTCONDITION, "the object was lost while it was held out")
 
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
-        """Find, go, hold out."""
+        """Find, go, hold out, wait, let go."""
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to hand over")
         person = yield from self._find(inputs.person)
         if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
             yield from self._go_before(person, inputs.person)
             person = yield from self._find(inputs.person)
+        q_carrying_rad = self.q_rad()
         yield from self._hold_out(person, inputs.person)
-        return self._checked(person, inputs.person)
+        self._check(person, inputs.person)
+        self._watch = HoldWatch()
+        if not (yield from self._taken(inputs)):
+            yield from self.move_to(lambda scene, q: q_carrying_rad, f"drawing the {inputs.thing} in")
+            why = f"{inputs.person} did not take the {inputs.thing} within {self.options.wait_s:g} s"
+            raise SkillFailure(Cause.TIMEOUT, why)
+        self._watch = None
+        yield from self._let_go(inputs)
+        return Succeeded(f"gave the {inputs.thing} to {inputs.person}")
+
+    def run_again(self, inputs: HandOverInputs) -> Routine[Succeeded]:
+        """Go on from an attempt that was broken off; what was let go of is given."""
+        self._watch = None
+        if not self.checkpoint.get("lets_go"):
+            return (yield from self.run(inputs))
+        yield from self._let_go(inputs)
+        return Succeeded(f"gave the {inputs.thing} to {inputs.person}")
+
+    def _taken(self, inputs: HandOverInputs) -> Routine[bool]:
+        """Wait for a pull at the object, or for the operator's word; False when the time is over."""
+        message, robot = f"holding the {inputs.thing} out to {inputs.person}", self.context.robot
+        yield from self.pause(_STILL_S, message)
+        watch = PullWatch(self.model, self.p_HT, self.options.pull_n)
+        text = f"{robot.name} holds the {inputs.thing} out to {inputs.person}. Let go?"
+        question = Question(f"hand-over/{robot.name}", text, (_LETS_GO, _KEEPS), _KEEPS, self.options.wait_s)
+        asked, end_s = self.context.ask(question), self.context.clock.now() + self.options.wait_s
+        try:
+            while self.context.clock.now() < end_s:
+                joints = robot.joints()
+                efforts_nm = np.array([joints.effort_nm[name] for name in self.model.names])
+                confirmed = asked.done() and asked.result() == _LETS_GO
+                if confirmed or watch.felt(joints.stamp_s, self.q_rad(), efforts_nm):
+                    return True
+                yield Running(message)
+            return False
+        finally:
+            asked.withdraw()
+
+    def _let_go(self, inputs: HandOverInputs) -> Routine[None]:
+        """Open, wait until the gripper feels nothing, and draw the hand back along its fingers."""
+        message, gripper = f"giving the {inputs.thing} to {inputs.person}", self.context.robot.gripper
+        self.checkpoint = {"lets_go": True}
+        yield from self.move_gripper(_OPEN_SHARE * self.open_rad, GRIPPER_FORCE_N, message)
+        end_s = self.context.clock.now() + _FREE_S
+        while gripper().holding:
+            if self.context.clock.now() > end_s:
+                raise SkillFailure(Cause.POSTCONDITION, f"the {inputs.thing} is still in the open gripper")
+            yield Running(message)
+        yield from self.pause(_STILL_S, message)
+        fingers_B = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
+        for back_m in _BACK_M:
+            if (yield from self.try_shift_hand(-back_m * fingers_B, "drawing the hand back")):
+                break
+        yield from self.try_stow()
 
     def _find(self, name: str) -> Routine[SeenPerson]:
         """The nearest person that is seen in several scans, ahead rather than behind."""
@@ -119,7 +210,7 @@ class HandOver(ArmSkill[HandOverInputs]):
 
         yield from self.move_to(goal, f"holding the object out to {name}", speed_rad_s=0.8)
 
-    def _checked(self, person: SeenPerson, name: str) -> Succeeded:
+    def _check(self, person: SeenPerson, name: str) -> None:
         """Raise SkillFailure with cause POSTCONDITION unless the object is held out near the person."""
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the object was lost while it was held out to {name}")
@@ -127,7 +218,6 @@ class HandOver(ArmSkill[HandOverInputs]):
         off = float(np.linalg.norm(p_BT[:2] - self._ahead(person)))
         if off > self.options.furthest_m:
             raise SkillFailure(Cause.POSTCONDITION, f"the object is held {off:.2f} m from {name}, which is too far")
-        return Succeeded(f"holding the object out, {off:.2f} m from {name}")
 
     def _ahead(self, person: SeenPerson) -> FloatArray:
         """The person's axis (x, y) in the body frame."""

@@ -12,6 +12,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.robot import CommandState, CommandStatus, Image, Robot
+from skills.testing.pulling import pulled
 
 THIEF: Final = "the tablet"
 """Who takes the lease in "lease taken"."""
@@ -196,6 +197,12 @@ def _nan_like(value: Any) -> Any:
     return value
 
 
+def _pulled(match: re.Match[str]) -> Effect:
+    """The joints hold against a force at the hand."""
+    force_n = float(match["force"])
+    return Effect(frozenset(("joints",)), lambda call: pulled(call.proceed(), call.robot.capabilities(), force_n))
+
+
 def _jumps(match: re.Match[str]) -> Effect:
     ahead = RigidTransform(np.array([float(match["metres"]), 0.0, 0.0]))
     return _reads("odometry", lambda reading: replace(reading, X_OB=reading.X_OB @ ahead))
@@ -271,6 +278,12 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
     FaultKind(r"(?:image|camera) is black", "camera is black from 1 s", "pictures show nothing, depth stays", _black),
     FaultKind(r"(?:scan|lidar) is missing", "scan is missing", "there is no scan", _missing),
     FaultKind(r"(?P<verb>\w+) returns garbage", "joints returns garbage", "a sensor's numbers are NaN", _garbage),
+    FaultKind(
+        r"hand is pulled with (?P<force>\d+(?:\.\d+)?) N",
+        "hand is pulled with 15 N at 6 s",
+        "the arm's joints feel somebody who pulls straight ahead at what the hand holds",
+        _pulled,
+    ),
     FaultKind(
         r"odometry jumps (?P<metres>-?\d+(?:\.\d+)?) m",
         "odometry jumps 0.5 m at 2 s",

@@ -34,6 +34,7 @@ from skills.robot import (
 from skills.testing.blocks import Block, can_at
 from skills.testing.clock import VirtualClock
 from skills.testing.commands import Commands
+from skills.testing.pulling import pulled
 from skills.testing.sensing import FRONT_CAMERAS, mount_of, picture, sweep
 
 _ACCELERATION_M_S2 = 2.5
@@ -68,7 +69,7 @@ class Start:
     """The initial state: the true pose in the world, arm angles (default: stowed), gripper, charge.
 
     `in_gripper_rad` is the opening at which a closing gripper meets what lies between its fingers (None: nothing).
-    `holding` begins with the gripper closed about it. A `docked` robot charges.
+    `holding` begins with the gripper closed about it. A `docked` robot charges. From `pulled_at_s` on somebody pulls.
     """
 
     pose: Pose2D = field(default_factory=lambda: Pose2D(0.0, 0.0, 0.0))
@@ -77,6 +78,7 @@ class Start:
     holding: bool = False
     charge: float = 0.9
     docked: bool = False
+    pulled_at_s: float | None = None
 
 
 class ScriptedRobot:
@@ -110,7 +112,7 @@ class ScriptedRobot:
         self.clamp_force_n = 20.0 if start.holding else 0.0
         self.held: Block | None = can_at(0.0, 0.0, 0.0) if start.holding else None
         self._hangs_down_m = 0.057  # of what is held, below the fingers' middle
-        self.charge, self.docked = start.charge, start.docked
+        self.charge, self.docked, self._pulled_at_s = start.charge, start.docked, start.pulled_at_s
         self.present_faults: tuple[str, ...] = ()
         self.refuse_because: dict[str, str] = {}
         self.calls: list[str] = []
@@ -187,7 +189,9 @@ class ScriptedRobot:
         names = () if self._capabilities.arm is None else self._capabilities.arm.joint_names
         position = dict(zip(names, self.q_rad.tolist(), strict=True))
         still = dict.fromkeys(names, 0.0)
-        return Joints(self._clock.now(), position, still, still)
+        joints = Joints(self._clock.now(), position, still, still)
+        is_pulled = self._pulled_at_s is not None and joints.stamp_s >= self._pulled_at_s
+        return pulled(joints, self._capabilities) if is_pulled else joints
 
     def gripper(self) -> Gripper:
         """Latest gripper state."""

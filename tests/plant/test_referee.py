@@ -21,6 +21,7 @@ TOUCH = 0.001  # depth of a touch
 TABLE_Z = 0.75
 ON_TABLE = (1.5, 0.0, TABLE_Z + HALF - TOUCH)
 FAR = (0.0, -5.0, 1.0)
+ON_TRAY = (0.0, 2.4, 0.9)
 
 
 def square(name, x, y, half=0.5, **heights):
@@ -53,6 +54,7 @@ class Stage:
         self._static("shelf", Box(1, 1, 0.05), (-1.5, 0, TABLE_Z - 0.025))
         self._static("wall", Box(0.1, 4, 2), (5, 0, 1.2))
         self._static("robin", Cylinder(0.2, 1.6), (0, 3, 0.85))
+        self._static("robin's tray", Box(0.3, 0.3, 0.02), np.subtract(ON_TRAY, (0, 0, HALF - TOUCH + 0.01)))
         self.bodies = {}
         for name in ("coke", "coke_2", "hammer"):
             self._free(name, name, Box(2 * HALF, 2 * HALF, 2 * HALF))
@@ -206,22 +208,43 @@ def test_no_condition_is_not_judged():
     assert Stage().referee.judge([]).success is None
 
 
-def test_held_out_near_the_person_is_handed_over():
-    stage = Stage().lift().carry("coke", np.add(ON_TABLE, (0, 0, 0.3)), AT_ROBIN)
-    verdict = stage.referee.judge([GRASPED, HANDED])
-    assert verdict.success
-    assert "The coke is held out to robin." in verdict.why
+def given():
+    """The coke is carried to robin, let go, and sinks by 2 cm onto the tray."""
+    above = np.add(ON_TRAY, (0, 0, 0.02))
+    return Stage().lift().carry("coke", np.add(ON_TABLE, (0, 0, 0.3)), above).let_go().put("coke", ON_TRAY)
 
 
-@pytest.mark.parametrize(
-    ("end", "reason"),
-    [((0.0, 1.5, 0.9), "1.50 m from robin"), ((0.0, 2.4, 0.3), "0.30 m high")],
-)
-def test_too_far_or_too_low_is_no_hand_over(end, reason):
-    stage = Stage().lift().carry("coke", np.add(ON_TABLE, (0, 0, 0.3)), end)
+def test_let_go_and_at_rest_on_the_persons_tray_is_handed_over():
+    verdict = given().watch().referee.judge([GRASPED, HANDED])
+    assert verdict.success, verdict.why
+    assert "The coke rests on robin's tray." in verdict.why
+    assert verdict.drops == 0
+
+
+def test_what_turns_over_on_the_tray_is_no_drop_but_what_falls_off_it_is():
+    stage = given().watch(0.1)
+    assert stage.put("coke", np.subtract(ON_TRAY, (0, 0, TOUCH))).watch().referee.drops == 0
+    stage = given().watch(0.1).fall("coke", ON_TRAY, (0.6, 2.4, HALF - TOUCH))
+    verdict = stage.referee.judge([HANDED])
+    assert (verdict.success, verdict.drops) == (False, 1)
+    assert "not on the tray" in verdict.why
+
+
+def test_taken_from_the_tray_again_it_was_handed_over():
+    stage = given().watch()
+    stage.hold("coke", np.add(ON_TRAY, (0, 0, 0.2))).watch()
+    assert not stage.holds(HANDED)
+    passing = stage.referee.judge([dataclasses.replace(HANDED, passing=True)])
+    assert passing.success
+    assert "The coke was put on robin's tray." in passing.why
+
+
+@pytest.mark.parametrize("end", [(0.0, 2.4, 0.9), (0.0, 2.4, 0.3)])
+def test_what_is_held_out_and_never_let_go_is_no_hand_over(end):
+    stage = Stage().lift().carry("coke", np.add(ON_TABLE, (0, 0, 0.3)), np.add(end, (0.5, 0, 0)))
     verdict = stage.referee.judge([HANDED])
     assert not verdict.success
-    assert reason in verdict.why
+    assert f"is still in the gripper, {end[2]:.2f} m high, 0.78 m from robin" in verdict.why
 
 
 def test_pressed_against_the_person_is_no_hand_over():
@@ -238,7 +261,7 @@ def test_object_let_go_near_the_person_is_no_hand_over():
 
 
 def test_hand_over_of_what_came_from_elsewhere_does_not_count():
-    stage = Stage().lift().carry("coke", np.add(ON_TABLE, (0, 0, 0.3)), AT_ROBIN)
+    stage = given().watch()
     assert not stage.holds(dataclasses.replace(HANDED, source=(SHELF,)))
     assert stage.holds(dataclasses.replace(HANDED, source=(TABLE,)))
 

@@ -192,7 +192,7 @@ class _Assembler:
         refuse_several(builder)
         refuse_everything(builder)
         command = builder.command
-        carried = None if self.held is None or self.held.offered_to is not None else self.held.thing
+        carried = None if self.held is None else self.held.thing
         in_gripper = is_same(self.held, command.object, self.knowledge)
         builder = replace(builder, in_gripper=in_gripper, carried=carried)
         node = step_plan(builder)

@@ -214,13 +214,12 @@ def _goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
 
 def _hand_over_plan(builder: PlanBuilder, item: Thing, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
     to = "the start" if isinstance(pose, FromBoard) else person
-    way = builder.at("bring").sequence(
-        f"bring it to {person}",
-        go_near_plan(builder, pose, to),
-        builder.skill("hand_over", {"person": person}),
-    )
-    guard = _holding(builder, item, f"to {to}", way)
-    return unless_fallen(builder.at("carry-on"), item, f"to {to}", guard, (guard,))
+    """Carry it there and hold it out; the gripper opens when the person takes it."""
+    ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
+    way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
+    give = _holding(builder.at("give"), item, f"to {to}", builder.skill("hand_over", ports), until_put_down=True)
+    bring = builder.at("bring").sequence(f"bring it to {person}", way, give)
+    return unless_fallen(builder.at("carry-on"), item, f"to {to}", bring, (way, give))
 
 
 def _put_down_plan(builder: PlanBuilder, item: Thing, place: str) -> NodeSpec:

@@ -27,7 +27,7 @@ def are_trips(get: Command, bring: Command | None) -> bool:
 def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     """Get one and bring it there, as often as was said; `builder` is that of the command to get them.
 
-    Raises InputError: too many; to a person, who does not take them from the gripper; no place to take them from, or
+    Raises InputError: too many; to a person, who takes one; no place to take them from, or
     one where those that were brought would be found again.
     """
     get, goal = builder.command, bring.goal
@@ -37,7 +37,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
         raise builder.error(f"{several} are too many trips", f"ask for {MAX_TRIPS} at most")
     if goal == START or (goal is not None and builder.knowledge.person(goal) is not None):
         hint = "name a place with a surface to put them on"
-        raise builder.error(f"{several} cannot be handed over: the first stays in the gripper until it is taken", hint)
+        raise builder.error(f"{several} cannot be handed over: a person takes one object", hint)
     if get.goal is None:
         raise builder.error(f"it is not said where to take {several} from", "name the place")
     brought = set(builder.knowledge.surfaces_in(builder.place(goal))) if goal is not None else set()

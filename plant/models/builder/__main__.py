@@ -15,6 +15,7 @@ from plant.models.builder.appearance import (
 from plant.models.builder.mesh import mtl_text, obj_text, palette_picture, plain_colours, write_text
 from plant.models.builder.person import person, person_appearance
 from plant.models.builder.sdf import Model, model_sdf
+from plant.models.builder.tray import tray, tray_appearance
 from plant.pictures import save_png
 
 
@@ -26,6 +27,7 @@ def build(folder: Path) -> None:
         (objects.hammer(), hammer_appearance()),
         (objects.cube(), cube_appearance()),
         (person(), person_appearance()),
+        (tray(), tray_appearance()),
     )
     for model, appearance in models:
         write_model(folder / model.name, model, appearance)

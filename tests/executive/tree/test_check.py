@@ -201,9 +201,9 @@ IN_GRIPPER = [
     ((BRING.format("coke", "counter"),), [1]),
     ((GET.format("coke"), BRING.format("beer", "counter")), [2]),
     ((GET.format("coke"), BRING.format("coke", "counter"), BRING.format("coke", "shelf")), [3]),
-    ((GET.format("coke"), BRING.format("coke", "Sam"), GET.format("beer")), [3]),
-    ((GET.format("coke"), BRING.format("coke", "Sam"), GET.format("coke")), [3]),
-    ((GET.format("coke"), BRING.format("coke", "Sam"), BRING.format("coke", "counter")), []),
+    ((GET.format("coke"), BRING.format("coke", "Sam"), GET.format("beer")), []),
+    ((GET.format("coke"), BRING.format("coke", "Sam"), GET.format("coke")), []),
+    ((GET.format("coke"), BRING.format("coke", "Sam"), BRING.format("coke", "counter")), [3]),
     ((DROPPED,), [1]),
     ((GET.format("coke"), DROPPED, GET.format("beer")), []),
 ]

@@ -122,7 +122,7 @@ def test_class_ids_are_distinct_and_leave_zero_to_nothing() -> None:
 def test_committed_models_are_what_the_builder_writes(tmp_path: Path) -> None:
     build(tmp_path)
     written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl")]
-    assert len(written) == 15
+    assert len(written) == 18
     for path in written:
         committed = MODELS_FOLDER / path.relative_to(tmp_path)
         assert committed.read_text(encoding="utf-8") == path.read_text(encoding="utf-8"), committed.name

@@ -1,32 +1,75 @@
 """The hand-over skill with a scripted arm and analytic scans."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from analytic_scan import scan_of
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 
-from skills.api import Cause, Succeeded
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.arm.pull import levers_m
 from skills.hand_over.skill import HandOver, HandOverInputs, facing_poses
-from skills.robot import Pose2D, Scan
+from skills.robot import CommandState, Gripper, Pose2D, Scan
 
 CARRYING = np.array([0.0, -3.0, 2.85, 0.0, 0.1, 1.57])
+P_HT = np.array([0.18, 0.0, 0.0])
+BEER = HandOverInputs("Robin", "beer")
+PULL_S = 8.0
 
 
-class _Scanning(ScriptedRobot):
-    """Gives the same scan with a new stamp at every call."""
+class _Person(ScriptedRobot):
+    """Somebody stands before it and pulls from a time on; each scan has a new stamp, efforts are noisy."""
+
+    pull_n, pull_s, lost_s = 15.0, PULL_S, math.inf
+    noise = np.random.default_rng(3)
 
     def scan(self):
         return None if self.scan_now is None else Scan(**{**self.scan_now.__dict__, "stamp_s": self.now_s})
 
+    def joints(self):
+        force_B = np.array([self.pull_n if self.now_s >= self.pull_s else 0.0, 0.0, 0.0])
+        efforts = self.noise.normal(0.0, 0.3, len(MODEL.names)) - force_B @ levers_m(MODEL, self.q, P_HT)
+        return replace(super().joints(), effort_nm=dict(zip(MODEL.names, efforts.tolist(), strict=True)))
+
+    def gripper(self):
+        return replace(super().gripper(), holding=self.holding and self.now_s < self.lost_s)
+
 
 def _holding(**scripted):
-    return _Scanning(q=CARRYING.copy(), holding=True, opening_rad=0.3, **scripted)
+    return _Person(q=CARRYING.copy(), holding=True, opening_rad=0.3, **scripted)
+
+
+def _before_robin(**how):
+    robot = _holding(scan_now=scan_of([(1.4, 0.0, 0.2)]))
+    for name, value in how.items():
+        setattr(robot, name, value)
+    return robot
+
+
+class _Operator:
+    """Answers the question at a time, and keeps what was asked."""
+
+    def __init__(self, clock, answer, at_s):
+        self.clock, self.answer, self.at_s, self.question, self.withdrawn = clock, answer, at_s, None, False
+
+    def __call__(self, question):
+        self.question = question
+        return self
+
+    def done(self):
+        return self.clock.now() >= self.at_s
+
+    def result(self):
+        return self.answer
+
+    def withdraw(self):
+        self.withdrawn = True
 
 
 def test_an_empty_gripper_is_a_failed_precondition():
-    failed(HandOver(context_of(_Scanning())), HandOverInputs("Robin"), Cause.PRECONDITION, "nothing in the gripper")
+    failed(HandOver(context_of(_Person())), HandOverInputs("Robin"), Cause.PRECONDITION, "nothing in the gripper")
 
 
 def test_nobody_in_sight_is_a_failed_precondition():
@@ -37,12 +80,103 @@ def test_nobody_in_sight_is_a_failed_precondition():
 @pytest.mark.parametrize("y", [-0.4, 0.0, 0.4])
 def test_the_thing_is_held_out_near_the_person_but_does_not_touch(y):
     robot = _holding(scan_now=scan_of([(1.4, y, 0.2)]))
-    assert isinstance(outcome(HandOver(context_of(robot)), HandOverInputs("Robin")), Succeeded)
-    p_BT = MODEL.X_BH(robot.q) @ np.array([0.18, 0.0, 0.0])
+    skill = HandOver(context_of(robot))
+    skill.begin(BEER)
+    while "holding the beer out" not in skill.step().message:
+        robot.advance(0.1)
+    p_BT = MODEL.X_BH(robot.q) @ P_HT
     off = math.hypot(p_BT[0] - 1.4, p_BT[1] - y)
     assert 0.35 < off < 0.75
     assert 0.7 < p_BT[2] + 0.52 < 1.1
     assert robot.holding
+
+
+def test_a_pull_opens_the_gripper_and_the_hand_is_drawn_in():
+    robot = _before_robin()
+    assert outcome(HandOver(context_of(robot)), BEER) == Succeeded("gave the beer to Robin")
+    assert not robot.holding
+    assert robot.q == pytest.approx(MODEL.stowed_rad, abs=0.06)
+
+
+@pytest.mark.parametrize("pull_n", [0.0, 4.0])
+def test_noise_and_a_light_touch_are_no_pull(pull_n):
+    robot = _before_robin(pull_n=pull_n)
+    failed(HandOver(context_of(robot)), BEER, Cause.TIMEOUT, "Robin did not take the beer within 20 s")
+    assert robot.holding
+    assert robot.q == pytest.approx(CARRYING, abs=0.01)
+
+
+def test_what_is_lost_while_it_is_held_out_is_no_hand_over():
+    robot = _before_robin(pull_n=0.0, lost_s=PULL_S)
+    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "lost while it was held out")
+
+
+def test_what_stays_in_the_open_gripper_is_told():
+    robot = _before_robin()
+    robot.gripper = lambda: Gripper(robot.now_s, robot.opening_rad, 5.0, True)
+    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "still in the open gripper")
+
+
+@pytest.mark.parametrize(("answer", "given"), [("let go", True), ("hold on", False)])
+def test_the_operator_may_say_that_it_lets_go(answer, given):
+    robot = _before_robin(pull_n=0.0)
+    operator = _Operator(robot, answer, at_s=PULL_S)
+    step = outcome(HandOver(replace(context_of(robot), ask=operator)), BEER)
+    assert isinstance(step, Succeeded if given else Failed)
+    assert operator.question.text == "Alice holds the beer out to Robin. Let go?"
+    assert operator.withdrawn
+
+
+def _ticks(robot, skill):
+    """Begin and give the number of each tick before it is done."""
+    skill.begin(BEER)
+    tick = 0
+    while isinstance(skill.step(), Running):
+        yield (tick := tick + 1)
+        robot.advance(0.1)
+        assert robot.now() < 60.0
+
+
+def test_cancelled_at_any_tick_nothing_is_under_way():
+    whole = _before_robin()
+    count = sum(1 for _ in _ticks(whole, HandOver(context_of(whole))))
+    for end in range(1, count + 1, 3):
+        robot = _before_robin()
+        operator = _Operator(robot, "hold on", at_s=math.inf)
+        skill = HandOver(replace(context_of(robot), ask=operator))
+        next(tick for tick in _ticks(robot, skill) if tick == end)
+        skill.end()
+        running = {command for command, each in robot.status.items() if each.state is CommandState.RUNNING}
+        assert running <= set(robot.stopped)
+        assert operator.withdrawn or operator.question is None
+
+
+def test_paused_at_any_tick_it_goes_on_and_gives_it():
+    whole = _before_robin()
+    count = sum(1 for _ in _ticks(whole, HandOver(context_of(whole))))
+    for pause in range(1, count + 1, 3):
+        robot = _before_robin()
+        skill = HandOver(context_of(robot))
+        next(tick for tick in _ticks(robot, skill) if tick == pause)
+        skill.suspend()
+        robot.advance(30.0)
+        robot.pull_s = robot.now() + 6.0
+        skill.resume(BEER)
+        while isinstance(step := skill.step(), Running):
+            robot.advance(0.1)
+            assert robot.now() < 120.0
+        assert step == Succeeded("gave the beer to Robin"), (pause, step)
+        assert not robot.holding
+
+
+def test_after_a_restart_what_was_let_go_is_given():
+    robot = _before_robin(holding=False)
+    skill = HandOver(context_of(robot))
+    skill.checkpoint = {"lets_go": True}
+    skill.resume(BEER)
+    while isinstance(step := skill.step(), Running):
+        robot.advance(0.1)
+    assert step == Succeeded("gave the beer to Robin")
 
 
 def test_poses_before_a_person_face_them_and_the_nearest_comes_first():

@@ -1,0 +1,166 @@
+"""What robots hold out: a loose object in a gripper before the robot's outline, clear of everything, and still."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import GeometryId
+from pydrake.multibody.tree import RigidBody
+from pydrake.systems.framework import Context
+
+from plant.diagram import WorldDiagram
+from plant.sensors.ray_shapes import ShapeKind, shape_row
+from plant.snapshot.values import State
+from plant.spot.capabilities import spot_capabilities
+from skills.robot import FloatArray
+
+LEAST_HEIGHT_M = 0.5
+STILL_M_S, MOVES_M_S = 0.03, 0.15
+BEYOND_OUTLINE_M = 0.05
+_AT_HAND_M = 0.5
+_GRIPPER_LINKS = ("arm_wr1", "arm_f1x")
+
+
+@dataclass(frozen=True)
+class Offer:
+    """An object (model name and body) that a robot holds."""
+
+    robot: str
+    thing: str
+    body: RigidBody
+
+
+class Offers:
+    """What the robots of one plant hold out; call `look` regularly."""
+
+    def __init__(self, world: WorldDiagram, context: Context) -> None:
+        plant = world.plant
+        self._plant, self._context, self._query = plant, context, plant.get_geometry_query_input_port()
+        self._inspector = world.scene_graph.model_inspector()
+        self._outline_B = np.array(spot_capabilities().footprint_m)
+        self._bodies = {name: robot.body for name, robot in world.robots.items()}
+        self._links = {
+            name: [plant.GetBodyByName(link, robot.instance) for link in _GRIPPER_LINKS]
+            for name, robot in world.robots.items()
+        }
+        grip_x_m = 0.0 if (gripper := spot_capabilities().gripper) is None else gripper.grip_x_m
+        self._p_HT = np.array([grip_x_m, 0.0, 0.0])
+        models = ((name, plant.get_body(plant.GetBodyIndices(model)[0])) for name, model in world.models.items())
+        self.loose = {name: body for name, body in models if body.is_floating_base_body()}
+        self._shapes = {
+            int(body.index()): [
+                shape_row(self._inspector, shape) for shape in plant.GetCollisionGeometriesForBody(body)
+            ]
+            for body in (*self.loose.values(), *(link for links in self._links.values() for link in links))
+        }
+        self._still_since_s: dict[str, float] = {}
+
+    def look(self, now_s: float, holding: Sequence[str]) -> None:
+        """Note which robots hold something out, and since when."""
+        out = [name for name in holding if self._holds_out(name)]
+        self._still_since_s = {name: self._still_since_s.get(name, now_s) for name in out}
+
+    def near(self, p_WP: FloatArray, reach_m: float, since_s: float) -> Offer | None:
+        """What has been held out since a time within reach of somebody at p_WP, free of all else."""
+        for name, still_s in self._still_since_s.items():
+            away_m = math.dist(self.grip_W(name)[:2], p_WP[:2])
+            if still_s <= since_s and away_m <= reach_m and (thing := self._free_in(name)) is not None:
+                return Offer(name, thing, self.loose[thing])
+        return None
+
+    def holds(self, offer: Offer) -> bool:
+        """Whether an object is still held out, be it that the arm gives way to a pull; what is moved faster is not."""
+        p_WO = self._plant.EvalBodyPoseInWorld(self._context, offer.body).translation()
+        at_hand = float(np.linalg.norm(p_WO - self.grip_W(offer.robot))) < _AT_HAND_M
+        return at_hand and self._before_outline(offer.robot) and self._hand_m_s(offer.robot) < MOVES_M_S
+
+    def grip_W(self, robot: str) -> FloatArray:
+        """Where a robot's fingers grip."""
+        return np.asarray(self._plant.EvalBodyPoseInWorld(self._context, self._links[robot][0]) @ self._p_HT)
+
+    def in_hand(self, offer: Offer) -> FloatArray:
+        """Where an object is in the hand (3,), m."""
+        X_WH = self._plant.EvalBodyPoseInWorld(self._context, self._links[offer.robot][0])
+        return np.asarray(X_WH.inverse() @ self.place_W(offer))
+
+    def opening_rad(self, robot: str) -> float:
+        """How far a robot's gripper is open."""
+        joint = self._plant.GetJointByName("arm_f1x", self._links[robot][1].model_instance())
+        return -float(joint.GetOnePosition(self._context))
+
+    def lowest_m(self, offer: Offer) -> float:
+        """The height of the lowest point of an object and of the gripper that holds it."""
+        bodies = (offer.body, *self._links[offer.robot])
+        return min(z for body in bodies for z in self._lows_m(body))
+
+    def place_W(self, offer: Offer) -> FloatArray:
+        """The object's centre of mass."""
+        X_WO = self._plant.EvalBodyPoseInWorld(self._context, offer.body)
+        return np.asarray(X_WO @ offer.body.default_com())
+
+    def _lows_m(self, body: RigidBody) -> Iterator[float]:
+        """The lowest height of each shape of a body."""
+        X_WB = self._plant.EvalBodyPoseInWorld(self._context, body)
+        for kind, half_m, X_BG in self._shapes[int(body.index())]:
+            X_WG = X_WB @ X_BG
+            down = np.abs(X_WG.rotation().matrix()[2])
+            yield float(X_WG.translation()[2]) - _reach_m(kind, half_m, down)
+
+    def _holds_out(self, robot: str) -> bool:
+        """Whether a robot that holds something keeps its hand still before itself, high enough."""
+        if self._hand_m_s(robot) > STILL_M_S:
+            return False
+        return self.grip_W(robot)[2] >= LEAST_HEIGHT_M and self._before_outline(robot)
+
+    def _hand_m_s(self, robot: str) -> float:
+        V_WH = self._plant.EvalBodySpatialVelocityInWorld(self._context, self._links[robot][0])
+        return float(np.linalg.norm(V_WH.translational()))
+
+    def _before_outline(self, robot: str) -> bool:
+        X_WB = self._plant.EvalBodyPoseInWorld(self._context, self._bodies[robot])
+        p_BG = X_WB.inverse() @ self.grip_W(robot)
+        low, high = self._outline_B.min(axis=0), self._outline_B.max(axis=0)
+        return bool(np.any((p_BG[:2] < low - BEYOND_OUTLINE_M) | (p_BG[:2] > high + BEYOND_OUTLINE_M)))
+
+    def _free_in(self, robot: str) -> str | None:
+        """The object that a gripper touches and that touches nothing else; None where there is not just one."""
+        of_shape = self._owners()
+        links = {int(link.index()) for link in self._links[robot]}
+        touching: dict[int, set[int]] = {}
+        for each in self._query.Eval(self._context).ComputePointPairPenetration():
+            a, b = of_shape.get(each.id_A, -1), of_shape.get(each.id_B, -1)
+            touching.setdefault(a, set()).add(b)
+            touching.setdefault(b, set()).add(a)
+        held = [n for n, body in self.loose.items() if touching.get(int(body.index()), set()) & links]
+        if len(held) != 1 or touching[int(self.loose[held[0]].index())] - links:
+            return None
+        return held[0]
+
+    def _owners(self) -> Mapping[GeometryId, int]:
+        """The body of each collision shape of a loose object or a gripper."""
+        bodies = (*self.loose.values(), *(link for links in self._links.values() for link in links))
+        return {
+            shape: int(body.index()) for body in bodies for shape in self._plant.GetCollisionGeometriesForBody(body)
+        }
+
+    def state(self) -> State:
+        """Since when each robot holds something out."""
+        return dict(self._still_since_s)
+
+    def restore(self, state: State) -> None:
+        """Go on from such a state."""
+        self._still_since_s = dict(state)
+
+
+def _reach_m(kind: ShapeKind, half_m: FloatArray, down: FloatArray) -> float:
+    """How far below its middle a shape reaches; `down` (3,) are the sizes of the vertical's parts along its axes."""
+    if kind is ShapeKind.BOX:
+        return float(half_m @ down)
+    if kind is ShapeKind.ELLIPSOID:
+        return float(np.linalg.norm(half_m * down))
+    if kind is ShapeKind.CAPSULE:
+        return float(half_m[0] + (half_m[2] - half_m[0]) * down[2])
+    return float(half_m[0] * math.hypot(down[0], down[1]) + half_m[2] * down[2])

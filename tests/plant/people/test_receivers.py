@@ -1,0 +1,192 @@
+"""People who take what a robot holds out, in the plant."""
+
+import math
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.math import SpatialVelocity
+
+from plant.diagram import LooseModel, build_diagram
+from plant.models.catalogue import load_catalogue
+from plant.people.receiver import Phase
+from plant.referee import Referee
+from plant.simulation import Engine
+from plant.worlds.placement import Placement, Receiving
+from plant.worlds.route import Route, Stop
+from skills.robot import ArmTrajectory, Pose2D
+
+FLOOR = """<sdf version="1.9"><model name="floor"><link name="floor">
+<collision name="top"><pose>0 0 -0.5 0 0 0</pose><geometry><box><size>20 20 1</size></box></geometry></collision>
+</link></model></sdf>"""
+WORLD = """directives:
+- add_model: {name: floor, file: "%s"}
+- add_weld: {parent: world, child: "floor::floor"}
+"""
+CATALOGUE = load_catalogue()
+PERSON, CAN = CATALOGUE["person"].forms["standing"], CATALOGUE["coke"].forms["can"]
+OUT_RAD = np.array([0.0, -1.45, 1.85, 0.0, -0.4, 1.57])
+GRIP_X_M = 0.18
+TAKES = Receiving()
+X_WP = RigidTransform(RollPitchYaw(0.0, 0.0, math.pi), [1.45, 0.0, 0.0])
+
+
+class Hall:
+    """Alice holds a can out to Kim, who stands before her or walks by."""
+
+    def __init__(self, folder, receiving=TAKES, *, route=None, receives=True):
+        (folder / "floor.sdf").write_text(FLOOR)
+        (folder / "world.dmd.yaml").write_text(WORLD % (folder / "floor.sdf").as_uri())
+        walks = route is not None
+        models = [
+            LooseModel("Kim", PERSON.path(), X_WP, fixed=not walks, slides=walks, receives=receives),
+            LooseModel("coke", CAN.path(), RigidTransform([-2.0, 0.0, CAN.rest_height_m])),
+        ]
+        self.world = build_diagram(
+            directives=folder / "world.dmd.yaml", models=models, robot_names=["Alice"], visuals=False, render=False
+        )
+        self.engine = Engine(
+            self.world,
+            {"Alice": Pose2D(0.0, 0.0, 0.0)},
+            routes={"Kim": route} if walks else {},
+            receiving={"Kim": receiving},
+        )
+        placed = Placement("coke", "coke", CAN, RigidTransform())
+        self.referee = Referee(
+            self.world.plant, [placed], robots=["Alice"], persons=["Kim"], scenery=self.world.scenery
+        )
+        self.engine.observe(lambda now_s: self.referee.observe(self.engine.context, now_s), every=4)
+        self.robot = self.engine.robots["Alice"]
+        self.lease = self.robot.acquire_lease("test")
+        self._hold_out()
+
+    def _hold_out(self):
+        """Stretch the arm, and close the gripper about a can that is put there."""
+        names = self.robot.capabilities().arm.joint_names
+        joints, plant, context = self.robot.joints().position_rad, self.world.plant, self.engine.context
+        way = np.vstack([[joints[name] for name in names], OUT_RAD])
+        self.robot.move_arm(ArmTrajectory(np.array([0.0, 2.0]), way), until_s=5.0, lease=self.lease)
+        self.robot.set_gripper(0.9, 20.0, until_s=3.0, lease=self.lease)
+        self.engine.advance(2.5)
+        hand = plant.GetBodyByName("arm_wr1")
+        X_WC = RigidTransform(plant.EvalBodyPoseInWorld(context, hand) @ np.array([GRIP_X_M, 0.0, 0.0]))
+        for step in range(55):
+            if step == 40:
+                self.robot.set_gripper(0.0, 60.0, until_s=9.0, lease=self.lease)
+            plant.SetFreeBodyPose(context, self.can, X_WC)
+            plant.SetFreeBodySpatialVelocity(context, self.can, SpatialVelocity.Zero())
+            self.engine.advance(0.0125)
+        while not self.robot.gripper().holding and self.engine.now() < 6.0:
+            self.engine.advance(0.05)
+        assert self.robot.gripper().holding
+
+    @property
+    def can(self):
+        return self.world.plant.GetBodyByName("coke")
+
+    def place_W(self, body):
+        return self.world.plant.EvalBodyPoseInWorld(self.engine.context, body).translation()
+
+    @property
+    def kim(self):
+        return self.engine.receivers["Kim"]
+
+    def until(self, phase, limit_s=8.0):
+        end_s = self.engine.now() + limit_s
+        while self.kim.phase is not phase:
+            assert self.engine.now() < end_s, f"still {self.kim.phase}"
+            self.engine.advance(0.05)
+        return self
+
+    def let_go(self):
+        self.robot.set_gripper(1.2, 20.0, until_s=self.engine.now() + 3.0, lease=self.lease)
+
+
+def test_the_tray_comes_under_what_is_held_out_without_touching_it(tmp_path):
+    hall = Hall(tmp_path)
+    tray, before_W = hall.world.trays["Kim"], hall.place_W(hall.can)
+    assert hall.place_W(tray) == pytest.approx([1.45, 0.0, 1.08], abs=1e-6)
+    speeds = []
+    while hall.kim.phase is not Phase.PULLING:
+        last_W = hall.place_W(tray)
+        hall.engine.advance(0.05)
+        speeds.append(np.linalg.norm(hall.place_W(tray) - last_W) / 0.05)
+        assert len(speeds) < 160
+    under_m = hall.place_W(hall.can)[2] - CAN.rest_height_m - hall.place_W(tray)[2]
+    assert 0.005 < under_m < 0.08
+    assert max(speeds) < 0.31
+    assert hall.place_W(hall.can) == pytest.approx(before_W, abs=0.005)
+
+
+def test_what_is_let_go_under_the_pull_comes_to_rest_on_the_tray(tmp_path):
+    hall = Hall(tmp_path).until(Phase.PULLING)
+    hall.engine.advance(0.4)
+    hall.let_go()
+    hall.until(Phase.RECEIVING).engine.advance(2.0)
+    history = hall.referee.objects["coke"]
+    assert history.on_tray_of == "Kim"
+    assert history.drops == 0
+    assert hall.referee.collisions == ()
+
+
+def test_a_gripper_that_holds_on_is_pulled_at_again_after_a_pause(tmp_path):
+    hall = Hall(tmp_path).until(Phase.PULLING).until(Phase.PAUSING).until(Phase.PULLING)
+    assert hall.robot.gripper().holding
+
+
+def test_the_arms_joints_feel_the_pull(tmp_path):
+    hall = Hall(tmp_path, Receiving(pull_n=20.0)).until(Phase.BRINGING)
+    name = hall.robot.capabilities().arm.joint_names[1]
+
+    def effort():
+        readings = []
+        for _ in range(10):
+            hall.engine.advance(0.05)
+            readings.append(hall.robot.joints().effort_nm[name])
+        return np.mean(readings)
+
+    before = effort()
+    hall.until(Phase.PULLING).engine.advance(1.0)
+    assert abs(effort() - before) > 2.0
+
+
+def test_the_tray_goes_home_when_the_object_is_drawn_in(tmp_path):
+    hall = Hall(tmp_path).until(Phase.PULLING)
+    q = hall.robot.joints().position_rad
+    names = hall.robot.capabilities().arm.joint_names
+    way = np.vstack([[q[name] for name in names], [0.0, -3.0, 2.85, 0.0, 0.1, 1.57]])
+    until_s = hall.engine.now() + 6.0
+    hall.robot.move_arm(ArmTrajectory(np.array([0.0, 3.0]), way), until_s=until_s, lease=hall.lease)
+    hall.until(Phase.IDLE).engine.advance(6.0)
+    assert hall.place_W(hall.world.trays["Kim"]) == pytest.approx([1.45, 0.0, 1.08], abs=1e-6)
+    assert not hall.kim.busy
+
+
+def test_who_does_not_receive_has_no_tray(tmp_path):
+    hall = Hall(tmp_path, receives=False)
+    hall.engine.advance(4.0)
+    assert not hall.world.trays
+    assert hall.robot.gripper().holding
+
+
+def test_somebody_who_walks_stops_to_take_it(tmp_path):
+    route = Route((Stop((1.45, 0.0), 4.0), Stop((1.45, 3.0))), speed_m_s=1.0, yields=False)
+    hall = Hall(tmp_path, Receiving(reaction_s=0.5), route=route).until(Phase.BRINGING)
+    person = hall.world.plant.GetBodyByName("person")
+    stopped_W = hall.place_W(person)
+    hall.engine.advance(2.5)
+    assert hall.place_W(person) == pytest.approx(stopped_W, abs=1e-6)
+    assert stopped_W[1] < 2.0
+
+
+def test_a_state_taken_up_again_goes_on_as_before(tmp_path):
+    hall = Hall(tmp_path).until(Phase.PULLING)
+    state, world = hall.engine.state(), {name: each.copy() for name, each in hall.engine.world_state().items()}
+    hall.engine.advance(1.0)
+    hall.engine.restore(state, world)
+    assert hall.kim.phase is Phase.PULLING
+    assert hall.kim.state() == state["receivers"]["people"]["Kim"]
+    hall.lease = hall.robot.acquire_lease("again")
+    hall.let_go()
+    hall.until(Phase.RECEIVING).engine.advance(2.0)
+    assert hall.referee.objects["coke"].on_tray_of == "Kim"

@@ -103,6 +103,11 @@ class ObjectHistory:
         return self._grip_robot if self.last.time_s - self._grip_s <= FLICKER_S else None
 
     @property
+    def in_the_air(self) -> bool:
+        """Carried in a gripper and touching nothing but the robot."""
+        return self._carried and self.held_by is not None and not self._supported
+
+    @property
     def on_tray_of(self) -> str | None:
         """The person on whose tray it rests."""
         return self._tray_of if self.resting and self.last.time_s - self._tray_s <= FLICKER_S else None

@@ -120,7 +120,7 @@ class Watch:
         history, base_W = self.simulation.referee.objects[TARGET], base_xy_W(self.simulation)
         if float(np.linalg.norm(base_W - self._base_W)) > MOVED_M:
             self._stands_since_s, self._base_W = now_s, base_W
-        if not history.held_out:
+        if not history.in_the_air:
             self.lifted_since_s = None
             return
         if not self.lifted:

@@ -252,8 +252,7 @@ class Grasp(ArmSkill[GraspInputs]):
         yield from self.move_to(goal, message)
         yield from self.clear_view(message)
         image = yield from self.picture(message)
-        place, detector = self.context.localiser.estimate(), self.context.detector
-        X_WB = place.X_WO @ image.frames.pose("body")
+        place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
 
         def look() -> CloseView | None:
             found = detections_in(detector, image)

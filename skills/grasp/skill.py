@@ -40,7 +40,7 @@ from skills.robot import ArmTrajectory, FloatArray
 
 _CLOSED_RAD = 0.06
 _PER_KG_N, _PER_LEVER_N_M, _MOST_OF_FORCE = 12.0, 400.0, 0.95
-_RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.026, 0.12, 0.8
+_RELAX_M, _RELAX_THIN_M, _FEEL_M, _FEEL_RAD_S, _DOWN = 0.002, 0.0005, 0.014, 0.12, 0.8
 _ASIDE_RAD, _MOST_OF_IT = (0.0, 0.8, -0.8), 0.7
 _FEEL_S = 0.4
 _AIM_LATENCY_S, _AIMED_M, _FAR_OFF_M, _LEAST_OVERLAP = 0.1, 0.003, 0.05, 0.5
@@ -333,8 +333,7 @@ class Grasp(ArmSkill[GraspInputs]):
         if aside_rad != 0.0 or not (open_wide and sees_closely(X_BC, p_BT)):
             yield from self.look_from(goal, message)
         image = yield from self.picture(message)
-        place, detector = self.context.localiser.estimate(), self.context.detector
-        X_WB = place.X_WO @ image.frames.pose("body")
+        place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
 
         def look() -> CloseView | None:
             found = detections_in(detector, image)

@@ -1,0 +1,74 @@
+"""A coke on a shelf stands right behind a beer, which is moved aside where the mission allows it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+from pydrake.math import RigidTransform
+
+from executive.cli.assembly import judge, run_entry
+from executive.cli.worlds import knowledge_of
+from executive.mission.command import parse_command
+from executive.mission.file.model import Mission, MissionStep, StepPolicy
+from executive.run.outcome import Outcome
+from executive.run.runner import RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.tree.compiler import compile_mission
+from executive.tree.registry import built_in_skills
+from plant import simulation
+from plant.worlds.placement import place_objects
+from plant.worlds.world import load_world
+from tests.benchmarks.manipulation_room import TAKEN, room
+
+pytestmark = pytest.mark.mission
+
+SEED, MIDDLE_X = 404, 2.5
+SPOTS = {"target": (0.0, 0.21), "other_0": (0.0, 0.09), "other_1": (0.13, 0.17)}
+"""How far right of the shelf's middle and behind its front edge the coke, the beer and a cylinder stand (m)."""
+
+
+@pytest.fixture
+def shelf(tmp_path, monkeypatch):
+    """A room with the three on an open shelf."""
+    room(tmp_path, "coke", ("beer", "cylinder"), "shelf", SEED)
+    rules = yaml.safe_load((tmp_path / "objects.yaml").read_text(encoding="utf-8"))
+    rules["rules"]["clear_m"] = -1.0  # the spots are set below
+    (tmp_path / "objects.yaml").write_text(yaml.safe_dump(rules), encoding="utf-8")
+    front_y = rules["fronts"][TAKEN][0][0][1]
+
+    def placed(world, seed):
+        for each in place_objects(world, seed):
+            (right, behind), X = SPOTS[each.name], each.X_WO
+            p_W = np.array([MIDDLE_X + right, front_y + behind, X.translation()[2]])
+            yield replace(each, X_WO=RigidTransform(X.rotation(), p_W))
+
+    monkeypatch.setattr(simulation, "place_objects", lambda world, seed: tuple(placed(world, seed)))
+    return load_world(str(tmp_path))
+
+
+def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
+    steps = (MissionStep((parse_command(f"Take [Nothing] to [{TAKEN}] and do [grasp] to [coke]"),)),)
+    mission = Mission("shelf", str(shelf.folder), "Alice", steps, StepPolicy(move_aside=1))
+    tree = compile_mission(mission, knowledge=knowledge_of(shelf), registry=built_in_skills())
+    plant, said = simulation.Simulation(shelf, seed=SEED, visuals=False), list[str]()
+    with LockStepWorker(plant.clock) as worker:
+        result = run(
+            [run_entry(plant, shelf, tree)],
+            clock=plant.clock,
+            worker=worker,
+            publish=lambda topic, message: said.append(str(message.get("message"))),
+            settings=RunSettings(seed=SEED),
+        ).worst
+    assert result.outcome is Outcome.SUCCESS, result.message
+    verdict = judge(plant, tree, result)
+    assert verdict.success, verdict.why
+    assert verdict.drops == 0
+    assert "the coke is behind the beer" in said
+    assert "the beer is in the way of the coke; it is moved aside" in said
+    beer = plant.referee.objects["other_0"]
+    assert beer.resting
+    assert abs(beer.last.p_WO[0] - MIDDLE_X) > 0.25
+    assert beer.last.p_WO[2] > shelf.surfaces[TAKEN].height_m

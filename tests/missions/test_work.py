@@ -19,13 +19,13 @@ BUDGETS = {
     "depth_pictures_640x480": 6,
     "detect_class_pictures": 136,
     "detect_in_views_pictures": 6,
-    "lidar_rays": 10_700_000,
+    "lidar_rays": 12_900_000,
     "pictures_320x240": 136,
     "pictures_40x30": 99,
     "pictures_640x480": 6,
     "planner_expansions": 8_300,
     "plant_steps": 7_380,
-    "scan_matches": 738,
+    "scan_matches": 894,
 }
 
 

@@ -24,8 +24,8 @@ from skills.robot import FloatArray
 
 WITH_HAND_M_S: Final = 0.02
 """What moves against the hand by less than this moves with it."""
-FASTEST_SPIN_RAD_S: Final = 15.0
-"""A fifth of a radian in a step of 12.5 ms."""
+FASTEST_SPIN_RAD_S: Final = 25.0
+"""A third of a radian in a step of 12.5 ms."""
 _AT_HAND_M: Final = 0.5
 
 

@@ -84,7 +84,7 @@ class GripperTurn:
 class ArmSkill(RoutineSkill[InputsT]):
     """A routine with an arm. `boxes` stand around it (frame B), `held` is in the hand (frame H).
 
-    Around it stands also what the hand camera has seen so far, but in `known_W` (least and greatest corner, world)
+    Around it stands also what the hand camera has seen so far, but in `known_W` (least and greatest corners, world)
     what `boxes` say.
     """
 
@@ -92,7 +92,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         super().__init__(context)
         self.boxes: Sequence[Box] = ()
         self.held: Sequence[Box] = ()
-        self.known_W: tuple[FloatArray, FloatArray] | None = None
+        self.known_W: Sequence[tuple[FloatArray, FloatArray]] = ()
         self._scene: ArmScene | None = None
         self._model: ArmModel | None = None
         self._rng = np.random.default_rng(context.seed)
@@ -109,7 +109,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         super().resume(inputs)
 
     def _forget(self) -> None:
-        self.boxes, self.held, self.known_W, self._scene = (), (), None, None
+        self.boxes, self.held, self.known_W, self._scene = (), (), (), None
         self._rng = np.random.default_rng(self.context.seed)
 
     def hand_near(self, p_W: FloatArray, within_m: float) -> bool:
@@ -184,8 +184,8 @@ class ArmSkill(RoutineSkill[InputsT]):
 
         def left_out(points_W: FloatArray) -> NDArray[np.bool_]:
             out = np.any([segment_distance(points_W, *each) < _AT_ARM_M for each in segments], axis=0)
-            if self.known_W is not None:
-                out |= np.all((points_W > self.known_W[0]) & (points_W < self.known_W[1]), axis=1)
+            for low, high in self.known_W:
+                out |= np.all((points_W > low) & (points_W < high), axis=1)
             return np.asarray(out | self._own(points_W))
 
         return solid_boxes(self.context.solid.cells, X_WB, self._reach_m() + beyond_m, left_out)

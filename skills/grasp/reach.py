@@ -186,18 +186,27 @@ def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
 
 
 def space_about(
-    position_W: tuple[float, float, float], base_m: float, half_m: float = _SURFACE_AROUND_M
-) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest corner (world, m) of the space on a surface about an object that stands base_m high."""
-    x, y, _ = position_W
-    low = np.array([x - half_m, y - half_m, base_m - _SURFACE_BAND_M])
-    return low, np.array([x + half_m, y + half_m, base_m + _KNOWN_ABOVE_M])
+    seen: ObjectObservation, half_m: float = _SURFACE_AROUND_M
+) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    """Least and greatest corners (world, m) of the space on its surface about an object, and of its own space.
+
+    What is tall reaches higher than what is known about it: the cells of its own top are no obstacle.
+    """
+    x, y, z = seen.position_W
+    length_m, width_m, height_m = seen.size_m
+    low_m, own_m = z - 0.5 * height_m - _SURFACE_BAND_M, 0.5 * max(length_m, width_m) + _OWN_M
+    corners = ((half_m, low_m + _SURFACE_BAND_M + _KNOWN_ABOVE_M), (own_m, z + 0.5 * height_m + _OWN_M))
+    about, own = (
+        (np.array([x - side_m, y - side_m, low_m]), np.array([x + side_m, y + side_m, top_m]))
+        for side_m, top_m in corners
+    )
+    return about, own
 
 
 def _beside(seen: ObjectObservation, p_W: FloatArray) -> NDArray[np.bool_]:
     """Which points (N, 3) are in the space about an object, but neither its own nor just above its surface."""
     base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
-    low, high = space_about(seen.position_W, base_m)
+    low, high = space_about(seen)[0]
     inside = np.all((p_W > low) & (p_W < high), axis=1) & (p_W[:, 2] > base_m + _LOW_M)
     turn = RotationMatrix.MakeZRotation(-seen.yaw_rad).matrix()
     off = np.abs((p_W - np.array(seen.position_W)) @ turn.T)[:, :2]
@@ -218,7 +227,7 @@ def reach_check(
     Around it stands what the hand camera has seen within the arm's reach and `beyond_m`, but just about the object.
     """
     X_WB, known_W = skill.X_WB(), skill.known_W
-    skill.known_W = space_about(seen.position_W, seen.position_W[2] - 0.5 * seen.size_m[2])
+    skill.known_W = space_about(seen)
     boxes = [*surface_boxes(surfaces, X_WB), *skill.seen_boxes(beyond_m)]
     skill.known_W = known_W
     candidates = partial(skill.context.stack.grasp_planner.candidates, p_BS=skill.model.p_BS, gripper=skill.gripper)

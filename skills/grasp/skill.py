@@ -300,7 +300,7 @@ class Grasp(ArmSkill[GraspInputs]):
         best: CloseView | None = None
         for aside_rad in _ASIDE_RAD:
             self.boxes = surface_boxes([square(seen.position_W, base_m, "guess", 0.25)], self.X_WB())
-            self.known_W = space_about(seen.position_W, base_m)
+            self.known_W = space_about(seen)
             try:
                 view = yield from self._view_from(seen, base_m, aside_rad)
             except SkillFailure as failure:
@@ -313,7 +313,7 @@ class Grasp(ArmSkill[GraspInputs]):
                 break
         if best is None:
             raise SkillFailure(Cause.PRECONDITION, f"the {seen.thing} is no longer where it was seen")
-        self.known_W = space_about(seen.position_W, base_m, LOOK_HALF_SIDE_M)
+        self.known_W = space_about(seen, LOOK_HALF_SIDE_M)
         return best
 
     def _view_from(self, seen: ObjectObservation, base_m: float, aside_rad: float) -> Routine[CloseView | None]:

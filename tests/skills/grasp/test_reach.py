@@ -61,9 +61,17 @@ def test_boxes_stay_where_they_are_in_the_world_when_the_body_stands_elsewhere()
 
 
 def test_the_space_about_an_object_holds_it_and_a_band_of_its_surface():
-    low, high = space_about((1.0, 2.0, 0.76), 0.70)
+    seen = ObjectObservation(0.0, Thing("coke"), (1.0, 2.0, 0.76), (0.066, 0.066, 0.12), 0.0, 1.0)
+    low, high = space_about(seen)[0]
     assert np.all(low < [1.0, 2.0, 0.69])
     assert np.all(high > [1.0, 2.0, 0.82])
+
+
+def test_what_is_tall_has_its_own_space_up_to_its_top_and_not_beside_it():
+    seen = ObjectObservation(0.0, Thing("extinguisher"), (1.0, 2.0, 0.9), (0.09, 0.09, 0.4), 0.0, 1.0)
+    about, own = space_about(seen)
+    assert about[1][2] < 1.1 < own[1][2] < 1.16
+    assert own[1][0] < 1.1 < about[1][0]
 
 
 # tilt of the hand (degrees), which way it is turned over -> whether what stands turns square to the fingers

@@ -24,7 +24,7 @@ UNDER_M = 0.15
 """From so far below it the tray is raised."""
 SPEED_M_S, TURN_RAD_S = 0.3, 1.5
 PULL_S, RAMP_S, PAUSE_S = 6.0, 0.6, 4.0
-DOWN = 0.25
+DOWN = 0.95
 """The share of the pull that goes down, beside that towards the person."""
 GIVES_M, GIVES_RAD = 0.01, 0.03
 """The gripper gives way: the object has moved so far in the hand since the pull began, or the fingers have opened."""
@@ -94,16 +94,16 @@ class Receiver:
         """Note how the gripper has the object, against which it is seen to give way."""
         self._opening_rad, self._p_HO = self._offers.opening_rad(offer.robot), self._offers.in_hand(offer)
 
-    def _gives(self, offer: Offer) -> bool:
-        """Whether the gripper gives way."""
-        opened = self._offers.opening_rad(offer.robot) - self._opening_rad > GIVES_RAD
+    def _gives(self, offer: Offer, opens_rad: float = GIVES_RAD) -> bool:
+        """Whether the gripper gives way: somebody who pulls feels it sooner."""
+        opened = self._offers.opening_rad(offer.robot) - self._opening_rad > opens_rad
         return opened or float(np.linalg.norm(self._offers.in_hand(offer) - self._p_HO)) > GIVES_M
 
     def pull_W(self, now_s: float) -> FloatArray | None:
         """The force (N, world) on the object; it ends for good when the gripper gives way."""
         if self.offer is None or self.phase is not Phase.PULLING:
             return None
-        if self._gives(self.offer):
+        if self._gives(self.offer, 0.5 * GIVES_RAD):
             self._turn_to(Phase.RECEIVING, now_s)
             return None
         to_person = self._X_WP().translation()[:2] - self._offers.place_W(self.offer)[:2]
@@ -134,8 +134,14 @@ class Receiver:
         under = self._under(self.offer)
         aside_m = float(np.linalg.norm((under.translation() - self._X_WT.translation())[:2]))
         if self.phase is Phase.BRINGING and aside_m > _ASIDE_M:
-            return RigidTransform(under.rotation(), under.translation() - [0.0, 0.0, UNDER_M])
+            return self._way_under(under)
         return under
+
+    def _way_under(self, under: RigidTransform) -> RigidTransform:
+        """First down before the body, lower than what is held out hangs, then below it."""
+        here, level_m = self._X_WT.translation(), float(under.translation()[2]) - UNDER_M
+        xy = here[:2] if here[2] > level_m + _NEAR_M else under.translation()[:2]
+        return RigidTransform(under.rotation(), np.array([*xy, level_m]))
 
     def _way_home(self) -> RigidTransform:
         """First back to the body, level and a little down, as something may be above the tray; then into the torso."""

@@ -34,6 +34,11 @@ WEIGHING_S = 0.3
 _STEP_RAD, _GRAVITY_M_S2 = 1e-4, 9.81
 _TURNS_WITHIN_S, _TURN_CHECKED = 1.6, 3
 """The gripper has turned within so long (s); each such sample of the arm's trajectory is checked meanwhile."""
+_RELEASE_RAD = 0.4
+"""The finger opens so far to let go, and no farther: wide open it would reach what stands beside."""
+_ASIDE_M, _LEVEL = 0.018, 0.5
+"""Fixed finger and palm leave the object by so much before the hand is drawn back, or it would drag it along."""
+_BACK_M = (0.16, 0.12, 0.08, 0.05)
 _AT_ARM_M = 0.12
 _BEYOND_M = 0.5
 
@@ -346,6 +351,22 @@ class ArmSkill(RoutineSkill[InputsT]):
     def p_HT(self) -> FloatArray:
         """Where the middle of what the gripper holds is in the hand frame (3,), m."""
         return np.array([self.gripper.grip_x_m, 0.0, 0.0])
+
+    def release_rad(self) -> float:
+        """How far the gripper opens to let go of what it holds."""
+        return min(self.context.robot.gripper().opening_rad + _RELEASE_RAD, 0.75 * self.open_rad)
+
+    def leave_object(self) -> Routine[bool]:
+        """Take fixed finger and palm off what was let go of, and draw the hand back; whether there was a way."""
+        fingers, _, closing = self.model.X_BH(self.q_rad()).rotation().matrix().T
+        if abs(closing[2]) < _LEVEL:
+            aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
+            yield from self.try_shift_hand(aside, "letting go")
+        up_B = np.array([0.0, 0.0, 1.0])
+        for way_B in (*(-back_m * fingers for back_m in _BACK_M), *(back_m * up_B for back_m in _BACK_M)):
+            if (yield from self.try_shift_hand(way_B, "drawing the hand back")):
+                return True
+        return False
 
     def look_from(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[None]:
         """Go where `goal` says to take a picture; an empty gripper, which else stands before the camera, opens."""

@@ -31,10 +31,9 @@ _SCANS = 3
 _SCAN_PATIENCE_S = 2.0
 _PERSON_SIZE_M = (0.6, 0.6, 1.8)
 _STILL_S = 0.5
-_OPEN_SHARE = 0.75
 _FREE_S = 2.0
 _LETS_GO, _KEEPS = "let go", "hold on"
-_BACK_M = (0.3, 0.2, 0.12)
+_POINTS_DOWN = 0.8
 
 
 @dataclass(frozen=True)
@@ -156,20 +155,17 @@ class HandOver(ArmSkill[HandOverInputs]):
             asked.withdraw()
 
     def _let_go(self, inputs: HandOverInputs) -> Routine[None]:
-        """Open, wait until the gripper feels nothing, and draw the hand back along its fingers."""
+        """Open, wait until the gripper feels nothing, and leave the object without dragging it."""
         message, gripper = f"giving the {inputs.thing} to {inputs.person}", self.context.robot.gripper
         self.checkpoint = {"lets_go": True}
-        yield from self.move_gripper(_OPEN_SHARE * self.open_rad, GRIPPER_FORCE_N, message)
+        yield from self.move_gripper(self.release_rad(), GRIPPER_FORCE_N, message)
         end_s = self.context.clock.now() + _FREE_S
         while gripper().holding:
             if self.context.clock.now() > end_s:
                 raise SkillFailure(Cause.POSTCONDITION, f"the {inputs.thing} is still in the open gripper")
             yield Running(message)
         yield from self.pause(_STILL_S, message)
-        fingers_B = self.model.X_BH(self.q_rad()).rotation().matrix()[:, 0]
-        for back_m in _BACK_M:
-            if (yield from self.try_shift_hand(-back_m * fingers_B, "drawing the hand back")):
-                break
+        yield from self.leave_object()
         yield from self.try_stow()
 
     def _find(self, name: str) -> Routine[SeenPerson]:
@@ -198,15 +194,19 @@ class HandOver(ArmSkill[HandOverInputs]):
         yield from go_to_one(self, [NavigateInputs(pose, 0.08, 0.1, 0.5) for pose in free[:3]])
 
     def _hold_out(self, person: SeenPerson, name: str) -> Routine[None]:
-        """Stretch the arm towards the person."""
-        R_BH = self.model.X_BH(self.q_rad()).rotation()
+        """Stretch the arm towards the person, with the object as it stood or lay, or else as it is carried.
+
+        What lies on a finger as it is carried would stay there when the gripper opens.
+        """
+        taken_R_BH, R_BH = self.context.payload.R_BH, self.model.X_BH(self.q_rad()).rotation()
+        rotations = [R_BH] if taken_R_BH is None else [taken_R_BH, R_BH]
         p_BP = self._ahead(person)
         axis = RigidTransform([*p_BP, 0.5 * _PERSON_SIZE_M[2] - self._height_m()])
         self.boxes = [Box(axis, _PERSON_SIZE_M)]
         level_m = self.options.height_m - self._height_m()
 
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
-            return hold_out_configuration(scene, R_BH, p_BP, self.p_HT, level_m, self.options.gaps_m, q)
+            return hold_out_configuration(scene, rotations, p_BP, self.p_HT, level_m, self.options.gaps_m, q)
 
         yield from self.move_to(goal, f"holding the object out to {name}", speed_rad_s=0.8)
 
@@ -239,29 +239,36 @@ def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float,
 
 def hold_out_configuration(
     scene: ArmScene,
-    R_BH: RotationMatrix,
+    rotations: Sequence[RotationMatrix],
     p_BP: FloatArray,
     p_HT: FloatArray,
     level_m: float,
     gaps_m: Sequence[float],
     q_near_rad: FloatArray,
 ) -> FloatArray:
-    """Arm angles with the object before the person, as upright as it is held; level_m is its height in B.
+    """Arm angles with the object before the person; level_m is its height in B.
 
-    The person's axis is at p_BP (2,), the middle of the object at p_HT. Raises PlanningError out of the arm's reach.
+    The hand is turned as in the first R_BH of `rotations` that does, about the vertical towards the person. The
+    person's axis is at p_BP (2,), the middle of the object at p_HT. Raises PlanningError out of the arm's reach.
     """
     direction = math.atan2(p_BP[1], p_BP[0])
     heading = np.array([math.cos(direction), math.sin(direction), 0.0])
-    x_axis = R_BH.matrix()[:, 0]
-    turn = RotationMatrix.MakeZRotation(direction - math.atan2(x_axis[1], x_axis[0]))
-    for gap, lower in itertools.product(gaps_m, (0.0, 0.1, 0.2)):
+    turned = (each for R_BH in rotations for each in _towards(R_BH, direction))
+    for rotation, gap, lower in itertools.product(turned, gaps_m, (0.0, 0.1, 0.2)):
         p_BT = (float(np.linalg.norm(p_BP)) - gap) * heading + np.array([0.0, 0.0, level_m - lower])
-        rotation = turn @ R_BH
         X_BH = RigidTransform(rotation, p_BT - rotation.matrix() @ p_HT)
         free = [q for q in scene.model.inverse(X_BH, margin_rad=0.05) if scene.free(q)]
         if free:
             return min(free, key=lambda q: float(np.max(np.abs(q - q_near_rad))))
     raise PlanningError("the arm cannot hold the object out near enough to the person from here")
+
+
+def _towards(R_BH: RotationMatrix, direction_rad: float) -> list[RotationMatrix]:
+    """The hand turned about the vertical so that it points in a direction; one that points down in any of four."""
+    x_axis = R_BH.matrix()[:, 0]
+    ahead = direction_rad - math.atan2(x_axis[1], x_axis[0])
+    turns = (0.0, math.pi / 2, -math.pi / 2, math.pi) if x_axis[2] < -_POINTS_DOWN else (0.0,)
+    return [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in turns]
 
 
 def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:

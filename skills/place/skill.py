@@ -39,7 +39,7 @@ _PRESS_M = 0.03
 _LAG_IN_CONTACT_M = 0.02
 """A hand that goes down fast lags by so much only in contact: what it holds hangs lower than was thought."""
 _SIDE_DROP_M, _LIFT_AGAIN_M = 0.12, 0.135
-_LEAST_BACK_M, _BACK_M = 0.08, (0.16, 0.12, 0.08, 0.05)
+_LEAST_BACK_M = 0.08
 """How far the hand is drawn back, the best first; a spot counts only where the hand gets back by the former."""
 _MARGIN_RAD = 0.05
 _MOST_SPOTS = 80
@@ -54,10 +54,6 @@ _STANDS_OUT_M, _HIGHEST_M, _OFF_SURFACE_M = 0.03, 0.5, 0.01
 _AT_HAND_M, _HIDDEN = 0.4, 0.5
 """A picture of which half is nearer than that, or too near to tell, shows what is held and not what lies behind it."""
 _OVER_SPOT_M = 0.45
-_RELEASE_RAD = 0.4
-"""The finger opens so far to let go, and no farther: wide open it would reach what stands beside."""
-_ASIDE_M = 0.018
-"""Fixed finger and palm leave the object by so much before the hand is drawn back, or it would drag it along."""
 
 
 @dataclass(frozen=True)
@@ -316,7 +312,7 @@ class Place(ArmSkill[PlaceInputs]):
         on_top = [X_BW @ np.array([x, y, view.plane.height_m]) for x, y in near]
         beside = cluster_boxes(view.clusters, X_WB)
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
-        letting_go = Release(beside, self._release_rad())
+        letting_go = Release(beside, self.release_rad())
         goal = above_goal(on_top, held, self.context.stack.arm_planner, letting_go)
         return (yield from self.move_to(goal, f"bringing the object over the {surface.name}", speed_rad_s=0.8))
 
@@ -353,22 +349,11 @@ class Place(ArmSkill[PlaceInputs]):
         raise SkillFailure(Cause.PLANNING, str(why)) from why
 
     def _let_go(self) -> Routine[None]:
-        """Open, take fixed finger and palm off the object, and draw the hand back along its fingers."""
-        yield from self.move_gripper(self._release_rad(), GRIPPER_FORCE_N, "letting go")
+        """Open, and leave the object without dragging it."""
+        yield from self.move_gripper(self.release_rad(), GRIPPER_FORCE_N, "letting go")
         yield from self.pause(0.3, "letting go")
-        fingers, _, closing = self.model.X_BH(self.q_rad()).rotation().matrix().T
-        if abs(closing[2]) < _LEVEL:
-            aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
-            yield from self.try_shift_hand(aside, "letting go")
-        up_B = np.array([0.0, 0.0, 1.0])
-        for way_B in (*(-back_m * fingers for back_m in _BACK_M), *(back_m * up_B for back_m in _BACK_M)):
-            if (yield from self.try_shift_hand(way_B, "drawing the hand back")):
-                return
-        raise SkillFailure(Cause.PLANNING, "the hand cannot be drawn back from the object")
-
-    def _release_rad(self) -> float:
-        """How far the gripper opens to let go of what it holds."""
-        return min(self.context.robot.gripper().opening_rad + _RELEASE_RAD, 0.75 * self.open_rad)
+        if not (yield from self.leave_object()):
+            raise SkillFailure(Cause.PLANNING, "the hand cannot be drawn back from the object")
 
     def _check(self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box] = ()) -> Routine[None]:
         """Raise SkillFailure with cause POSTCONDITION unless something stands where the object was put.

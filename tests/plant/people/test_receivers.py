@@ -102,6 +102,16 @@ class Hall:
         self.robot.set_gripper(1.2, 20.0, until_s=self.engine.now() + 3.0, lease=self.lease)
 
 
+def test_the_tray_goes_down_before_the_body_before_it_comes_near_what_may_hang_low(tmp_path):
+    hall = Hall(tmp_path).until(Phase.BRINGING)
+    tray, lowest_m = hall.world.trays["Kim"], hall.place_W(hall.can)[2] - 0.06
+    while hall.kim.phase is not Phase.PULLING:
+        x, _, z = hall.place_W(tray)
+        under = math.dist((x, 0.0), hall.place_W(hall.can)[:2]) < 0.05
+        assert under or x > 1.4 or z < lowest_m - 0.1
+        hall.engine.advance(0.05)
+
+
 def test_the_tray_comes_under_what_is_held_out_without_touching_it(tmp_path):
     hall = Hall(tmp_path)
     tray, before_W = hall.world.trays["Kim"], hall.place_W(hall.can)

@@ -50,6 +50,12 @@ def test_on_failure_retry_is_one_retry_unless_said(load):
     assert [step.over(None).retries for step in load(text).steps] == [1, 3]
 
 
+def test_moving_aside_is_allowed_for_a_step_or_for_each(load):
+    text = "name: x\neach: {move_aside: 1}\nsteps:\n  - {to: hall}\n  - {to: hall, move_aside: 0}\n"
+    file = load(text)
+    assert [step.over(file.each).move_aside for step in file.steps] == [1, 0]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "line", "says"),
     [

@@ -13,6 +13,7 @@ from pydrake.math import RigidTransform
 
 from skills.api import Cause, InputsT, Running, SkillContext
 from skills.arm.collision import ArmScene, Box
+from skills.arm.hold import Grip, HoldWatch, grip_again
 from skills.arm.kinematics import ArmModel, arm_model
 from skills.arm.routine import Routine, RoutineSkill, SkillFailure
 from skills.arm.solid_cells import solid_boxes, with_picture, with_view
@@ -116,6 +117,21 @@ class ArmSkill(RoutineSkill[InputsT]):
     def _forget(self) -> None:
         self.boxes, self.held, self.known_W, self._scene = (), (), (), None
         self._rng = np.random.default_rng(self.context.seed)
+
+    _watch: HoldWatch | None = None
+
+    def lost(self, message: str) -> SkillFailure | None:
+        """A failure of that message when what `_watch` watches is lost; what begins to slip is gripped again."""
+        if self._watch is None:
+            return None
+        context = self.context
+        grip = self._watch.judge(context.robot.gripper(), context.clock.now())
+        if grip is Grip.SLIPPING:
+            self.issue(grip_again(context.robot, self._watch.force_n, clock=context.clock, lease=context.lease))
+        if grip is not Grip.LOST:
+            return None
+        self._watch = None
+        return SkillFailure(Cause.POSTCONDITION, message)
 
     def hand_near(self, p_W: FloatArray, within_m: float) -> bool:
         """Whether the hand is this near to a point in the world."""

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, box_corners
-from skills.arm.hold import Grip, HoldWatch, grip_again
+from skills.arm.hold import HoldWatch
 from skills.arm.poses import (
     carry_configuration,
     close_viewpoints,
@@ -226,8 +226,6 @@ class Grasp(ArmSkill[GraspInputs]):
         message = f"choosing how high to stand before the {seen.thing}"
         return (yield from self.compute(choose, latency_s=0.1, name="choose a height", message=message))
 
-    _watch: HoldWatch | None = None
-
     def begin(self, inputs: GraspInputs) -> None:
         """Forget an earlier attempt, but not the grasps that `inputs` names."""
         self._tried, self._watch = inputs.avoid, None
@@ -240,16 +238,7 @@ class Grasp(ArmSkill[GraspInputs]):
 
     def trouble(self) -> SkillFailure | None:
         """That the object fell while it is lifted and drawn back; what begins to slip is gripped again."""
-        if self._watch is None:
-            return None
-        context = self.context
-        grip = self._watch.judge(context.robot.gripper(), context.clock.now())
-        if grip is Grip.SLIPPING:
-            self.issue(grip_again(context.robot, self._watch.force_n, clock=context.clock, lease=context.lease))
-        if grip is not Grip.LOST:
-            return None
-        self._watch = None
-        return SkillFailure(Cause.POSTCONDITION, "the object fell out of the gripper while it was lifted")
+        return self.lost("the object fell out of the gripper while it was lifted")
 
     def _telling(self, failure: SkillFailure) -> SkillFailure:
         """A failure that says which grasps were tried, and what was in the way."""

@@ -15,7 +15,7 @@ from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.approach.standing import go_to_one
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.collision import ArmScene, Box
-from skills.arm.hold import Grip, HoldWatch, grip_again
+from skills.arm.hold import HoldWatch
 from skills.arm.pull import PullWatch
 from skills.arm.routine import Routine, SkillFailure
 from skills.geometry import wrap
@@ -81,7 +81,6 @@ class HandOver(ArmSkill[HandOverInputs]):
     changes_world = True
     gripper_before = True
     gripper_after = False
-    _watch: HoldWatch | None = None
 
     def begin(self, inputs: HandOverInputs) -> None:
         """Forget an earlier attempt."""
@@ -95,16 +94,7 @@ class HandOver(ArmSkill[HandOverInputs]):
 
     def trouble(self) -> SkillFailure | None:
         """That the object is lost while it is held out; what begins to slip is gripped again."""
-        if self._watch is None:
-            return None
-        context = self.context
-        grip = self._watch.judge(context.robot.gripper(), context.clock.now())
-        if grip is Grip.SLIPPING:
-            self.issue(grip_again(context.robot, self._watch.force_n, clock=context.clock, lease=context.lease))
-        if grip is not Grip.LOST:
-            return None
-        self._watch = None
-        return SkillFailure(Cause.POSTCONDITION, "the object was lost while it was held out")
+        return self.lost("the object was lost while it was held out")
 
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
         """Find, go, hold out, wait, let go."""

@@ -268,7 +268,7 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
             "place_error_m": place_error_m(ran.spot_W, middle_W) if put else None,
             "others_disturbed": sum(disturbed(before[name], after[name]) for name in before if name != TARGET),
             "claimed": claimed,
-            "false_claim": is_false_claim(claimed, watch),
+            "false_claim": is_false_claim(claimed, lifted=watch.lifted, held_s=watch.longest_s),
             "collisions": len(simulation.referee.collisions),
             "cause": "" if succeeded else f"{ran.result.cause}: {ran.result.message}",
             "sim_time_s": round(simulation.clock.now(), 1),
@@ -280,12 +280,12 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
         return judged, ending_picture(simulation, middle_W) if pictured else None
 
 
-def is_false_claim(claimed: bool, watch: Watch) -> bool:
+def is_false_claim(claimed: bool, *, lifted: bool, held_s: float) -> bool:
     """Whether "holding" was claimed of what was never lifted, or never of what was held for long.
 
     What falls as it is lifted, and is not claimed, is told rightly.
     """
-    return (claimed and not watch.lifted) or (not claimed and watch.longest_s >= HELD_S)
+    return (claimed and not lifted) or (not claimed and held_s >= HELD_S)
 
 
 def has_grasped(notes: Sequence[tuple[float, Mapping[str, Any]]]) -> bool:

@@ -15,6 +15,7 @@ from tests.benchmarks.manipulation import (
     TimedWorker,
     failure,
     failures,
+    is_false_claim,
     near_upright,
     place_error_m,
     spread,
@@ -60,6 +61,21 @@ def test_only_what_stands_upright_within_5_cm_counts_as_near(run, near):
 )
 def test_a_failure_is_told_by_the_mission_or_else_by_the_truth(run, why):
     assert failure(run) == why
+
+
+# claimed, lifted, held (s) -> a false claim
+@pytest.mark.parametrize(
+    ("claimed", "lifted", "held_s", "false"),
+    [
+        (True, True, 12.0, False),
+        (True, False, 0.0, True),
+        (False, True, 12.0, True),
+        (False, True, 0.4, False),  # fell as it was lifted
+        (False, False, 0.0, False),
+    ],
+)
+def test_a_false_claim_is_of_what_was_never_lifted_or_none_of_what_was_held(claimed, lifted, held_s, false):
+    assert is_false_claim(claimed, lifted=lifted, held_s=held_s) is false
 
 
 def test_failures_are_counted_by_class_and_cause():

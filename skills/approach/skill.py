@@ -96,6 +96,7 @@ class Approach(ArmSkill[ApproachInputs]):
         check_now = reach_check(self, seen, own_surfaces(inputs), beyond_m=off_m)
 
         def choose() -> tuple[list[Standing], FloatArray]:
+            """The places and the arm there, by one collision scene for all poses."""
             check = check_now()
 
             def cost_at(pose: Pose2D) -> float | None:

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.robot import CommandState, CommandStatus, Image, Robot
-from skills.testing.pulling import pulled
+from skills.faults.pulling import pulled
+from skills.robot import CommandState, CommandStatus, Image, NoImageError, Robot
 
 THIEF: Final = "the tablet"
 """Who takes the lease in "lease taken"."""
@@ -67,13 +67,15 @@ class Effect:
 class FaultKind:
     """A fault by name: the words (a pattern with named groups), an example, and the effect of a match.
 
-    Raises ValueError from `effect` when the words match but name nothing that there is.
+    Raises ValueError from `effect` when the words match but name nothing that there is. `random` are the words by which
+    it is drawn at random, with {camera}, {sensor}, {motion}, {metres}, {span} and {at}; without, it never is.
     """
 
     pattern: str
     example: str
     meaning: str
     effect: Callable[[re.Match[str]], Effect]
+    random: str = ""
 
 
 class InjectedFault(RuntimeError):  # noqa: N818 - it stands for any defect of a driver
@@ -107,8 +109,25 @@ def _freezes(match: re.Match[str]) -> Effect:
             call.memory[call.source] = call.proceed()
         return call.memory[call.source]
 
+    return Effect(_sensors(match), act, watch)
+
+
+def _sensors(match: re.Match[str]) -> frozenset[str]:
+    """The sense verb that the words name, or all."""
     everything = match["verb"] in ("sensors", "everything")
-    return Effect(frozenset(SENSE_VERBS) if everything else _among(match, SENSE_VERBS), act, watch)
+    return frozenset(SENSE_VERBS) if everything else _among(match, SENSE_VERBS)
+
+
+def _drops_out(match: re.Match[str]) -> Effect:
+    """There are no new readings, and no pictures at all."""
+    frozen = _freezes(match)
+
+    def act(call: Call) -> Any:
+        if call.verb == "image":
+            raise NoImageError(f"the camera '{call.arguments[0]}' gives no picture")
+        return frozen.act(call)
+
+    return replace(frozen, act=act)
 
 
 def _raises(match: re.Match[str]) -> Effect:
@@ -252,11 +271,37 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         "camera freezes at 3 s",
         'a sensor, or all ("sensors"), gives its last reading over and over',
         _freezes,
+        "{sensor}: freezes {span}",
+    ),
+    FaultKind(
+        r"(?P<verb>\w+) (?:has a )?(?:dropout|drops out)",
+        "camera.hand: dropout 5 s at 20 s",
+        'a sensor, or all ("sensors"), gives no new readings; a camera gives no pictures',
+        _drops_out,
+        "{sensor}: dropout {span}",
     ),
     FaultKind(r"(?P<verb>\w+)(?: verb)? raises", "drive raises at 2 s", "a verb raises an exception", _raises),
-    FaultKind(r"(?P<verb>\w+) refuses", "arm refuses", "a motion verb refuses its commands", _refuses),
-    FaultKind(r"(?P<verb>\w+) never ends", "stand never ends", "commands stay under way and do nothing", _never_ends),
-    FaultKind(r"(?P<verb>\w+) is stopped", "arm is stopped at 1 s", "commands are stopped at once", _is_stopped),
+    FaultKind(
+        r"(?P<verb>\w+) refuses",
+        "arm refuses",
+        "a motion verb refuses its commands",
+        _refuses,
+        "{motion} refuses {span}",
+    ),
+    FaultKind(
+        r"(?P<verb>\w+) never ends",
+        "stand never ends",
+        "commands stay under way and do nothing",
+        _never_ends,
+        "{motion} never ends {span}",
+    ),
+    FaultKind(
+        r"(?P<verb>\w+) is stopped",
+        "arm is stopped at 1 s",
+        "commands are stopped at once",
+        _is_stopped,
+        "{motion} is stopped {span}",
+    ),
     FaultKind(
         r"gripper reports holding(?: (?P<what>nothing|something))?",
         "gripper reports holding nothing",
@@ -268,15 +313,23 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         "gripper loses it at 20 s",
         "what the gripper holds then, or takes next, falls out of it, once",
         _loses,
+        "gripper loses it {at}",
     ),
     FaultKind(
         r"(?:image|camera) returns (?P<what>NaN|nan|no) depth",
         "image returns NaN depth",
         "pictures come with depth that is NaN, or none",
         _no_depth,
+        "{camera}: returns no depth {span}",
     ),
-    FaultKind(r"(?:image|camera) is black", "camera is black from 1 s", "pictures show nothing, depth stays", _black),
-    FaultKind(r"(?:scan|lidar) is missing", "scan is missing", "there is no scan", _missing),
+    FaultKind(
+        r"(?:image|camera) is black",
+        "camera is black from 1 s",
+        "pictures show nothing, depth stays",
+        _black,
+        "{camera}: is black {span}",
+    ),
+    FaultKind(r"(?:scan|lidar) is missing", "scan is missing", "there is no scan", _missing, "lidar is missing {span}"),
     FaultKind(r"(?P<verb>\w+) returns garbage", "joints returns garbage", "a sensor's numbers are NaN", _garbage),
     FaultKind(
         r"hand is pulled with (?P<force>\d+(?:\.\d+)?) N",
@@ -289,6 +342,7 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         "odometry jumps 0.5 m at 2 s",
         "dead reckoning is off by so much ahead",
         _jumps,
+        "odometry jumps {metres} m {at}",
     ),
     FaultKind(
         r"battery falls to (?P<percent>\d+(?:\.\d+)?) ?%",

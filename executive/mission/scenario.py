@@ -1,0 +1,52 @@
+"""Scenarios: what goes wrong with the robot, and what happens in its world, while a mission runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+__all__ = ["Scenario"]
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What goes wrong and what happens, understood: words of faults, how many the seed draws, and events as plain data.
+
+    `people` are routes by name, `doors` doorways with the times at which they close and open, `moves` objects with the
+    time at which they are moved and where to; all points are in the world frame, in metres.
+    """
+
+    faults: tuple[str, ...] = ()
+    random: int = 0
+    people: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    doors: tuple[Mapping[str, Any], ...] = ()
+    moves: tuple[Mapping[str, Any], ...] = ()
+
+    def __bool__(self) -> bool:
+        return self != Scenario()
+
+    def and_also(self, other: Scenario) -> Scenario:
+        """Both together."""
+        return Scenario(
+            (*self.faults, *other.faults),
+            self.random + other.random,
+            {**self.people, **other.people},
+            (*self.doors, *other.doors),
+            (*self.moves, *other.moves),
+        )
+
+    def with_drawn(self, faults: tuple[str, ...]) -> Scenario:
+        """The same with the random faults drawn."""
+        return replace(self, faults=(*self.faults, *faults), random=0)
+
+    def to_text(self) -> str:
+        """As JSON."""
+        return json.dumps({"faults": self.faults, "people": self.people, "doors": self.doors, "moves": self.moves})
+
+    @staticmethod
+    def of_text(text: str) -> Scenario:
+        """What `to_text` wrote."""
+        told = json.loads(text)
+        return Scenario(tuple(told["faults"]), 0, told["people"], tuple(told["doors"]), tuple(told["moves"]))

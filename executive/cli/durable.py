@@ -81,7 +81,8 @@ def next_run(store: MissionStore, mission: StoredMission, before: StoredMission)
 def same_world(one: StoredMission, other: StoredMission) -> bool:
     """Whether two missions are to be done by one robot in one world."""
     a, b = one.request, other.request
-    return (a.world, a.world_name, a.seed, a.robot) == (b.world, b.world_name, b.seed, b.robot)
+    same = (a.world, a.world_name, a.seed, a.robot) == (b.world, b.world_name, b.seed, b.robot)
+    return same and a.scenario == b.scenario
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from executive.cli.mission_run import Finished
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Prepared, prepare
-from executive.cli.run_options import SET, START_OR_UNKNOWN
+from executive.cli.run_options import FAULT, RANDOM_FAULTS, SCENARIO, SET, START_OR_UNKNOWN
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
@@ -27,6 +27,7 @@ from executive.cli.sweep import rows, seed_range, sweep, totals
 from executive.language.questions import QuestionPolicy
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
+from executive.mission.scenario import Scenario
 from executive.record.profile import Profile, lines
 from executive.store.missions import MissionStore
 
@@ -73,6 +74,9 @@ def run(
     stack: STACK = None,
     own_map: OwnMap = None,
     start: START_OR_UNKNOWN = None,
+    fault: FAULT = None,
+    random_faults: RANDOM_FAULTS = 0,
+    scenario: SCENARIO = None,
     anyway: Anyway = False,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
@@ -93,7 +97,9 @@ def run(
             say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
-        asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
+        disturbed = Scenario(tuple(fault or ()), random_faults)
+        asked = replace(asked, given=given_values(given or ()), start=at, map=own_map, scenario=disturbed)
+        asked = replace(asked, scenario_file=scenario)
         finished, page = _run_kept(
             asked,
             kept_in,

@@ -35,7 +35,7 @@ class RunReport:
     """One run, with the keys that scripts rely on.
 
     Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name. `referee` is None
-    where nobody but the robot saw what happened.
+    where nobody but the robot saw what happened. `scenario` tells what went wrong and happened by intention.
     """
 
     outcome: str
@@ -51,6 +51,7 @@ class RunReport:
     ticks: int
     log: str
     work: Mapping[str, int] = field(default_factory=dict)
+    scenario: tuple[str, ...] = ()
 
     @property
     def claimed(self) -> bool:
@@ -75,6 +76,7 @@ class RunReport:
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values; the referee's events are for people only."""
         values = {**asdict(replace(self, work={})), "commands": list(self.commands), "work": dict(self.work)}
+        values["scenario"] = list(self.scenario)
         if self.referee is not None:
             del values["referee"]["events"]
         return values
@@ -84,7 +86,8 @@ class RunReport:
         """A report that another process has printed."""
         fields = {key: values[key] for key in RunReport.__dataclass_fields__}
         referee = None if values["referee"] is None else RefereeReport(**values["referee"])
-        return RunReport(**{**fields, "referee": referee, "commands": tuple(values["commands"])})
+        listed = {key: tuple(values[key]) for key in ("commands", "scenario")}
+        return RunReport(**{**fields, **listed, "referee": referee})
 
     def lines(self) -> tuple[str, ...]:
         """The two verdicts and the figures, with rich markup."""

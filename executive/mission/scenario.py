@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
-__all__ = ["Scenario"]
+__all__ = ["NO_SCENARIO", "Scenario"]
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Scenario:
     moves: tuple[Mapping[str, Any], ...] = ()
 
     def __bool__(self) -> bool:
-        return self != Scenario()
+        return self != NO_SCENARIO
 
     def and_also(self, other: Scenario) -> Scenario:
         """Both together."""
@@ -41,6 +41,15 @@ class Scenario:
         """The same with the random faults drawn."""
         return replace(self, faults=(*self.faults, *faults), random=0)
 
+    def lines(self) -> tuple[str, ...]:
+        """What goes wrong and happens, one line each."""
+        people = (f"{name} sets off at {route['start']:g} s" for name, route in self.people.items())
+        doors = (f"the {door['name']} {_times(door)}" for door in self.doors)
+        moves = (
+            f"somebody moves the {each['name']} at {each['at']:g} s to {_where(each['to'])}" for each in self.moves
+        )
+        return (*(f"fault: {words}" for words in self.faults), *people, *doors, *moves)
+
     def to_text(self) -> str:
         """As JSON."""
         return json.dumps({"faults": self.faults, "people": self.people, "doors": self.doors, "moves": self.moves})
@@ -50,3 +59,17 @@ class Scenario:
         """What `to_text` wrote."""
         told = json.loads(text)
         return Scenario(tuple(told["faults"]), 0, told["people"], tuple(told["doors"]), tuple(told["moves"]))
+
+
+NO_SCENARIO: Final = Scenario()
+"""Nothing goes wrong, and nothing happens but what the robot does."""
+
+
+def _times(door: Mapping[str, Any]) -> str:
+    """When a door closes and opens, in order."""
+    told = sorted((door[verb], verb) for verb in ("closes", "opens") if door[verb] is not None)
+    return " and ".join(f"{verb} at {at_s:g} s" for at_s, verb in told)
+
+
+def _where(to: Any) -> str:
+    return f"the {to}" if isinstance(to, str) else "({:g}, {:g}, {:g})".format(*to)

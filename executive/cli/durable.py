@@ -35,6 +35,9 @@ def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
     arguments += [] if asked.start is None else [f"--start={asked.start}"]
     arguments += [f"--set={name}={json.dumps(value)}" for name, value in asked.given.items()]
     arguments += ["--map", str(asked.map)] if asked.map else []
+    arguments += [f"--fault={words}" for words in asked.scenario.faults]
+    arguments += [f"--random-faults={asked.scenario.random}"] if asked.scenario.random else []
+    arguments += [f"--scenario={path}" for path in asked.scenario_files]
     if asked.file is None:
         return arguments
     arguments += [part for answer in asked.answers for part in ("--answer", answer)]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -23,7 +23,16 @@ from executive.cli.run_options import FAULT, RANDOM_FAULTS, SCENARIO, SET, START
 from executive.cli.shown import control_for, show_files, show_run
 from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
-from executive.cli.sweep import rows, seed_range, sweep, totals
+from executive.cli.sweep import (
+    COUNTS,
+    condition_rows,
+    condition_totals,
+    conditions,
+    rows,
+    seed_range,
+    sweep_each,
+    totals,
+)
 from executive.language.questions import QuestionPolicy
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
@@ -97,9 +106,8 @@ def run(
             say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
-        disturbed = Scenario(tuple(fault or ()), random_faults)
-        asked = replace(asked, given=given_values(given or ()), start=at, map=own_map, scenario=disturbed)
-        asked = replace(asked, scenario_file=scenario)
+        asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
+        asked = _disturbed(asked, fault, random_faults, scenario)
         finished, page = _run_kept(
             asked,
             kept_in,
@@ -134,32 +142,57 @@ def evaluate(
     stack: STACK = None,
     own_map: OwnMap = None,
     start: START_OR_UNKNOWN = None,
+    fault: FAULT = None,
+    random_faults: RANDOM_FAULTS = 0,
+    scenario: SCENARIO = None,
+    each_fault: Annotated[
+        bool, typer.Option("--each-fault", help="Without any, then with each fault and scenario alone.")
+    ] = False,
     anyway: Anyway = False,
     out: Annotated[Path, typer.Option(help="Folder for the logs.")] = Path("out/evaluate"),
     as_json: AsJson = False,
 ) -> None:
-    """Run a mission at many seeds and count what the trees claim and what the referee saw."""
+    """Run a mission at many seeds and count what the trees claim and what the referee saw.
+
+    Faults and scenarios are all in each run, unless each is to be tried alone.
+    """
     with refusals():
         chosen = seed_range(seeds)
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, stack=stack, start=at, map=own_map)
         asked = replace(asked, given=given_values(given or ()))
+        asked = _disturbed(asked, fault, random_faults, scenario)
         prepared = _prepared(asked, anyway=anyway)
-        arguments = run_arguments(asked, prepared)
+        tried = [(name, run_arguments(each, prepared)) for name, each in conditions(asked, each=each_fault)]
     console = console_for(as_json)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as bar:
-        task = bar.add_task("seeds", total=len(chosen))
-        reports = sweep(arguments, chosen, jobs=jobs, out=out, done=lambda report: bar.advance(task))
+        task = bar.add_task("runs", total=len(chosen) * len(tried))
+        found = sweep_each(tried, chosen, jobs=jobs, out=out, done=lambda report: bar.advance(task))
     header = ("seed", "tree", "referee", "collisions", "drops", "sim s", "x real", "message")
-    show_table(console, header, rows(reports))
+    reports = [report for _, each in found for report in each]
+    for name, runs in found:
+        if each_fault:
+            console.print(f"\n{name}", style="bold", markup=False)
+        show_table(console, header, rows(runs))
     result = totals(reports)
-    counts = ", ".join(f"{result[key]} {key.replace('_', ' ')}" for key in _COUNTS)
+    if each_fault:
+        console.print()
+        show_table(console, ("condition", "runs", "tree", "referee", "false claims"), condition_rows(found))
+        result["conditions"] = condition_totals(found)
+    counts = ", ".join(f"{result[key]} {key.replace('_', ' ')}" for key in COUNTS)
     console.print(f"{len(reports)} runs: {counts}")
     if as_json:
         print_json(result)
     if not all(report.achieved for report in reports):
         raise typer.Exit(NOT_ACHIEVED)
+
+
+def _disturbed(
+    asked: Request, faults: Sequence[str] | None, random_faults: int, files: Sequence[Path] | None
+) -> Request:
+    """The request with what is to go wrong and to happen."""
+    return replace(asked, scenario=Scenario(tuple(faults or ()), random_faults), scenario_files=tuple(files or ()))
 
 
 def _prepared(asked: Request, *, anyway: bool) -> Prepared:
@@ -201,6 +234,3 @@ def _run_kept(
             ended(finished.report)
     show_files(asked.out, console)
     return finished, shown
-
-
-_COUNTS: Final = ("successes", "referee_successes", "false_claims")

@@ -155,7 +155,7 @@ def _commanded(request: Request, world: World) -> Mission:
 def _prepared(
     request: Request, mission: Mission, world: World, knowledge: Knowledge, meant: Understanding | None = None
 ) -> Prepared:
-    if request.scenario or request.scenario_file is not None:
+    if request.scenario or request.scenario_files:
         from executive.cli.scenarios import with_happenings, with_scenario
 
         request = with_scenario(request, world, knowledge)

@@ -42,7 +42,8 @@ FAULT = Annotated[
     ),
 ]
 SCENARIO = Annotated[
-    Path | None, typer.Option("--scenario", help="A file of faults and events: people walk, doors close, objects move.")
+    list[Path] | None,
+    typer.Option("--scenario", metavar="FILE", help="Faults and events: people walk, doors close, objects are moved."),
 ]
 RANDOM_FAULTS = Annotated[int, typer.Option("--random-faults", min=0, max=100, help="So many faults, by the seed.")]
 SET = Annotated[

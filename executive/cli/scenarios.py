@@ -27,22 +27,25 @@ _BEYOND_M: Final = 0.5
 
 
 def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Request:
-    """The request with its scenario file read and its random faults drawn.
+    """The request with its scenario files read and its random faults drawn.
 
-    Raises InputError: a fault is none, with the line where it has one, or something in the file is not in the world.
+    Raises InputError: a fault is none, with the line where it has one, or something in a file is not in the world.
     """
     cameras = tuple(camera.source for camera in spot_capabilities().cameras)
     scenario = request.scenario
     for words in scenario.faults:
         checked_fault(words, cameras)
-    if request.scenario_file is not None:
-        file, source = load_scenario(request.scenario_file)
-        objects = {rule.name: _class_of(rule.model, world) for rule in world.seed_rules.objects}
-        people = {rule.name: rule.route is not None for rule in world.seed_rules.people}
+    objects = {rule.name: _class_of(rule.model, world) for rule in world.seed_rules.objects}
+    people = {rule.name: rule.route is not None for rule in world.seed_rules.people}
+    for path in request.scenario_files:
+        file, source = load_scenario(path)
         read = scenario_of(file, source, knowledge, cameras=cameras, objects=objects, people=people)
+        twice = read.moving & scenario.moving
+        if twice:
+            raise InputError(f"another scenario has an event of {min(twice)}", hint="keep one of them", file=path)
         scenario = scenario.and_also(_with_doorways(read, world))
     drawn = random_faults(scenario.random, request.seed, cameras)
-    return replace(request, scenario=scenario.with_drawn(drawn), scenario_file=None)
+    return replace(request, scenario=scenario.with_drawn(drawn), scenario_files=())
 
 
 def with_happenings(world: World, scenario: Scenario) -> World:

@@ -54,10 +54,10 @@ class Request:
     further ones. `given` are values for a file's parameters; the robot stands at `start`, where the world's own is not
     meant. `out` is the folder for the run's files, `stack` the file that says what the robot uses, `map` the
     folder of the map that it has in place of the world's own. `scenario` is what goes wrong and happens meanwhile, and
-    `scenario_file` more of it.
+    `scenario_files` hold more of it.
 
     What stands below `given` is filled once it is understood. Then another process can take it up: a sentence has the
-    answers in their places, `text` is that of the file, and `scenario` holds all that the file says and the seed draws.
+    answers in their places, `text` is that of the file, and `scenario` holds all that its files say and the seed draws.
     """
 
     sentence: str | None = None
@@ -73,7 +73,7 @@ class Request:
     map: Path | None = None
     start: Start | None = None
     scenario: Scenario = NO_SCENARIO
-    scenario_file: Path | None = None
+    scenario_files: tuple[Path, ...] = ()
     given: Mapping[str, Any] = field(default_factory=dict)
     name: str = ""
     world_name: str = ""

@@ -27,6 +27,11 @@ class Scenario:
     def __bool__(self) -> bool:
         return self != NO_SCENARIO
 
+    @property
+    def moving(self) -> set[str]:
+        """The people and doors that it moves, by name; in one run, only one scenario may move each."""
+        return {*self.people, *(door["name"] for door in self.doors)}
+
     def and_also(self, other: Scenario) -> Scenario:
         """Both together."""
         return Scenario(
@@ -45,9 +50,7 @@ class Scenario:
         """What goes wrong and happens, one line each."""
         people = (f"{name} sets off at {route['start']:g} s" for name, route in self.people.items())
         doors = (f"the {door['name']} {_times(door)}" for door in self.doors)
-        moves = (
-            f"somebody moves the {each['name']} at {each['at']:g} s to {_where(each['to'])}" for each in self.moves
-        )
+        moves = (f"somebody moves the {_moved(move)} at {move['at']:g} s" for move in self.moves)
         return (*(f"fault: {words}" for words in self.faults), *people, *doors, *moves)
 
     def to_text(self) -> str:
@@ -71,5 +74,7 @@ def _times(door: Mapping[str, Any]) -> str:
     return " and ".join(f"{verb} at {at_s:g} s" for at_s, verb in told)
 
 
-def _where(to: Any) -> str:
-    return f"the {to}" if isinstance(to, str) else "({:g}, {:g}, {:g})".format(*to)
+def _moved(move: Mapping[str, Any]) -> str:
+    """What is moved, and where to."""
+    to = move["to"]
+    return f"{move['name']} to {f'the {to}' if isinstance(to, str) else '({:g}, {:g}, {:g})'.format(*to)}"

@@ -28,9 +28,10 @@ from executive.cli.sweep import (
     condition_rows,
     condition_totals,
     conditions,
+    folders,
     rows,
     seed_range,
-    sweep_each,
+    sweep,
     totals,
 )
 from executive.language.questions import QuestionPolicy
@@ -168,7 +169,10 @@ def evaluate(
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as bar:
         task = bar.add_task("runs", total=len(chosen) * len(tried))
-        found = sweep_each(tried, chosen, jobs=jobs, out=out, done=lambda report: bar.advance(task))
+        found = [
+            (name, sweep(arguments, chosen, jobs=jobs, out=folder, done=lambda report: bar.advance(task)))
+            for (name, arguments), folder in zip(tried, folders(out, [name for name, _ in tried]), strict=True)
+        ]
     header = ("seed", "tree", "referee", "collisions", "drops", "sim s", "x real", "message")
     reports = [report for _, each in found for report in each]
     for name, runs in found:

@@ -77,6 +77,8 @@ class RunReport:
         """The report as JSON values; the referee's events are for people only."""
         values = {**asdict(replace(self, work={})), "commands": list(self.commands), "work": dict(self.work)}
         values["scenario"] = list(self.scenario)
+        if not self.scenario:
+            del values["scenario"]
         if self.referee is not None:
             del values["referee"]["events"]
         return values
@@ -84,6 +86,7 @@ class RunReport:
     @staticmethod
     def from_json(values: Mapping[str, Any]) -> RunReport:
         """A report that another process has printed."""
+        values = {"scenario": (), **values}
         fields = {key: values[key] for key in RunReport.__dataclass_fields__}
         referee = None if values["referee"] is None else RefereeReport(**values["referee"])
         listed = {key: tuple(values[key]) for key in ("commands", "scenario")}

@@ -61,21 +61,11 @@ def conditions(asked: Request, *, each: bool) -> list[tuple[str, Request]]:
     return [("no fault", plain), *alone]
 
 
-def sweep_each(
-    tried: Sequence[tuple[str, Sequence[str]]],
-    seeds: Sequence[int],
-    *,
-    jobs: int,
-    out: Path,
-    done: Callable[[RunReport], None],
-) -> list[Found]:
-    """`sweep` under each of some conditions, given by name with the arguments; logs of each in a folder of its own."""
-    named = [out / f"{number}-{slug(name)}"[:_MOST_LETTERS] for number, (name, _) in enumerate(tried)]
-    folders = named if len(tried) > 1 else [out]
-    return [
-        (name, sweep(arguments, seeds, jobs=jobs, out=folder, done=done))
-        for (name, arguments), folder in zip(tried, folders, strict=True)
-    ]
+def folders(out: Path, names: Sequence[str]) -> list[Path]:
+    """Where the logs under each condition go: a folder of its own in `out`, where there are several."""
+    if len(names) == 1:
+        return [out]
+    return [out / f"{number}-{slug(name)}"[:_MOST_LETTERS] for number, name in enumerate(names)]
 
 
 def sweep(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -12,7 +13,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.faults.pulling import pulled
-from skills.robot import CommandState, CommandStatus, Image, NoImageError, Robot
+from skills.robot import CommandState, CommandStatus, FrameTree, Image, NoImageError, Robot
 
 THIEF: Final = "the tablet"
 """Who takes the lease in "lease taken"."""
@@ -86,7 +87,10 @@ def verb_of(word: str) -> str:
     """The verb that a word names. Raises ValueError."""
     verb = _OTHER_WORDS.get(word, word)
     if verb not in VERBS:
-        raise ValueError(f"'{word}' is no verb of the robot; known are {', '.join((*VERBS, *_OTHER_WORDS))}")
+        known = (*VERBS, *_OTHER_WORDS)
+        near = difflib.get_close_matches(word, known, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(known)}"
+        raise ValueError(f"'{word}' is no verb of the robot; {hint}")
     return verb
 
 
@@ -223,8 +227,18 @@ def _pulled(match: re.Match[str]) -> Effect:
 
 
 def _jumps(match: re.Match[str]) -> Effect:
+    """Dead reckoning is off wherever it is told: by itself, with scans, and with pictures."""
     ahead = RigidTransform(np.array([float(match["metres"]), 0.0, 0.0]))
-    return _reads("odometry", lambda reading: replace(reading, X_OB=reading.X_OB @ ahead))
+
+    def act(call: Call) -> Any:
+        reading = call.proceed()
+        if isinstance(reading, Image):
+            edges = reading.frames.edges.items()
+            moved = {child: (parent, X_PC @ ahead if parent == "odom" else X_PC) for child, (parent, X_PC) in edges}
+            return replace(reading, frames=FrameTree(moved))
+        return None if reading is None else replace(reading, X_OB=reading.X_OB @ ahead)
+
+    return Effect(frozenset(("odometry", "scan", "image")), act)
 
 
 def _battery(match: re.Match[str]) -> Effect:

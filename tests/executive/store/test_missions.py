@@ -198,7 +198,7 @@ def test_a_store_of_another_version_is_refused(path):
     with sqlite3.connect(path) as other:
         other.execute("PRAGMA user_version = 9")
     other.close()
-    with pytest.raises(InputError, match="version 9, and this errand reads 4"):
+    with pytest.raises(InputError, match="version 9, and this errand reads 5"):
         MissionStore(path)
 
 

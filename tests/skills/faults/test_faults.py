@@ -126,6 +126,8 @@ def test_odometry_can_jump(faulty, clock):
     assert robot.odometry().pose.x_m == 0.0
     clock.advance(1.0)
     assert robot.odometry().pose.x_m == pytest.approx(0.5)
+    assert robot.scan().X_OB.translation()[0] == pytest.approx(0.5)
+    assert robot.image("left").frames.pose("body").translation()[0] == pytest.approx(0.5)
 
 
 def test_battery_and_faults_can_be_set(faulty):
@@ -228,6 +230,7 @@ def test_every_kind_that_is_drawn_parses_as_that_kind(kind):
         ("camera.hnad: dropout 5 s at 20 s", "the robot has no camera 'hnad'; did you mean 'hand'"),
         ("lidar.front: dropout 5 s", "leave '.front' out"),
         ("drive: dropout", "'drive' cannot do that"),
+        ("camra: dropout", "'camra' is no verb of the robot; did you mean 'camera'"),
     ],
 )
 def test_words_that_are_no_fault_are_refused_with_the_mend(words, message):

@@ -92,7 +92,7 @@ def _alias(name: str) -> str:
 
 
 class ScenarioFile(_Strict):
-    """The schema of a scenario file."""
+    """What goes wrong and happens while a mission runs."""
 
     faults: tuple[Text, ...] = Field(default=(), description="Faults by their words.")
     random: Annotated[int, Field(ge=0, le=MOST_RANDOM, strict=True)] = Field(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from executive.cli.artifacts import Artifacts, draw_answer
@@ -29,6 +30,7 @@ from executive.tree.node_view import NodeView, node_view
 from executive.view.collapse import DRAWN_NODES, folded_to, what_ran
 from executive.view.svg import to_svg
 from skills.faults.faulty_robot import with_faults
+from skills.faults.words import Fault, parse_fault
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def run_request(
     scenario = prepared.request.scenario
     entry = backend.entry(tree, durable)
     warm_up(entry)
-    robot = with_faults(entry.robot, clock, scenario.faults, since_s=0.0)
+    robot = with_faults(entry.robot, clock, _to_come(scenario.faults, clock.now()), since_s=0.0)
     entry = replace(entry, robot=robot, detector=CountedDetector(entry.detector, work))
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     artifacts = Artifacts(log)
@@ -100,6 +102,11 @@ def run_request(
     if page is not None:
         page.end(recording)
     return replace(finished, report=replace(finished.report, work=counts))
+
+
+def _to_come(faults: Sequence[str], now_s: float) -> list[Fault]:
+    """The faults that are not over by now, as some are in a run that goes on after a restart."""
+    return [fault for fault in map(parse_fault, faults) if not fault.over_by(now_s)]
 
 
 def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:

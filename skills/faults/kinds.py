@@ -55,13 +55,14 @@ class Call:
 class Effect:
     """What a fault does: to which verbs, and `act(call)` while it is on; `watch(result, call)` sees the calls before.
 
-    Calls of the verbs in `always` go to `act` at all times.
+    Calls of the verbs in `always` go to `act` at all times. What happens `once` is over then, though it stays on.
     """
 
     verbs: frozenset[str]
     act: Callable[[Call], Any]
     watch: Callable[[Any, Call], None] = field(default=lambda result, call: None)
     always: frozenset[str] = frozenset()
+    once: bool = False
 
 
 @dataclass(frozen=True)
@@ -257,7 +258,7 @@ def _lease(_: re.Match[str]) -> Effect:
             call.memory["taken"] = call.robot.take_lease(THIEF)
         return call.proceed()
 
-    return Effect(frozenset(VERBS) - {"take_lease"}, act)
+    return Effect(frozenset(VERBS) - {"take_lease"}, act, once=True)
 
 
 def _loses(_: re.Match[str]) -> Effect:
@@ -273,7 +274,7 @@ def _loses(_: re.Match[str]) -> Effect:
             return call.robot.set_gripper(opening_rad, _WEAK_N, until_s=until_s, lease=owned)
         return call.proceed()
 
-    return Effect(frozenset(("gripper", "set_gripper")), act)
+    return Effect(frozenset(("gripper", "set_gripper")), act, once=True)
 
 
 _WEAK_N, _WEAK_S = 0.5, 1.0

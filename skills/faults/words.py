@@ -47,6 +47,10 @@ class Fault:
     calls: int = 0
     source: str | None = None
 
+    def over_by(self, now_s: float) -> bool:
+        """Whether it is over at a time; one that happens once is, when it has begun before."""
+        return now_s >= self.to_s or (self.effect.once and now_s > self.from_s)
+
 
 def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cameras: Sequence[str] = ()) -> Fault:
     """The fault of these words. `cameras` are the robot's, where it is known.

@@ -198,6 +198,15 @@ def test_times_may_count_from_the_beginning_of_the_clock(clock, spot):
     assert robot.gripper().holding
 
 
+@pytest.mark.parametrize(
+    ("words", "over"),
+    [("lease taken at 4 s", True), ("lease taken at 6 s", False), ("lidar freezes at 4 s", False),
+     ("lidar: dropout 1 s at 4 s", True), ("lidar: dropout 2 s at 4 s", False)],
+)  # fmt: skip
+def test_what_is_over_does_not_come_again_after_a_restart(words, over):
+    assert parse_fault(words).over_by(5.0) is over
+
+
 def test_random_faults_are_the_same_for_a_seed_and_are_faults():
     drawn = random_faults(50, 7, CAMERAS)
     assert drawn == random_faults(50, 7, CAMERAS)

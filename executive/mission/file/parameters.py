@@ -14,10 +14,11 @@ from typing import Any, Final
 import yaml
 
 from executive.mission.errors import InputError, did_you_mean, listing, suggestion
+from executive.mission.expression import Value
 from executive.mission.file.model import KeyPath
 from executive.mission.yaml_source import YamlSource
 
-__all__ = ["Given", "given_values", "with_parameters"]
+__all__ = ["Given", "given_values", "round_source", "with_parameters"]
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -68,6 +69,20 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
     return replace(source, data=data)
 
 
+def round_source(source: YamlSource, steps: KeyPath, name: str, value: Value) -> YamlSource:
+    """The steps at a path with the value of a round of their `for_each` put in, as a document {steps: ..} of their own.
+
+    Raises InputError: `${..}` of a name that is neither the round's nor that of a `for_each` within.
+    """
+    data: Any = source.data
+    for part in steps:
+        data = data[part]
+    lines = {("steps", *path[len(steps) :]): line for path, line in source.lines.items() if path[: len(steps)] == steps}
+    first = source.line(steps)
+    below = replace(source, data={"steps": data}, lines=lines, first_line=first)
+    return replace(below, data=_put_in(below.data, {name: value}, below, ()))
+
+
 def _declared(source: YamlSource) -> dict[str, Any]:
     """The parameters with their defaults; what is no mapping is left to the schema to refuse."""
     declared = source.data.get(DECLARED)
@@ -83,24 +98,40 @@ def _declared(source: YamlSource) -> dict[str, Any]:
     return dict(declared)
 
 
-def _put_in(value: Any, values: Mapping[str, Any], source: YamlSource, path: KeyPath) -> Any:
+def _put_in(
+    value: Any, values: Mapping[str, Any], source: YamlSource, path: KeyPath, rounds: frozenset[str] = frozenset()
+) -> Any:
+    """`rounds` are the names of the `for_each` around it: what reads them is left for their rounds."""
     if isinstance(value, str):
-        return _text(value, values, source, path)
+        return _text(value, values, source, path, rounds)
     if isinstance(value, dict):
-        return {key: _put_in(part, values, source, (*path, str(key))) for key, part in value.items()}
+        within = rounds | _rounds_name(value)
+        return {
+            key: _put_in(part, values, source, (*path, str(key)), within if key == "steps" else rounds)
+            for key, part in value.items()
+        }
     if isinstance(value, list):
-        return [_put_in(part, values, source, (*path, index)) for index, part in enumerate(value)]
+        return [_put_in(part, values, source, (*path, index), rounds) for index, part in enumerate(value)]
     return value
 
 
-def _text(text: str, values: Mapping[str, Any], source: YamlSource, path: KeyPath) -> Any:
+def _rounds_name(step: Mapping[str, Any]) -> frozenset[str]:
+    """The name that a `for_each` gives to the value of each round."""
+    repeat = step.get("repeat")
+    name = repeat.get("as") if isinstance(repeat, Mapping) and "for_each" in repeat else None
+    return frozenset({name}) if isinstance(name, str) else frozenset()
+
+
+def _text(text: str, values: Mapping[str, Any], source: YamlSource, path: KeyPath, rounds: frozenset[str]) -> Any:
     if "${" not in text:
         return text
     whole = _REFERENCE.fullmatch(text)
-    if whole is not None and not whole[1]:
+    if whole is not None and not whole[1] and whole[2] not in rounds:
         return _value(whole[2], values, source, path)
 
     def replaced(match: re.Match[str]) -> str:
+        if match[2] in rounds or (match[1] and rounds):
+            return match[0]
         return f"${{{match[2]}}}" if match[1] else str(_value(match[2], values, source, path))
 
     return _REFERENCE.sub(replaced, text)

@@ -20,7 +20,7 @@ steps:
   - say: go to the hall
     on_failure: ask
     retries: 0
-    ask: {text: What now?, limit: 9, default: skip}
+    question: {text: What now?, limit: 9, default: skip}
   - skill: navigate
     with: {x: 5.2, y: 4.5}
 """

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from py_trees.common import Status
+
 from executive.mission.errors import listing
 from executive.mission.goal import Area, GoalCondition
 from executive.run.outcome import Outcome, RobotResult
@@ -35,7 +37,7 @@ def verdict_of(
 
 
 def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.GoalCondition, ...]:
-    """The goal conditions of a tree that has run: of all its parts but those that its own result tells were skipped.
+    """The goal conditions of a tree that has run: of all its parts that were done.
 
     A count is one condition, however many trips it takes; an answer belongs to the check that gave it; what comes
     before a step without condition needs to have been so at some time only.
@@ -53,9 +55,12 @@ def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.Goal
 
 
 def _done(tree: CompiledTree, result: RobotResult) -> list[StepPart]:
-    """The parts that were not skipped."""
+    """The parts that were done. Of a mission that succeeded, what failed or was not begun was not called for: it was
+    skipped, stands in a branch that was not taken, or something else was done in its place."""
+    if result.outcome is not Outcome.SUCCESS:
+        return list(tree.parts)
     statuses = {path: state.status for path, state in result.states.items()}
-    return [part for part in tree.parts if not part.was_skipped(statuses)]
+    return [part for part in tree.parts if statuses.get(part.node or part.path_id) is Status.SUCCESS]
 
 
 def _joined(*sentences: str) -> str:

@@ -79,9 +79,13 @@ class Replacement:
 
 @dataclass(frozen=True)
 class ControlRequests:
-    """What is asked of the run now; `preempts` are missions to do first, `instead` and `later` as they say."""
+    """What is asked of the run now; `preempts` are missions to do first, `instead` and `later` as they say.
+
+    `insists` says that a run that is cancelled already was cancelled once more.
+    """
 
     cancel: str | None = None
+    insists: bool = False
     hold: str | None = None
     breakpoints: frozenset[str] = frozenset()
     events: tuple[Event, ...] = ()
@@ -124,6 +128,7 @@ class Control:
         self._lost: Mapping[str, str] = MappingProxyType({})
         self._missions: Mapping[str, tuple[str, ...]] = MappingProxyType({})
         self._known: frozenset[str] = frozenset()
+        self._presses: Mapping[str, int] = MappingProxyType({})
 
     @property
     @_locked
@@ -178,10 +183,25 @@ class Control:
 
     @_locked
     def cancel(self, reason: str = "cancelled by the operator") -> None:
-        """End the run; the first reason stays."""
+        """End the run; the first reason stays. Once more: at once, without what missions always do in the end."""
         if self._requests.cancel is None and not self._ended:
             self._ask_for(cancel=reason)
             self._note("cancel", reason)
+        elif not self._requests.insists and not self._ended:
+            self._ask_for(insists=True)
+            self._note("cancel", f"once more: {reason}")
+
+    @_locked
+    def press(self, button: str) -> None:
+        """Press a button that missions wait for or decide by."""
+        self._presses = MappingProxyType({**self._presses, button: self._presses.get(button, 0) + 1})
+        self._note("button", button)
+
+    @property
+    @_locked
+    def presses(self) -> Mapping[str, int]:
+        """How often each button was pressed."""
+        return self._presses
 
     @_locked
     def stop_button(self, reason: str = "the stop button is pressed") -> None:
@@ -282,7 +302,7 @@ class Control:
         mode, reason = self._mode()
         held = mode is Mode.STOPPED or (mode is Mode.PAUSED and self._stride is None)
         requests = replace(self._requests, hold=reason if held else None)
-        self._requests = ControlRequests(requests.cancel, breakpoints=requests.breakpoints)
+        self._requests = ControlRequests(requests.cancel, requests.insists, breakpoints=requests.breakpoints)
         return requests
 
     @_locked

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from py_trees.common import Status
 
@@ -13,8 +13,8 @@ from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.journal import Journal, TickNote
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.behaviours.answer import Answer
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviours.context import Endings, RunContext
+from executive.tree.behaviours.explained import Explained, message_of
 from executive.tree.behaviours.gate import Gate
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
@@ -44,9 +44,11 @@ class TreeRun:
         self, tree: CompiledTree, context: RunContext, journal: Journal | None = None, profile: Profile | None = None
     ) -> None:
         self.tree = tree
-        self.context = context
+        self.context = context = replace(context, endings=Endings())
         self.journal = journal
         self.root = tree.build(context)
+        self._ended_early = self._suspended = False
+        self._endings: list[str] = []
         self._observed = Observed(self.root)
         self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
         self._skills = frozenset(leaf.path_id for leaf in self._leaves)
@@ -60,8 +62,13 @@ class TreeRun:
 
     @property
     def finished(self) -> bool:
-        """True when the tree has come to an end."""
-        return self.root.status in (Status.SUCCESS, Status.FAILURE)
+        """True when the tree has come to an end, and all is done that is always done in the end."""
+        return self.root.status in (Status.SUCCESS, Status.FAILURE) and self.context.endings.due is None
+
+    @property
+    def ends(self) -> bool:
+        """True while it only does what is always done in the end, since it was ended early."""
+        return self._ended_early and self.context.endings.due is not None
 
     @property
     def waiting_at(self) -> str | None:
@@ -78,11 +85,36 @@ class TreeRun:
         self._breakpoints = breakpoints
         if not breakpoints <= self._gates.keys():
             self._set_gates(breakpoints)
-        self.root.tick_once()
+        self._tick()
         changes = self.log_changes()
         if self.journal is not None:
             self.journal.note(self._tick_note(changes))
         return bool(changes)
+
+    def _tick(self) -> None:
+        """Tick the tree; or, while the rest of it stands still, what a node that was stopped was still to do."""
+        endings = self.context.endings
+        due = endings.due
+        if due is None:
+            self._suspended = False
+            if not self._ended_early:
+                self.root.tick_once()
+            return
+        if not self._suspended:
+            self._suspended = True
+            suspend(self.root)
+        for _ in due.tick():
+            pass
+        if due.status != Status.RUNNING:
+            endings.done()
+            if due.status == Status.FAILURE:
+                self._endings.append(f"in the end: {message_of(due)}")
+
+    def end_early(self) -> None:
+        """Stop the tree where it is, and do no more of it than what is always done in the end."""
+        if not self._ended_early and not self.finished:
+            self.root.stop(Status.INVALID)
+            self._ended_early = True
 
     def suspend(self) -> None:
         """Keep the place and let go of the robot."""
@@ -109,7 +141,9 @@ class TreeRun:
 
         Each part is done through `attempt`, so that a defect in one does not keep the others from being done.
         """
-        if not self.finished:
+        for node in self.context.endings.close():
+            attempt("stop what is done in the end", lambda node=node: node.stop(Status.INVALID))  # type: ignore[misc]
+        if not self.finished and not self._ended_early:
             attempt("stop the tree", lambda: self.root.stop(Status.INVALID))
         for leaf in self._leaves:
             attempt(f"end {leaf.path_id}", leaf.abandon)
@@ -125,6 +159,8 @@ class TreeRun:
             outcome = Outcome.ERROR
         if ending is not None and not self.finished:
             outcome, cause, message = ending.outcome, ending.cause, ending.message
+        if self._endings:
+            message = "; ".join((message, *self._endings))
         answers = {
             node.path_id: node.answer
             for node in self._observed.nodes

@@ -74,7 +74,5 @@ def _refusal(text: str) -> Failed | None:
     if not text:
         return Failed(Cause.PRECONDITION, "there is nothing to say")
     if len(text) > LONGEST_TEXT:
-        return Failed(
-            Cause.PRECONDITION, f"{len(text)} characters are too long to be said; {LONGEST_TEXT} are the most"
-        )
+        return Failed(Cause.PRECONDITION, f"{len(text)} characters are too many to say; {LONGEST_TEXT} are the most")
     return None

@@ -257,6 +257,8 @@ def test_answers_and_the_start_pose_outlive_the_process(live, script):
     result, _, _ = live(FETCH_AND_ASK)
     assert result.outcome is Outcome.SUCCESS
     assert list(result.worst.answers.values()) == [False]
+    (found,) = result.worst.findings
+    assert (found.answer, found.t_s < 2.0) == (False, True)
     remembered = next(state for path, state in result.worst.states.items() if path.endswith("remember-start"))
     assert remembered.message.endswith("(before the restart)")
 

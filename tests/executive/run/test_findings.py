@@ -115,10 +115,11 @@ def test_a_mission_that_also_brought_something_claims_both(compiled, run_tree, m
 
 def test_a_mission_that_failed_says_what_it_found_before(compiled, run_tree, script):
     def navigate(skill):
-        return Failed(Cause.PLANNING, "no way") if "detect" in script.begun else Succeeded("there")
+        return Failed(Cause.PLANNING, "no way") if skill.inputs.goal.y_m > 3.0 else Succeeded("there")
 
     script.ends["navigate"] = navigate
-    worst = run_tree(compiled(CHECKS[0], CHECKS[2])).worst
+    there = "Take [Nothing] to [bathroom] and do [Nothing] to [Nothing]"
+    worst = run_tree(compiled(CHECKS[0], there)).worst
     assert worst.outcome is Outcome.FAILURE
     assert worst.message.endswith("(found out: yes: hammer in the kitchen)")
 

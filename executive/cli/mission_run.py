@@ -7,15 +7,18 @@ from dataclasses import dataclass, replace
 from executive.cli.artifacts import Artifacts, draw_answer
 from executive.cli.backend import Backend
 from executive.cli.durable import Durable
+from executive.cli.found_out import with_found_out
 from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
 from executive.cli.report import RefereeReport, RunReport
+from executive.cli.report_file import TREE_FILE, write_report
 from executive.cli.requests import Prepared
 from executive.cli.signals import HUNG_UP, cancelled_by_signals
 from executive.cli.warm_up import warm_up
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
 from executive.record.profile import Profile
+from executive.record.reader import read_events
 from executive.record.schemas import WORK
 from executive.record.work import CountedDetector, Work
 from executive.run.control import Control
@@ -88,12 +91,16 @@ def run_request(
         log(WORK, counts)
     finally:
         log.close()
+    events = read_events(log.path)
     finished = _judged(prepared, backend, result, log)
+    report = with_found_out(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)
     recording = backend.leave(artifacts, out)
+    tree = result.trees.get(prepared.tree.robot_name, prepared.tree)
+    write_report(prepared, report, tree, finished.tree, artifacts, events)
     if page is not None:
         page.end(recording)
-    return replace(finished, report=replace(finished.report, work=counts))
+    return replace(finished, report=report)
 
 
 def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:
@@ -108,7 +115,7 @@ def _judged(prepared: Prepared, backend: Backend, result: RunResult, log: EventL
     tree = result.trees.get(prepared.tree.robot_name, prepared.tree)
     view = node_view(tree.root, result.worst.states)
     picture = to_svg(folded_to(what_ran(view), DRAWN_NODES), title=prepared.mission.name)
-    (prepared.request.out / "tree.svg").write_text(picture, encoding="utf-8")
+    (prepared.request.out / TREE_FILE).write_text(picture, encoding="utf-8")
     referee = backend.judge(tree, result.worst)
     return Finished(_report(prepared, tree, result, referee, log=str(log.path)), view)
 

@@ -22,17 +22,13 @@ _DENIALS: Final = ("no ", "not ", "nobody ", "nothing ")
 
 @dataclass(frozen=True)
 class Finding:
-    """One answer that a mission gave, or was given: by which node, when (s on the robot's clock), and in words.
-
-    `picture` is the number of its picture among those of the run, from 0, where somebody keeps pictures.
-    """
+    """One answer that a mission gave, or was given: by which node, when (s on the robot's clock), and in words."""
 
     path_id: str
     t_s: float
     question: str
     answer: bool | str | float | None
     sentence: str
-    picture: int | None = None
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from executive.mission.goal import Area, GoalCondition
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
 from plant import referee
+from skills.speak.skill import Speak
 
 
 def verdict_of(
@@ -53,9 +54,9 @@ def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.Goal
 
 
 def _done(tree: CompiledTree, result: RobotResult) -> list[StepPart]:
-    """The parts that were not skipped."""
+    """The parts that were not skipped; what was only said leaves nothing in the world to judge."""
     statuses = {path: state.status for path, state in result.states.items()}
-    return [part for part in tree.parts if not part.was_skipped(statuses)]
+    return [part for part in tree.parts if part.skill is not Speak and not part.was_skipped(statuses)]
 
 
 def _joined(*sentences: str) -> str:

@@ -16,7 +16,7 @@ from executive.cli.requests import Prepared
 from executive.cli.signals import HUNG_UP, cancelled_by_signals
 from executive.cli.warm_up import warm_up
 from executive.record.announce import announce
-from executive.record.event_log import EventLog
+from executive.record.event_log import EventLog, Listener
 from executive.record.profile import Profile
 from executive.record.reader import read_events
 from executive.record.schemas import WORK
@@ -54,11 +54,12 @@ def run_request(
     page: PageView | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
+    listener: Listener | None = None,
 ) -> Finished:
-    """Run a request on a backend and write log, tree and what that has recorded into its folder.
+    """Run a request on a backend and write log, tree, report and what that has recorded into its folder.
 
-    The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it;
-    with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
+    The observer is told after each tick, the listener of each logged message; through `control` the run is held,
+    cancelled, and so on; `page` shows it; with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
     Raises InputError when the world cannot be used.
     """
     tree, out, clock, work = prepared.tree, prepared.request.out, backend.clock, Work()
@@ -66,6 +67,8 @@ def run_request(
     warm_up(entry)
     entry = replace(entry, detector=CountedDetector(entry.detector, work))
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
+    if listener is not None:
+        log.listen(listener)
     artifacts = Artifacts(log)
     try:
         if page is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -53,7 +54,6 @@ def write_report(
     the picture of the tree stands in the folder.
     """
     out, mission = prepared.request.out, _below(view, tree.mission.path_id) or view
-    pictures = tuple(_pictures(artifacts))
     page = ReportPage(
         title=prepared.mission.name,
         request=_request(prepared),
@@ -76,7 +76,7 @@ def write_report(
         steps=tuple(step_rows(mission, frozenset(part.path_id for part in tree.parts), _spans(events))),
         events=() if report.referee is None else report.referee.events,
         map=_map(artifacts, events),
-        pictures=pictures,
+        pictures=tuple(_pictures(artifacts)),
         tree_svg=(out / TREE_FILE).read_text(encoding="utf-8"),
     )
     path = out / REPORT
@@ -92,17 +92,31 @@ def step_rows(
     Decorators make one row with what they decorate: the status is theirs, the name that of the node within.
     """
     outer, within = node, [node]
-    while len(_steps(within[-1])) == 1 and within[-1].path_id not in parts:
-        within.append(_steps(within[-1])[0])
-    inner = within[-1]
-    below = () if inner.path_id in parts else _steps(inner)
-    has_parts = any(part.startswith(f"{inner.path_id}/") for part in parts)
-    nested = has_parts and len(below) > 1
+    while (only := _decorated(within[-1], parts)) is not None:
+        within.append(only)
+    inner, below = within[-1], _steps(within[-1])
+    nested = len(below) > 1 and inner.path_id not in parts and _has_parts(inner, parts)
     if depth or not nested:
-        yield _row(outer, within, spans, max(0, depth - 1))
+        row = _row(outer, within, spans, max(0, depth - 1))
+        yield replace(row, message="") if nested and row.word == Styles.SUCCESS.value.word else row
     if nested:
         for child in below:
             yield from step_rows(child, parts, spans, depth + 1)
+
+
+def _decorated(node: NodeView, parts: frozenset[str]) -> NodeView | None:
+    """What a node is there for: its only child, or of one that is no sequence the only child with parts of the mission.
+
+    None for a part itself, and where there are several.
+    """
+    below = () if node.path_id in parts else _steps(node)
+    if len(below) > 1 and node.kind != "sequence":
+        below = tuple(child for child in below if _has_parts(child, parts))
+    return below[0] if len(below) == 1 else None
+
+
+def _has_parts(node: NodeView, parts: frozenset[str]) -> bool:
+    return any(one.path_id in parts for _, one in node.walk())
 
 
 def _steps(node: NodeView) -> tuple[NodeView, ...]:
@@ -179,7 +193,7 @@ def _pictures(artifacts: Artifacts) -> Iterator[PagePicture]:
     for name, caption in _CAPTIONS.items():
         if (drawn := _drawn(artifacts, name)) is not None:
             yield PagePicture(caption, drawn)
-        elif name == "detection" and artifacts.detection is not None:
+        elif name == "detection" and artifacts.detection is not None and not artifacts.pictures:
             yield PagePicture(caption, to_jpeg(detection_picture(artifacts.detection)))
 
 

@@ -59,7 +59,8 @@ def run_request(
     """Run a request on a backend and write log, tree, report and what that has recorded into its folder.
 
     The observer is told after each tick, the listener of each logged message; through `control` the run is held,
-    cancelled, and so on; `page` shows it; with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
+    cancelled, and so on; `page` shows it; with `durable` another process can take it up, or this one takes
+    up another's; `profile` times the subsystems.
     Raises InputError when the world cannot be used.
     """
     tree, out, clock, work = prepared.tree, prepared.request.out, backend.clock, Work()

@@ -87,7 +87,7 @@ def write_report(
 def step_rows(
     node: NodeView, parts: frozenset[str], spans: Mapping[str, tuple[float, float]], depth: int = 0
 ) -> Iterator[StepRow]:
-    """The steps of a mission: its parts, and above them what they belong to, one row each.
+    """The steps of a mission: its parts, and above several of them what they belong to, one row each.
 
     Decorators make one row with what they decorate: the status is theirs, the name that of the node within.
     """
@@ -95,7 +95,7 @@ def step_rows(
     while (only := _decorated(within[-1], parts)) is not None:
         within.append(only)
     inner, below = within[-1], _steps(within[-1])
-    nested = len(below) > 1 and inner.path_id not in parts and _has_parts(inner, parts)
+    nested = len(below) > 1 and inner.path_id not in parts and _parts_in(inner, parts) > (1 if depth else 0)
     if depth or not nested:
         row = _row(outer, within, spans, max(0, depth - 1))
         yield replace(row, message="") if nested and row.word == Styles.SUCCESS.value.word else row
@@ -111,12 +111,12 @@ def _decorated(node: NodeView, parts: frozenset[str]) -> NodeView | None:
     """
     below = () if node.path_id in parts else _steps(node)
     if len(below) > 1 and node.kind != "sequence":
-        below = tuple(child for child in below if _has_parts(child, parts))
+        below = tuple(child for child in below if _parts_in(child, parts))
     return below[0] if len(below) == 1 else None
 
 
-def _has_parts(node: NodeView, parts: frozenset[str]) -> bool:
-    return any(one.path_id in parts for _, one in node.walk())
+def _parts_in(node: NodeView, parts: frozenset[str]) -> int:
+    return sum(one.path_id in parts for _, one in node.walk())
 
 
 def _steps(node: NodeView) -> tuple[NodeView, ...]:

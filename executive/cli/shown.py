@@ -55,9 +55,10 @@ def speech_heard(console: Console, voice: Voice, *, quiet: bool) -> Listener:
 
     def hear(topic: str, t_s: float, message: Mapping[str, Any]) -> None:
         if topic == SPEECH:
+            robot, text = (str(message.get(name, "")) for name in ("robot", "text"))
             if not quiet:
-                console.print(Text(f"{printable(message['robot'])}: {printable(message['text'])}", style="bold"))
-            voice.say(message["text"])
+                console.print(Text(printable(f"{robot}: {text}"), style="bold"))
+            voice.say(text)
 
     return hear
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -74,7 +75,8 @@ class Findings:
             message = {**message, "robot": self._robot_name, "t": round(self._clock.now(), 6)}
             self._add(_finding(message))
         elif topic == SPEECH:
-            self._board.put(self._keys.said, (*self.said, Said(float(message["t"]), str(message["text"]))))
+            now_s = round(self._clock.now(), 6)
+            self._board.put(self._keys.said, (*self.said, Said(now_s, str(message.get("text", "")))))
         self._publish(topic, message)
 
     @property
@@ -104,6 +106,7 @@ class Findings:
 def _finding(message: Mapping[str, Any]) -> Finding:
     answer = message.get("answer")
     plain = answer if answer is None or isinstance(answer, bool | str | int | float) else str(answer)
+    plain = str(plain) if isinstance(plain, float) and not math.isfinite(plain) else plain
     texts = (str(message.get(name, "")) for name in ("node", "question", "message"))
     path_id, question, sentence = texts
     return Finding(path_id, float(message["t"]), question, plain, sentence or str(answer))

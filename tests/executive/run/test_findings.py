@@ -1,5 +1,7 @@
 """What a mission found out: every answer in order, and what its claim tells of them."""
 
+import math
+
 import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -44,10 +46,16 @@ def test_any_node_adds_a_finding_by_publishing_an_answer(findings, answer):
     assert (one.answer, one.sentence, one.question) == (answer, "Robin says so", "q")
 
 
-def test_what_was_said_is_kept(findings, published):
+def test_what_was_said_is_kept(findings, published, clock):
+    clock.advance(2.0)
     findings("speech", {"robot": "Alice", "text": "Hello", "t": 2.0})
     assert findings.said == (Said(2.0, "Hello"),)
     assert published[-1][0] == "speech"
+
+
+def test_a_number_that_json_does_not_know_is_told_as_text(findings):
+    findings("answer", answered("alice/patrol/1", math.nan, "nobody knows"))
+    assert findings.findings[0].answer == "nan"
 
 
 def test_an_answer_given_again_after_a_restart_is_one_finding(clock):

@@ -55,8 +55,11 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     What the mission is interrupted for is not taken up, but called for again where need be.
     """
     skills = {node.path_id: node for node in tree.mission.walk() if node.kind == "skill"}
+    failed = {path for path, step in memory.steps.items() if step.status is Status.FAILURE}
     kept = [
-        path for path, leaf in skills.items() if all(key in memory.board for key in leaf.options["outputs"].values())
+        path
+        for path, leaf in skills.items()
+        if path in failed or all(key in memory.board for key in leaf.options["outputs"].values())
     ]
     recollection = Recollection(tree.path_ids, memory.steps).only(kept)
     parents = {child.path_id: node for node in tree.root.walk() for child in node.children}

@@ -3,7 +3,8 @@ the way walked from above."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import base64
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -12,6 +13,7 @@ import cv2
 import numpy as np
 
 from executive.record.messages import DESTINATION_TOPIC
+from executive.record.reader import Event
 from executive.record.schemas import TRANSITIONS
 from executive.store.resuming import told_before
 from executive.tree.behaviours.answer import ANSWER_TOPIC
@@ -75,11 +77,27 @@ class Artifacts:
             self.answer = detection_picture(self._confirmed)
         else:
             self.answer = _sheet([detection_picture(each) for each in looked[-_MOST_LOOKS:]])
-        small = to_jpeg(self.answer)
-        if sum(map(len, self.pictures)) + len(small) <= MOST_BYTES:
-            self.numbers[str(message["node"]), float(message.get("t", 0.0))] = len(self.pictures)
-            self.pictures.append(small)
+        self._keep(message, self.answer)
         return {**message, "image": self.answer}
+
+    def recall(self, events: Iterable[Event]) -> None:
+        """Keep the pictures of answers that were logged before a restart."""
+        for event in events:
+            if event.topic == ANSWER_TOPIC and event.data.get("format") == "jpeg" and "t" in event.data:
+                data = np.frombuffer(base64.b64decode(event.data["data"]), np.uint8)
+                picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
+                if picture is not None:
+                    self._keep(event.data, np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8))
+
+    def _keep(self, message: Mapping[str, Any], picture: Picture) -> None:
+        """Keep the small picture of an answer, once, as long as there is room."""
+        key = str(message["node"]), float(message.get("t", 0.0))
+        if key in self.numbers or sum(map(len, self.pictures)) >= MOST_BYTES:
+            return
+        small = to_jpeg(picture)
+        if sum(map(len, self.pictures)) + len(small) <= MOST_BYTES:
+            self.numbers[key] = len(self.pictures)
+            self.pictures.append(small)
 
     def _note(self, path_id: str, time_s: float) -> None:
         name = _MOMENTS.get(path_id.rsplit("/", 1)[-1])

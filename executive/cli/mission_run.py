@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from executive.cli.artifacts import Artifacts, draw_answer
 from executive.cli.backend import Backend
-from executive.cli.durable import Durable
+from executive.cli.durable import Durable, mission_events
 from executive.cli.found_out import with_found_out
 from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
@@ -18,7 +18,6 @@ from executive.cli.warm_up import warm_up
 from executive.record.announce import announce
 from executive.record.event_log import EventLog, Listener
 from executive.record.profile import Profile
-from executive.record.reader import read_events
 from executive.record.schemas import WORK
 from executive.record.work import CountedDetector, Work
 from executive.run.control import Control
@@ -95,7 +94,8 @@ def run_request(
         log(WORK, counts)
     finally:
         log.close()
-    events = read_events(log.path)
+    events = mission_events(log.path)
+    artifacts.recall(events)
     finished = _judged(prepared, backend, result, log)
     report = with_found_out(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)

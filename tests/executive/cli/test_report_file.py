@@ -9,15 +9,18 @@ from scripted_backend import ScriptedBackend
 
 from executive.cli import requests
 from executive.cli.artifacts import MOST_BYTES, Artifacts
+from executive.cli.durable import mission_events
 from executive.cli.mission_run import run_request
 from executive.cli.report import ReportedAnswer, ReportedObject, RunReport
 from executive.cli.report_file import step_rows
 from executive.cli.requests import prepare
 from executive.mission.request import Request
+from executive.record.event_log import EventLog
 from executive.run.findings import Said
 from executive.tree.node_view import NodeView
 from executive.tree.snapshot import NodeState
 from skills.api import Cause
+from skills.testing.clock import VirtualClock
 
 TALK = """
 name: talk <b>
@@ -113,3 +116,31 @@ def test_a_step_that_was_skipped_or_failed_says_so():
         ("skipped", "skipped: no way"),
         ("failure (PLANNING)", "no way"),
     ]
+
+
+def write_log(path, commands, topic, message):
+    log = EventLog(path, VirtualClock())
+    log("run", {"world": "flat", "seed": 1, "commands": commands, "versions": {}})
+    log(topic, message)
+    log.close()
+
+
+def test_the_logs_of_all_starts_of_a_mission_are_told_together(tmp_path):
+    for name, commands in (("log", ["a"]), ("log-2", ["another"]), ("log-3", ["a"])):
+        write_log(tmp_path / f"{name}.mcap", commands, name, {"t": 1.0})
+    (tmp_path / "log-4.mcap").write_text("no log")
+    write_log(tmp_path / "log-5.mcap", ["a"], "log-5", {"t": 1.0})
+    topics = [event.topic for event in mission_events(tmp_path / "log-5.mcap") if event.topic != "run"]
+    assert topics == ["log", "log-3", "log-5"]
+    assert [event.topic for event in mission_events(tmp_path / "log.mcap")] == ["run", "log"]
+
+
+def test_pictures_of_answers_from_before_a_restart_are_found_in_the_log(tmp_path):
+    picture = np.full((48, 64, 3), 90, np.uint8)
+    told = {"node": "alice/q", "t": 4.0, "question": "q", "answer": False, "message": "m"}
+    write_log(tmp_path / "log.mcap", ["a"], "answer", {**told, "image": picture})
+    artifacts = Artifacts(lambda topic, message: None)
+    for _ in range(2):
+        artifacts.recall(mission_events(tmp_path / "log.mcap"))
+    assert artifacts.numbers == {("alice/q", 4.0): 0}
+    assert len(artifacts.pictures) == 1

@@ -44,12 +44,12 @@ RUN = """
     request = Request(file=out / "m.yaml", out=out)
     prepared = prepare(request)
 
-    def start(*, control, observer):
+    def start(*, control, observer, listener):
         def told(progress):
             observer(progress)
             (out / "begun").touch()
             time.sleep(0.01)
-        return run_request(prepared, robot, control=control, observer=told)
+        return run_request(prepared, robot, control=control, observer=told, listener=listener)
 
     with MissionStore(out / "missions.sqlite") as store:
         mission = store.add(prepared.request, queued=False)

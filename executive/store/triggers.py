@@ -39,6 +39,7 @@ __all__ = [
 FULL: Final = 0.95
 LONGEST: Final = timedelta(days=366)
 _WEEK: Final = 7
+_LONGEST_SKIP: Final = timedelta(hours=3)
 _EXAMPLES: Final = "'every weekday 09:00', 'every monday and friday 08:15' or '2026-12-01 09:00'"
 _EVENTS: Final = "'battery full', 'battery 80%', 'call NAME' or 'topic KIND:TOPIC'"
 
@@ -138,12 +139,14 @@ class Every:
 
     def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
         """The first occurrence later than a moment."""
-        return anchor + max(1, (moment - anchor) // self.period + 1) * self.period
+        start = anchor.astimezone(UTC)  # between two times of one zone, Python counts what clocks show
+        return start + max(1, (moment.astimezone(UTC) - start) // self.period + 1) * self.period
 
     def latest(self, now: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
         """The last occurrence up to now."""
-        count = (now - anchor) // self.period
-        return anchor + count * self.period if count > 0 else None
+        start = anchor.astimezone(UTC)
+        count = (now.astimezone(UTC) - start) // self.period
+        return start + count * self.period if count > 0 else None
 
 
 @dataclass(frozen=True)
@@ -227,7 +230,7 @@ def event_of(text: str) -> OnBatteryFull | OnCall | OnTopic:
     if (call := _CALL.fullmatch(words)) is not None:
         return OnCall(call["name"])
     if (battery := _BATTERY.fullmatch(words.lower())) is not None:
-        level = FULL if battery["percent"] is None else float(battery["percent"]) / 100.0
+        level = FULL if battery["percent"] is None else round(float(battery["percent"]) / 100.0, 6)
         if 0.0 < level <= 1.0:
             return OnBatteryFull(level)
         raise InputError(f"'{text}': a charge is above 0 % and at most 100 %", hint="write as in 'battery 80%'")
@@ -250,7 +253,13 @@ def local(moment: datetime, zone: tzinfo | None) -> datetime:
 def _moment(day: date, at: time, zone: tzinfo | None) -> datetime:
     """A local date and time as UTC."""
     wall = datetime.combine(day, at)
-    return (wall if zone is None else wall.replace(tzinfo=zone)).astimezone(UTC)
+    if zone is not None:
+        return wall.replace(tzinfo=zone).astimezone(UTC)
+    moment = wall.astimezone(UTC)
+    if moment.astimezone().replace(tzinfo=None) == wall:
+        return moment
+    before = (wall - _LONGEST_SKIP).astimezone().utcoffset() or timedelta()  # of a time that clocks skip
+    return (wall - before).replace(tzinfo=UTC)
 
 
 def _days(word: str) -> Sequence[Day]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 
 START_LIMIT_S: Final = 10.0
 MAX_BODY: Final = 20_000
@@ -52,10 +52,13 @@ class ServingThread:
 
 
 async def body_of(request: Request) -> bytes | None:
-    """A request's body; None when it is larger than MAX_BODY, of which no more than that is read."""
+    """A request's body; None when it is larger than MAX_BODY (the rest is not read), or its client went away."""
     body = b""
-    async for part in request.stream():
-        body += part
-        if len(body) > MAX_BODY:
-            return None
+    try:
+        async for part in request.stream():
+            body += part
+            if len(body) > MAX_BODY:
+                return None
+    except ClientDisconnect:
+        return None
     return body

@@ -5,7 +5,7 @@ A port is open, and a plug-in started, only while a standing mission waits for i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -89,17 +89,24 @@ class Listeners:
         for kind, (topics, source) in list(self._sources.items()):
             if wanted.get(kind) != topics:
                 del self._sources[kind]
-                self._attempt(kind, "stop", source.stop)
+                self._stop(kind, source)
         for kind, topics in wanted.items():
             if kind not in self._sources:
-                source = trigger_source(kind)
-                self._attempt(kind, "start", lambda: source.start(topics, partial(self._calls.heard, kind)))  # noqa: B023
-                self._sources[kind] = (topics, source)
+                self._sources[kind] = (topics, self._started(kind, topics))
 
-    def _attempt(self, kind: str, what: str, call: Callable[[], None]) -> None:
-        """Call a plug-in. Raises InputError: that raised."""
+    def _started(self, kind: str, topics: Sequence[str]) -> TriggerSource:
+        """A plug-in that listens. Raises InputError: there is none, or it does not start."""
+        source = trigger_source(kind)
         try:
-            call()
+            source.start(topics, partial(self._calls.heard, kind))
         except Exception as defect:
-            message = f"trigger source '{kind}' does not {what} ({type(defect).__name__}: {defect})"
+            message = f"trigger source '{kind}' does not start ({type(defect).__name__}: {defect})"
             raise InputError(message, hint="see the documentation of that package") from defect
+        return source
+
+    def _stop(self, kind: str, source: TriggerSource) -> None:
+        """Stop a plug-in; that it raises is told, and harms nothing else."""
+        try:
+            source.stop()
+        except Exception as defect:
+            self._tell(f"trigger source '{kind}' does not stop ({type(defect).__name__}: {defect})")

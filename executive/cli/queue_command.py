@@ -20,11 +20,11 @@ from executive.mission.errors import InputError
 from executive.mission.file.parameters import given_values
 from executive.mission.request import Request
 from executive.mission.stack_file import load_stack
-from executive.store.doorbell import ring
 from executive.store.missions import MissionState, MissionStore, StoredMission, utc_now
 from executive.store.standing import StandingMission, StandingMissions
 from executive.store.trigger_source import refuse_missing_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
+from executive.store.wakeup import wake_server
 
 __all__ = ["queue"]
 
@@ -95,7 +95,7 @@ def add(
             else:
                 added = StandingMissions(missions).add(request, trigger, missed or Missed.SKIP)
                 mission, standing = missions.mission(added.id), {added.id: added}
-        ring(store or out / STORE)
+        wake_server(store or out / STORE)
     said = "is queued" if trigger is None else f"stands, to be queued by `errand queue serve` ({trigger})"
     console_for(as_json).print(f"Mission {mission.id} {said}: {request.name}", markup=False)
     if as_json:
@@ -121,7 +121,7 @@ def remove(number: Number, out: Out = Path("out"), store: Store = None) -> None:
         stands = missions.mission(number).state is MissionState.STANDING
         with nullcontext() if stands else missions.claimed():
             missions.remove(number)
-        ring(missions.path)
+        wake_server(missions.path)
     console_for(False).print(f"Mission {number} is removed.")
 
 

@@ -21,12 +21,12 @@ __all__ = ["Ended", "MissionRunner", "QueueServer", "Runner", "Waiting"]
 
 
 class Waiting(Protocol):
-    """Waits for the next thing to do; `executive.store.doorbell.Doorbell` is one."""
+    """Waits for the next thing to do; `executive.store.wakeup.WakeupPipe` is one."""
 
     def wait(self, until: datetime | None) -> None:
-        """Block until somebody rings or, at the latest, a moment comes."""
+        """Block until somebody calls `wake` or, at the latest, a moment comes."""
 
-    def ring(self) -> None:
+    def wake(self) -> None:
         """End the wait, from any thread or signal handler."""
 
 
@@ -76,7 +76,7 @@ class QueueServer:
         """Serve no longer; from any thread and from signal handlers."""
         self.stopped = self.stopped or reason
         self._runner.cancel(reason)
-        self._waiting.ring()
+        self._waiting.wake()
 
     def serve(self, *, end: datetime | None = None, until_idle: bool = False) -> list[Ended]:
         """Serve until it is stopped, until a moment (no mission begins after it), or until nothing is queued.

@@ -12,9 +12,9 @@ import typer
 from executive.cli.durable import STORE
 from executive.cli.output import console_for, print_json, refusals
 from executive.cli.signals import ended_by_signals
-from executive.store.doorbell import Doorbell
 from executive.store.missions import MissionState, MissionStore
 from executive.store.standing import StandingMissions
+from executive.store.wakeup import WakeupPipe
 
 __all__ = ["AsJson", "Out", "Store", "serve"]
 
@@ -52,11 +52,11 @@ def serve(
     with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
         end = None if for_s is None else missions.now() + timedelta(seconds=for_s)
         address = CallAddress(host, port, token)
-        with Doorbell(missions) as doorbell, Listeners(missions.path, address, tell) as listeners:
+        with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
             standing, runner = StandingMissions(missions), MissionRunner(missions, console, quiet=quiet)
-            server = QueueServer(missions, standing, doorbell, runner, follow=listeners.follow, tell=tell)
+            server = QueueServer(missions, standing, wakeup, runner, follow=listeners.follow, tell=tell)
             with ended_by_signals(server.stop):
-                tell(f"{len(standing.missions())} missions stand in {missions.path}. Ctrl-C ends.")
+                tell(f"Standing missions: {len(standing.missions())} ({missions.path}). Ctrl-C ends.")
                 ended = server.serve(end=end, until_idle=until_idle)
     tell(f"{sum(each.achieved for each in ended)} of {len(ended)} missions achieved")
     if ended and ended[-1].outcome == MissionState.CANCELLED.value:

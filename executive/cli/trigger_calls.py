@@ -1,4 +1,4 @@
-"""HTTP calls and messages of plug-ins: each queues the standing missions that wait for it, and rings the server."""
+"""HTTP calls and messages of plug-ins: each queues the standing missions that wait for it, and wakes the server."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from executive.cli.requests import prepare
 from executive.mission.errors import InputError
 from executive.mission.file.parameters import values_in_json
 from executive.mission.request import Request
-from executive.store.doorbell import ring
 from executive.store.missions import MissionStore, StoredMission
 from executive.store.standing import StandingMission, StandingMissions, TooManyError
 from executive.store.triggers import OnCall, OnTopic
+from executive.store.wakeup import wake_server
 from executive.view.calls import CallError
 
 __all__ = ["TriggerCalls"]
@@ -59,7 +59,7 @@ class TriggerCalls:
             raise CallError(HTTPStatus.SERVICE_UNAVAILABLE, str(error)) from error
         for mission in fired:
             self._tell(f"Mission {mission.id} is queued: {mission.request.name} ({mission.why})")
-        ring(self._store)
+        wake_server(self._store)
         return fired
 
 

@@ -37,6 +37,8 @@ __all__ = [
 ]
 
 FULL: Final = 0.95
+NOISE: Final = 0.01
+"""A charge that falls is read now below a level and now above it; one that rises was lower by more than this."""
 LONGEST: Final = timedelta(days=366)
 _WEEK: Final = 7
 _LONGEST_SKIP: Final = timedelta(hours=3)
@@ -151,7 +153,7 @@ class Every:
 
 @dataclass(frozen=True)
 class OnBatteryFull:
-    """A mission ends with this charge (0 to 1) or more, and the charge was lower while it ran."""
+    """A mission ends with this charge (0 to 1) or more, and the charge was lower while it ran, by more than NOISE."""
 
     level: float = FULL
 
@@ -160,7 +162,7 @@ class OnBatteryFull:
 
     def rises(self, lowest: float, last: float) -> bool:
         """Whether a mission with this lowest and last charge is an occurrence."""
-        return lowest < self.level <= last
+        return lowest < self.level - NOISE and self.level <= last
 
 
 @dataclass(frozen=True)

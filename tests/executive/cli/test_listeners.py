@@ -117,6 +117,20 @@ def test_a_plug_in_that_does_not_start_is_named(listeners, monkeypatch):
         listeners.follow([OnTopic("bell", "a")])
 
 
+def test_a_plug_in_that_does_not_stop_is_named_and_the_others_stop(listeners, notes, lines, monkeypatch):
+    stop = Source.stop
+
+    def broken(self):
+        stop(self)
+        raise ConnectionError("gone already")
+
+    monkeypatch.setattr(Source, "stop", broken)
+    listeners.follow([OnTopic("bell", "a"), OnTopic("horn", "a")])
+    listeners.close()
+    assert notes[2:] == [("stop",), ("stop",)]
+    assert lines[0] == "trigger source 'bell' does not stop (ConnectionError: gone already)"
+
+
 @pytest.mark.parametrize("host", ["192.0.2.1", "no host at all", "::ffff:zz"])
 def test_an_address_that_cannot_be_served_is_refused(tmp_path, lines, host):
     with (

@@ -18,8 +18,8 @@ from executive.mission.command import Command
 from executive.mission.errors import InputError
 from executive.mission.mission import mission_from_commands
 from executive.run.journal import TickNote
-from executive.store.doorbell import Doorbell
 from executive.store.missions import MissionStore
+from executive.store.wakeup import WakeupPipe
 from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
@@ -397,13 +397,13 @@ def test_serve_without_a_store_is_refused(errand):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_server_that_waits(errand, mission, plant, monkeypatch, number):
-    wait = Doorbell.wait
+    wait = WakeupPipe.wait
 
     def signalled(self, until):
         signal.raise_signal(number)
         wait(self, until)
 
-    monkeypatch.setattr(Doorbell, "wait", signalled)
+    monkeypatch.setattr(WakeupPipe, "wait", signalled)
     errand("queue", "add", mission("first"), "--every", "1h")
     begun = time.monotonic()
     assert errand("queue", "serve", "--for", "50").exit_code == 0

@@ -49,7 +49,7 @@ class World:
             assert until is not None, "it would wait for ever"
             self.now = max(self.now, until)
 
-    def ring(self):
+    def wake(self):
         """The wait is over by itself."""
 
     def run(self, mission):

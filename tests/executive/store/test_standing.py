@@ -228,6 +228,7 @@ def test_copies_that_wait_do_not_pile_up_without_end(add, standing, store):
         ((1.0, 0.97), False),
         ((0.2, 0.94), False),
         ((0.2, 0.97, 0.9), False),
+        ((0.951, 0.945, 0.951), False),
         ((), False),
     ],
 )
@@ -244,7 +245,7 @@ def test_a_battery_is_full_when_a_mission_ends_so_and_it_was_not_while_it_ran(ad
 def test_a_battery_counts_from_the_level_that_was_said(add, clock, fire, store):
     add("battery 50%")
     clock.pass_by(minutes=1)
-    end_mission(store, 0.49, 0.5)
+    end_mission(store, 0.48, 0.5)
     assert fire() == ["battery 50%"]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from rich.console import Console
 
@@ -16,6 +16,9 @@ from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.standing import StandingMissions
 from executive.store.triggers import Trigger
+
+MOST_STARTS: Final = 3
+"""A mission that has been started so often is not taken up by itself: what ends the process would end it for ever."""
 
 __all__ = ["Ended", "MissionRunner", "QueueServer", "Runner", "Waiting"]
 
@@ -107,11 +110,18 @@ class QueueServer:
         return ended
 
     def _take_up(self) -> list[Ended]:
-        """Go on with the mission of the queue that was broken off. Raises InputError: another one was broken off."""
+        """Go on with the mission of the queue that was broken off.
+
+        Raises InputError: it was broken off again and again, or it is none of the queue.
+        """
         broken = self._missions.missions(MissionState.RUNNING)
         for each in broken:
             if not each.queued:
                 raise broken_off(self._missions, each)
+            if each.starts >= MOST_STARTS:
+                what = f"mission {each.id} ({each.request.name}) was started {each.starts} times and broken off"
+                hint = f"`errand resume` tries again, `errand queue remove {each.id}` gives it up"
+                raise InputError(what, hint=hint, file=self._missions.path)
         return [self._runner.run(each) for each in broken if self.stopped is None]
 
     def _follow_again(self) -> None:

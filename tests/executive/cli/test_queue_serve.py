@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from executive.cli import queue_serve
-from executive.cli.queue_serve import Ended, MissionRunner, QueueServer
+from executive.cli.queue_serve import MOST_STARTS, Ended, MissionRunner, QueueServer
 from executive.mission.errors import InputError
 from executive.mission.request import Request
 from executive.run.journal import TickNote
@@ -173,6 +173,15 @@ def test_a_mission_that_was_broken_off_goes_on_first(server, store, world):
     store.begin(store.add(REQUEST, queued=True).id)
     server.serve(until_idle=True)
     assert [number for _, number, _ in world.runs] == [2, 1]
+
+
+def test_a_mission_that_ends_the_process_each_time_is_not_taken_up_for_ever(server, store, world):
+    store.add(REQUEST, queued=True)
+    for _ in range(MOST_STARTS):
+        store.begin(1)
+    with pytest.raises(InputError, match=r"started 3 times and broken off; `errand resume` tries again, .*remove 1"):
+        server.serve(until_idle=True)
+    assert world.runs == []
 
 
 def test_a_run_that_was_broken_off_is_left_to_the_user(server, store, world):

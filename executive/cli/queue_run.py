@@ -62,10 +62,11 @@ def go_on(
         return start_of(missions, mission, console, quiet=quiet, control=control)
     taken = take_up(missions, mission)
     console.print(f"Mission {mission.id} ({name}) goes on.", markup=False)
-    result = run_kept(missions, mission, taken.prepared, taken.durable, console, quiet=quiet, control=control)
+    prepared = _in_its_folder(mission, taken.prepared)
+    result = run_kept(missions, mission, prepared, taken.durable, console, quiet=quiet, control=control)
     told = list(taken.recollection.told)
     console.print("\n  ".join(["What became of its past:", *told]), markup=False)
-    show_files(mission.request.out, console)
+    show_files(prepared.request.out, console)
     return {**result, "resumed": told}
 
 
@@ -77,16 +78,20 @@ def start_of(
     Raises:
         InputError: its file, its world or the plant's state cannot be used.
     """
-    prepared = prepare(as_it_was(mission, missions.path))
-    asked = mission.request
-    out = asked.out / f"{mission.id:03d}-{slug(asked.name)}" if mission.queued else asked.out
-    prepared = replace(prepared, request=replace(prepared.request, out=out))
+    prepared = _in_its_folder(mission, prepare(as_it_was(mission, missions.path)))
     before = _before(missions, mission) if mission.queued else None
     durable = new_run(missions, mission) if before is None else next_run(missions, mission, before)
-    console.print(f"Mission {mission.id}: {asked.name}", markup=False, style="bold")
+    console.print(f"Mission {mission.id}: {mission.request.name}", markup=False, style="bold")
     result = run_kept(missions, mission, prepared, durable, console, quiet=quiet, control=control)
-    show_files(out, console)
+    show_files(prepared.request.out, console)
     return result
+
+
+def _in_its_folder(mission: StoredMission, prepared: Prepared) -> Prepared:
+    """With the folder for its files: each mission of a queue has its own."""
+    asked = mission.request
+    out = asked.out / f"{mission.id:03d}-{slug(asked.name)}" if mission.queued else asked.out
+    return replace(prepared, request=replace(prepared.request, out=out))
 
 
 def run_kept(

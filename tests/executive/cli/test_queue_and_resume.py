@@ -372,7 +372,10 @@ def test_serve_goes_on_with_what_was_killed(errand, mission, plant, states):
         errand("queue", "serve", "--until-idle", "--quiet")
     assert states() == ["running", "queued"]
     assert errand("queue", "serve", "--until-idle", "--quiet").exit_code == 0
-    assert [(run[0], run[3].log) for run in plant.runs[1:]] == [("first", "log-2.mcap"), ("second", "log.mcap")]
+    assert [(run[0], run[2], run[3].log) for run in plant.runs[1:]] == [
+        ("first", "001-first", "log-2.mcap"),
+        ("second", "002-second", "log.mcap"),
+    ]
     assert states() == ["success", "success"]
 
 

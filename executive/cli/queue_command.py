@@ -174,8 +174,8 @@ def _told(mission: StoredMission, standing: Mapping[int, StandingMission]) -> di
     told |= {"seed": asked.seed, "commands": list(asked.commands), "message": mission.message}
     if (stands := standing.get(mission.id)) is not None:
         due = _due(stands)
-        told |= {"trigger": str(stands.trigger), "missed": stands.missed.value}
-        told |= {"next": None if due is None else due.isoformat()}
+        told |= {"trigger": str(stands.trigger), "next": None if due is None else due.isoformat()}
+        told |= {} if isinstance(stands.trigger, OnCall | OnTopic) else {"missed": stands.missed.value}
     return {**told, "standing": mission.standing, "why": mission.why} if mission.why else told
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
@@ -20,6 +20,8 @@ __all__ = ["AsJson", "Out", "Store", "serve"]
 
 Out = Annotated[Path, typer.Option(help="Folder for logs; each mission gets one of its own in it.")]
 Store = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
+_LONGEST_S: Final = 3.2e9  # a hundred years
+
 AsJson = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
 
 
@@ -45,12 +47,13 @@ def serve(
     from executive.cli.queue_serve import MissionRunner, QueueServer
 
     console = console_for(as_json)
+    limit = None if for_s is None else timedelta(seconds=min(for_s, _LONGEST_S))
 
     def tell(line: str) -> None:
         console.print(line, markup=False)
 
     with refusals(), MissionStore(store or out / STORE, create=False) as missions, missions.claimed():
-        end = None if for_s is None else missions.now() + timedelta(seconds=for_s)
+        end = None if limit is None else missions.now() + limit
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
             standing, runner = StandingMissions(missions), MissionRunner(missions, console, quiet=quiet)

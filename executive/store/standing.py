@@ -14,7 +14,7 @@ from executive.store.missions import MissionState, MissionStore, StoredMission, 
 from executive.store.records import request_of, row_of
 from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedule, Timed, Trigger, local, trigger_of
 
-__all__ = ["MOST_WAITING", "StandingMission", "StandingMissions"]
+__all__ = ["LATE", "MOST_WAITING", "StandingMission", "StandingMissions", "TooManyError"]
 
 LATE: Final = timedelta(seconds=90)
 """What is noticed later than this after its time is missed: the clock was set, or the machine slept."""

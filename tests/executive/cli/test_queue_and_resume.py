@@ -298,14 +298,14 @@ def listed(errand):
         (("--at", "every weekday 09:00"), "every weekday 09:00", "skip"),
         (("--every", "30m", "--missed", "once"), "every 30m", "once"),
         (("--on", "battery full"), "battery full", "skip"),
-        (("--on", "call first"), "call first", "skip"),
+        (("--on", "call first"), "call first", None),
     ],
 )
 def test_a_mission_with_a_trigger_stands_until_it_is_removed(errand, mission, plant, options, trigger, missed):
     result = errand("queue", "add", mission("first"), *options)
     assert (result.exit_code, f"({trigger}): first" in result.output) == (0, True), result.output
     (told,) = listed(errand)
-    assert (told["state"], told["trigger"], told["missed"]) == ("standing", trigger, missed)
+    assert (told["state"], told["trigger"], told.get("missed")) == ("standing", trigger, missed)
     assert (told["next"] is not None) == trigger.startswith("every")
     assert trigger in errand("queue", "list").output
     assert errand("queue", "run", "--quiet").exit_code == 0
@@ -391,6 +391,13 @@ def test_serve_ends_when_its_time_is_over(errand, mission, plant):
     errand("queue", "add", mission("first"), "--every", "1h")
     assert errand("queue", "serve", "--for", "0.05").exit_code == 0
     assert plant.runs == []
+
+
+@pytest.mark.parametrize("seconds", ["1e300", "inf"])
+def test_serve_may_have_all_the_time_there_is(errand, mission, plant, seconds):
+    errand("queue", "add", mission("first"))
+    assert errand("queue", "serve", "--for", seconds, "--until-idle", "--quiet").exit_code == 0
+    assert len(plant.runs) == 1
 
 
 def test_serve_without_a_store_is_refused(errand):

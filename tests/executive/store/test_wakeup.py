@@ -12,7 +12,8 @@ import pytest
 from executive.mission.errors import InputError
 from executive.store import wakeup as wakeup_module
 from executive.store.missions import MissionStore
-from executive.store.wakeup import WakeupPipe, wake_server
+from executive.store.standing import LATE
+from executive.store.wakeup import LONGEST_WAIT, WakeupPipe, wake_server
 
 ROOT = Path(__file__).parents[3]
 
@@ -77,6 +78,10 @@ def test_a_wait_is_never_so_long_that_a_clock_which_is_set_would_go_unnoticed(st
     with WakeupPipe(store) as pipe:
         assert waited_s(pipe, store, 1000) < 10
         pipe.wait(None)
+
+
+def test_what_is_noticed_at_the_end_of_the_longest_wait_is_not_late():
+    assert LONGEST_WAIT < LATE
 
 
 def test_a_pipe_that_a_killed_server_left_is_taken_over(store):

@@ -202,10 +202,11 @@ class TreeRun:
         context = self.context
         running = (leaf for leaf in self._leaves if leaf.status is Status.RUNNING)
         checkpoints = {leaf.path_id: leaf.checkpoint for leaf in running if leaf.checkpoint}
-        now_s, pose = context.clock.now(), None
+        now_s, pose, charge = context.clock.now(), None, None
         if changes or now_s >= self._pose_due_s:
             self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.known_pose()
-        return TickNote(now_s, changes, context.board.values(), pose, checkpoints)
+            charge = context.robot.battery().charge
+        return TickNote(now_s, changes, context.board.values(), pose, checkpoints, charge)
 
     def _transition(self, change: Change) -> dict[str, object]:
         after = change.after

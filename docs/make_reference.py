@@ -21,8 +21,8 @@ from executive.tree.registry import built_in_skills
 from executive.tree.types import describe_type, field_types
 from plant.worlds.world import SeedRules
 from skills.api import Skill
+from skills.faults.kinds import STANDARD_FAULTS
 from skills.stack import SLOTS, components, skill_options, stack_schema
-from skills.testing.fault_kinds import STANDARD_FAULTS
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from make_api import api_page

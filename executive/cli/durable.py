@@ -38,6 +38,9 @@ def run_arguments(asked: Request, prepared: Prepared) -> list[str]:
     arguments += [] if asked.start is None else [f"--start={asked.start}"]
     arguments += [f"--set={name}={json.dumps(value)}" for name, value in asked.given.items()]
     arguments += ["--map", str(asked.map)] if asked.map else []
+    arguments += [f"--fault={words}" for words in asked.scenario.faults]
+    arguments += [f"--random-faults={asked.scenario.random}"] if asked.scenario.random else []
+    arguments += [f"--scenario={path}" for path in asked.scenario_files]
     if asked.file is None:
         return arguments
     arguments += [part for answer in asked.answers for part in ("--answer", answer)]
@@ -84,7 +87,8 @@ def next_run(store: MissionStore, mission: StoredMission, before: StoredMission)
 def same_world(one: StoredMission, other: StoredMission) -> bool:
     """Whether two missions are to be done by one robot in one world."""
     a, b = one.request, other.request
-    return (a.world, a.world_name, a.seed, a.robot) == (b.world, b.world_name, b.seed, b.robot)
+    same = (a.world, a.world_name, a.seed, a.robot) == (b.world, b.world_name, b.seed, b.robot)
+    return same and a.scenario == b.scenario
 
 
 @dataclass(frozen=True)

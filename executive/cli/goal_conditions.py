@@ -49,8 +49,10 @@ def conditions_of(tree: CompiledTree, result: RobotResult) -> tuple[referee.Goal
         if part.goal is None:
             continue
         below = f"{part.path_id}/"
-        answers = (answer for path, answer in result.answers.items() if f"{path}/".startswith(below))
-        condition = condition_of(part.goal, robot=tree.robot_name, answer=next(answers, None))
+        path = next((path for path in result.answers if f"{path}/".startswith(below)), "")
+        times_s = [finding.t_s for finding in result.findings if finding.path_id == path]
+        condition = condition_of(part.goal, robot=tree.robot_name, answer=result.answers.get(path))
+        condition = replace(condition, answered_s=times_s[-1] if times_s else None)
         found.append(replace(condition, passing=any(later.goal is None for later in parts[n + 1 :])))
     return tuple(found)
 

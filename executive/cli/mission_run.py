@@ -8,6 +8,7 @@ from executive.cli.artifacts import Artifacts, draw_answer
 from executive.cli.backend import Backend
 from executive.cli.durable import Durable, mission_events
 from executive.cli.found_out import with_found_out
+from executive.cli.happening_log import HappeningLog
 from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
 from executive.cli.report import RefereeReport, RunReport
@@ -29,6 +30,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView, node_view
 from executive.view.collapse import DRAWN_NODES, folded_to, what_ran
 from executive.view.svg import to_svg
+from skills.faults.faulty_robot import with_faults
 
 
 @dataclass(frozen=True)
@@ -63,9 +65,11 @@ def run_request(
     Raises InputError when the world cannot be used.
     """
     tree, out, clock, work = prepared.tree, prepared.request.out, backend.clock, Work()
+    scenario = prepared.request.scenario
     entry = backend.entry(tree, durable)
     warm_up(entry)
-    entry = replace(entry, detector=CountedDetector(entry.detector, work))
+    robot = with_faults(entry.robot, clock, scenario.faults, since_s=0.0)
+    entry = replace(entry, robot=robot, detector=CountedDetector(entry.detector, work))
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
     if listener is not None:
         log.listen(listener)
@@ -74,7 +78,9 @@ def run_request(
         if page is not None:
             page.begin(log, backend.show_live())
         log_map(log, prepared)
-        announce(log, clock, tree, prepared.knowledge, world=prepared.world.name, seed=prepared.request.seed)
+        world, seed = prepared.world.name, prepared.request.seed
+        announce(log, clock, tree, prepared.knowledge, world=world, seed=seed, scenario=scenario.lines())
+        watched = HappeningLog(log, robot, backend.happened) if scenario else None
         with cancelled_by_signals(control or Control(pace=None)) as controlled, LockStepWorker(clock) as worker:
             begin = run if profile is None else profiled(profile, run, backend, entry, worker)
             result = begin(
@@ -84,7 +90,7 @@ def run_request(
                 publish=artifacts if profile is None else profile.timed("log", artifacts),
                 settings=RunSettings(seed=prepared.request.seed),
                 control=controlled,
-                observer=both(observer, page),
+                observer=both(observer, page, watched),
                 work=work,
                 profile=profile,
             )
@@ -154,4 +160,5 @@ def _report(
         real_time_factor=round(result.sim_time_s / max(result.wall_time_s, 1e-6), 2),
         ticks=result.ticks,
         log=log,
+        scenario=prepared.request.scenario.lines(),
     )

@@ -64,7 +64,7 @@ class RunReport:
 
     Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name. `referee` is None
     where nobody but the robot saw what happened. `answers` has all answers in order, `said` what the robot said,
-    `seen_objects` what it is sure to have seen.
+    `seen_objects` what it is sure to have seen. `scenario` tells what went wrong and happened by intention.
     """
 
     outcome: str
@@ -83,6 +83,7 @@ class RunReport:
     answers: tuple[ReportedAnswer, ...] = ()
     said: tuple[Said, ...] = ()
     seen_objects: tuple[ReportedObject, ...] = ()
+    scenario: tuple[str, ...] = ()
 
     @property
     def claimed(self) -> bool:
@@ -107,8 +108,10 @@ class RunReport:
     def to_json(self) -> dict[str, Any]:
         """The report as JSON values; the referee's events are for people only."""
         values = {**asdict(replace(self, work={})), "work": dict(self.work)}
-        lists = {name: list(values[name]) for name in ("commands", "answers", "said", "seen_objects")}
+        lists = {name: list(values[name]) for name in ("commands", "answers", "said", "seen_objects", "scenario")}
         values = {**values, **lists}
+        if not self.scenario:
+            del values["scenario"]
         if self.referee is not None:
             del values["referee"]["events"]
         return values
@@ -116,6 +119,7 @@ class RunReport:
     @staticmethod
     def from_json(values: Mapping[str, Any]) -> RunReport:
         """A report that another process has printed."""
+        values = {"scenario": (), **values}
         own = {each.name: values[each.name] for each in fields(RunReport)}
         referee = None if values["referee"] is None else RefereeReport(**values["referee"])
         lists = {
@@ -123,6 +127,7 @@ class RunReport:
             "answers": tuple(ReportedAnswer(**each) for each in values["answers"]),
             "said": tuple(Said(**each) for each in values["said"]),
             "seen_objects": tuple(_reported_object(each) for each in values["seen_objects"]),
+            "scenario": tuple(values["scenario"]),
         }
         return RunReport(**{**own, "referee": referee, **lists})
 

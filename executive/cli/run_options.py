@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,7 +13,17 @@ from typer.core import TyperCommand
 if TYPE_CHECKING:
     from skills.robot import Pose2D
 
-__all__ = ["SET", "START", "START_OR_UNKNOWN", "StartCommand", "joined", "start_pose"]
+__all__ = [
+    "FAULT",
+    "RANDOM_FAULTS",
+    "SCENARIO",
+    "SET",
+    "START",
+    "START_OR_UNKNOWN",
+    "StartCommand",
+    "joined",
+    "start_pose",
+]
 
 _NAME = "--start"
 START = Annotated[
@@ -24,6 +35,17 @@ START_OR_UNKNOWN = Annotated[
         _NAME, metavar="X Y YAW", help="Where the robot stands (m, rad); 'unknown': anywhere, and it finds out."
     ),
 ]
+FAULT = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault", metavar="WORDS", help='A fault, as in "camera.hand: dropout 5 s at 20 s"; may be repeated.'
+    ),
+]
+SCENARIO = Annotated[
+    list[Path] | None,
+    typer.Option("--scenario", metavar="FILE", help="Faults and events: people walk, doors close, objects are moved."),
+]
+RANDOM_FAULTS = Annotated[int, typer.Option("--random-faults", min=0, max=100, help="So many faults, by the seed.")]
 SET = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value for a parameter of the mission file.")
 ]

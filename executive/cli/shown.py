@@ -87,6 +87,8 @@ def show_run(
     """
     for told in prepared.mission.notes:
         console.print(f"{told}.", markup=False)
+    for line in prepared.request.scenario.lines():
+        console.print(f"Scenario: {line}", markup=False)
     for command in prepared.mission.commands:
         console.print(str(command), markup=False)
     talk = conversation or conversation_of(prepared, control)

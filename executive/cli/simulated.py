@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -63,6 +63,10 @@ class SimulatedBackend:
             take_up_plant(self._simulation, durable.plant, label=durable.take_up_label)
         durable.journal.keep_world = self._simulation.keep_in(durable.plant, label=durable.label)
         return replace(entry, journal=durable.journal)
+
+    def happened(self) -> Sequence[tuple[float, str]]:
+        """What doors did, and what somebody moved."""
+        return self._simulation.clock.happened
 
     def work(self) -> Mapping[str, int]:
         """The plant's counters."""

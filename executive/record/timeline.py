@@ -64,7 +64,8 @@ def _transition(event: Event) -> Entry:
 
 def _run(data: Mapping[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in data.get("versions", {}).items())
-    return f"world {data.get('world')}, seed {data.get('seed')}; {versions}"
+    scenario = "".join(f"; {line}" for line in data.get("scenario", ()))
+    return f"world {data.get('world')}, seed {data.get('seed')}; {versions}{scenario}"
 
 
 def _outcome(data: Mapping[str, Any]) -> str:

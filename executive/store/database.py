@@ -33,6 +33,7 @@ CREATE TABLE mission (
     map TEXT,
     given TEXT NOT NULL,
     start TEXT,
+    scenario TEXT,
     commands TEXT NOT NULL,
     fingerprint TEXT NOT NULL,
     queued INTEGER NOT NULL,

@@ -11,6 +11,7 @@ from py_trees.common import Status
 
 from executive.mission.errors import InputError
 from executive.mission.request import Request, Start
+from executive.mission.scenario import Scenario
 from executive.run.journal import TickNote
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.snapshot import Change, NodeState
@@ -52,6 +53,15 @@ def test_a_mission_keeps_where_it_starts(path, start):
     request = replace(REQUEST, start=start)
     with MissionStore(path) as store:
         store.add(request, queued=True)
+    with MissionStore(path, create=False) as store:
+        assert store.missions()[0].request == request
+
+
+def test_a_mission_keeps_what_goes_wrong_and_happens(path):
+    events = {"people": {"Robin": {"start": 3.0}}, "doors": ({"name": "door", "closes": 4.0},), "moves": ()}
+    request = replace(REQUEST, scenario=Scenario(("arm refuses at 3 s",), **events))
+    with MissionStore(path) as store:
+        store.add(request, queued=False)
     with MissionStore(path, create=False) as store:
         assert store.missions()[0].request == request
 

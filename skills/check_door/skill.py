@@ -75,8 +75,9 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
             seen = yield from self._look(door, inputs.door)
             if seen.least_m >= self._needed_m() or seen.most_m < self._needed_m():
                 return self._told(inputs, seen)
-        why = "hardly anything of it is seen" if seen.rays < _FEW_RAYS else "something stands in it or before it"
-        raise _untold(inputs.door, why)
+        few = f"hardly anything is seen of the {inputs.door}"
+        why = few if seen.rays < _FEW_RAYS else f"something stands in the {inputs.door} or before it"
+        raise SkillFailure(Cause.POSTCONDITION, why)
 
     def _look(self, door: Doorway, name: str) -> Routine[Opening]:
         """How wide it is open in the next scans.
@@ -92,9 +93,9 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
             scans.append((scan, estimate.X_WO @ scan.X_OB @ scan.X_BL))
         x_m, y_m, _ = (float(value) for value in scans[-1][1].translation())
         if (far_m := door.distance_m((x_m, y_m))) > self.options.reach_m:
-            raise _untold(name, f"it is {far_m:.1f} m away")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {name} is {far_m:.1f} m away, too far to tell")
         if door.view_angle_rad((x_m, y_m)) > self.options.flattest_rad:
-            raise _untold(name, "it is seen too flat from here")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {name} is seen too flat from here to tell")
         return opening(door, scans)
 
     def _next_scan(self, message: str) -> Routine[Scan]:
@@ -121,7 +122,3 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
             return Succeeded(f"the {door} is closed", outputs)
         gap = f"at most {seen.most_m:.2f} m are free, and the robot needs {needed_m:.2f} m"
         return Succeeded(f"the {door} is not open: {gap}", outputs)
-
-
-def _untold(door: str, why: str) -> SkillFailure:
-    return SkillFailure(Cause.POSTCONDITION, f"cannot tell whether the {door} is open: {why}")

@@ -1,4 +1,7 @@
-"""Looking whether a door is open: go where it can be seen through, and look; where that fails, from its other side."""
+"""Looking whether a door is open: go where it can be seen through, and look; where that fails, from its other side.
+
+A closed door may bar the way to where it would be looked at. So the robot looks from where its way ended, too.
+"""
 
 from __future__ import annotations
 
@@ -18,27 +21,34 @@ CHECK_DOOR: Final = "check_door"
 _BEFORE_M: Final = ((1.5, 1.2, 1.8), (0.9, 0.7))
 """How far before a door, the better ones first."""
 _ASIDE_RAD: Final = tuple(map(math.radians, (0.0, 20.0, -20.0, 40.0, -40.0)))
+_LOOK_S: Final = 0.5
 _TURNED_RAD: Final = (0.0, math.pi / 2)
 _BODY_M: Final = (1.3, 0.7)
 """Length and width of the body, with a little room around it."""
 
 
 def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str) -> NodeSpec:
-    """Go before the door in the room on its first side, or else on the other, and look; the answer goes to `key`.
+    """Go before the door in the room on one side, or else on the other, and look; the answer goes to `key`.
+
+    The side with more doors comes first: whoever must go through a door to look at it need not look.
 
     Raises InputError: the world has no such door.
     """
     door = _door(builder, between)
     through_rad = _through_rad(builder.knowledge, door)
-    views = [(room, view) for room in between if (view := view_of(builder.knowledge, door, room)) is not None]
-    views = views or [(room, pose_2d(builder.knowledge.places[room].pose)) for room in between]
+    sides = sorted(between, key=lambda room: -sum(room in other.between for other in builder.knowledge.doors))
+    views = [(room, view) for room in sides if (view := view_of(builder.knowledge, door, room)) is not None]
+    views = views or [(room, pose_2d(builder.knowledge.places[room].pose)) for room in sides]
     told = f"door between {between[0]} and {between[1]}"
     ports = {"middle_W": door.at, "width_m": door.width, "through_rad": through_rad, "door": told}
 
     def looked(room: str, view: Pose2D) -> NodeSpec:
         below = builder.at(f"from-{room}")
-        drive = below.navigate(view, f"the {told}")
-        return below.sequence(f"look from the {room}", drive, below.skill(CHECK_DOOR, ports, {"open": key}))
+        stay = below.pause("stay", "look from here", _LOOK_S)
+        near = below.node(
+            "selector", "stand before it, or stay", below.navigate(view, f"the {told}"), stay, part="near"
+        )
+        return below.sequence(f"look from the {room}", near, below.skill(CHECK_DOOR, ports, {"open": key}))
 
     return builder.node("selector", f"is the {told} open?", *(looked(room, view) for room, view in views))
 

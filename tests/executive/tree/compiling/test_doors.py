@@ -45,8 +45,8 @@ def test_it_goes_before_the_door_and_looks_and_else_does_so_from_the_other_side(
     looks = plan(world())
     assert (looks.kind, looks.path_id) == ("selector", "alice/m/1-check")
     assert [[step.path_id.rpartition("/")[2] for step in side.children] for side in looks.children] == [
-        ["way", "check-door"],
-        ["way", "check-door"],
+        ["near", "check-door"],
+        ["near", "check-door"],
     ]
     goals = [port(leaf, "goal") for leaf in leaves(looks, "navigate")]
     assert goals == [Pose2D(3.0, 2.55, 1.5708), Pose2D(3.0, 5.55, -1.5708)]
@@ -58,6 +58,20 @@ def test_the_skill_learns_where_the_door_is_and_answers_under_the_key():
         assert abs(math.cos(port(leaf, "through_rad"))) < 1e-9
         assert port(leaf, "door") == "door between kitchen and hall"
         assert leaf.options["outputs"] == {"open": "alice/m/1-check/answer"}
+
+
+def test_where_the_way_is_barred_it_looks_from_where_it_is():
+    near = plan(world()).children[0].children[0]
+    assert [near.kind, *(child.kind for child in near.children)] == ["selector", "recover", "pause"]
+
+
+def test_the_side_from_which_there_are_more_ways_comes_first():
+    cellar = {"pose": {"x": 9, "y": 6}, "polygon": [[6.1, 4.1], [9, 4.1], [9, 8], [6.1, 8]]}
+    told = world().model_dump()
+    told["places"]["cellar"] = cellar
+    told["doors"] = (*told["doors"], {"between": ["cellar", "hall"], "at": (6.05, 6.0), "width": 0.9})
+    looks = plan(Knowledge.model_validate(told))
+    assert [side.name for side in looks.children] == ["look from the hall", "look from the kitchen"]
 
 
 def test_path_ids_are_unique():

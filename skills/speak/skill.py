@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
+from skills.api import Cause, Failed, Part, Running, Skill, Step, Succeeded
 from skills.quantities import Delay
 
 SPEECH_TOPIC: Final = "speech"
@@ -37,6 +37,7 @@ class Speak(Skill[SpeakInputs]):
 
     name: ClassVar[str] = "speak"
     Inputs: ClassVar[type] = SpeakInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.VOICE})
     Options: ClassVar[type] = SpeakOptions
     options: SpeakOptions
     causes: ClassVar[Mapping[Cause, str]] = {Cause.PRECONDITION: "there is no text, or it is too long"}

@@ -19,7 +19,17 @@ from executive.cli.mission_run import Finished
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Prepared, prepare
-from executive.cli.run_options import FAULT, RANDOM_FAULTS, SCENARIO, SET, START_OR_UNKNOWN
+from executive.cli.run_options import (
+    FAULT,
+    RANDOM_FAULTS,
+    SCENARIO,
+    SET,
+    START_OR_UNKNOWN,
+    TIME_LIMIT,
+    TIME_OF_DAY,
+    time_limit_s,
+    time_of_day,
+)
 from executive.cli.shown import control_for, show_files, show_run, voice_for
 from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
@@ -88,6 +98,8 @@ def run(
     fault: FAULT = None,
     random_faults: RANDOM_FAULTS = 0,
     scenario: SCENARIO = None,
+    day_time: TIME_OF_DAY = None,
+    time_limit: TIME_LIMIT = None,
     anyway: Anyway = False,
     aloud: Annotated[bool, typer.Option("--voice", help="Say aloud what the robot says, by espeak-ng.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
@@ -110,6 +122,7 @@ def run(
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
         asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
+        asked = replace(asked, time_of_day=time_of_day(day_time), time_limit_s=time_limit_s(time_limit))
         asked = _disturbed(asked, fault, random_faults, scenario)
         finished, page = _run_kept(
             asked,

@@ -16,6 +16,7 @@ from executive.cli.report_file import TREE_FILE, write_report
 from executive.cli.requests import Prepared
 from executive.cli.signals import HUNG_UP, cancelled_by_signals
 from executive.cli.warm_up import warm_up
+from executive.mission.request import Request
 from executive.record.announce import announce
 from executive.record.event_log import EventLog, Listener
 from executive.record.profile import Profile
@@ -88,7 +89,7 @@ def run_request(
                 clock=clock,
                 worker=worker,
                 publish=artifacts if profile is None else profile.timed("log", artifacts),
-                settings=RunSettings(seed=prepared.request.seed),
+                settings=_settings(prepared.request),
                 control=controlled,
                 observer=both(observer, page, watched),
                 work=work,
@@ -111,6 +112,15 @@ def run_request(
     if page is not None:
         page.end(recording)
     return replace(finished, report=report)
+
+
+def _settings(request: Request) -> RunSettings:
+    """The settings of a run: seed, time of day, and time limit."""
+    usual = RunSettings(seed=request.seed)
+    limit_s = usual.time_limit_s if request.time_limit_s is None else request.time_limit_s
+    hours, minutes = map(int, (request.time_of_day or "0:0").split(":"))
+    time_s = None if request.time_of_day is None else 3600.0 * hours + 60.0 * minutes
+    return replace(usual, time_limit_s=limit_s, time_of_day_s=time_s)
 
 
 def _keep(durable: Durable, log: EventLog, robot_name: str) -> None:

@@ -33,7 +33,6 @@ CREATE TABLE mission (
     map TEXT,
     given TEXT NOT NULL,
     start TEXT,
-    scenario TEXT,
     commands TEXT NOT NULL,
     fingerprint TEXT NOT NULL,
     queued INTEGER NOT NULL,
@@ -79,8 +78,13 @@ CREATE TABLE battery (
     ended TEXT
 );
 """
+_SCENARIOS_AND_TIMES: Final = """
+ALTER TABLE mission ADD COLUMN scenario TEXT;
+ALTER TABLE mission ADD COLUMN time_of_day TEXT;
+ALTER TABLE mission ADD COLUMN time_limit_s REAL;
+"""
 _OLDEST: Final = 4
-_ADDED: Final = {5: _TRIGGERS}
+_ADDED: Final = {5: _TRIGGERS + _SCENARIOS_AND_TIMES}
 """What each version has added to the one before; `_OLDEST` is `_SCHEMA`."""
 
 

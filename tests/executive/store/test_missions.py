@@ -212,12 +212,14 @@ def test_a_store_of_another_version_is_refused(path):
         MissionStore(path)
 
 
-def test_a_store_from_before_there_were_triggers_is_brought_up_to_date(path):
+def test_a_store_of_version_4_is_brought_up_to_date(path):
     with MissionStore(path) as store:
         kept = store.add(REQUEST, queued=True)
     with sqlite3.connect(path) as old:
         for table in ("standing", "origin", "battery"):
             old.execute(f"DROP TABLE {table}")
+        for column in ("scenario", "time_of_day", "time_limit_s"):
+            old.execute(f"ALTER TABLE mission DROP COLUMN {column}")
         old.execute("PRAGMA user_version = 4")
     old.close()
     with MissionStore(path, create=False) as store:

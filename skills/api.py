@@ -261,7 +261,8 @@ class Question:
     """A question to the operator.
 
     `id` is unique among the open ones (a path id); with `options`, nothing else is an answer. `default` counts when
-    nobody answers within `limit_s` of the robot's clock. Raises ValueError when the default is none of the options.
+    nobody answers within `limit_s` of the robot's clock; an empty one says that nobody did. Raises ValueError when the
+    default is none of the options.
     """
 
     id: str
@@ -271,7 +272,7 @@ class Question:
     limit_s: float
 
     def __post_init__(self) -> None:
-        if self.options and self.default not in self.options:
+        if self.options and self.default and self.default not in self.options:
             raise ValueError(f"question '{self.id}': the default '{self.default}' is none of {list(self.options)}")
 
 
@@ -372,6 +373,17 @@ class NoOptions:
     """Nothing can be set."""
 
 
+class Part(enum.Enum):
+    """A part of the robot that one skill at a time may use."""
+
+    BASE = "base"
+    ARM = "arm"
+    VOICE = "voice"
+
+
+WHOLE_ROBOT: Final = frozenset({Part.BASE, Part.ARM})
+
+
 class Skill(ABC, Generic[InputsT]):
     """Base of all skills.
 
@@ -381,6 +393,7 @@ class Skill(ABC, Generic[InputsT]):
     `changes_world` marks a skill that must not run twice: after a restart it gets `resume`, and checks first.
     `gripper_before` says whether the gripper has to hold something (False: to be empty) when it begins, `gripper_after`
     whether it does when it has succeeded; None: it does not matter, and nothing changes.
+    `uses` are the parts of the robot that it uses: skills that share none may run side by side.
     `Options` is a frozen dataclass of what a stack file may set of the skill, all with defaults.
     `max_data_age_s` says how old (s) the data may be on which a success rests, by name: a sense verb (not `image`),
     "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.
@@ -395,6 +408,7 @@ class Skill(ABC, Generic[InputsT]):
     changes_world: ClassVar[bool] = False
     gripper_before: ClassVar[bool | None] = None
     gripper_after: ClassVar[bool | None] = None
+    uses: ClassVar[frozenset[Part]] = WHOLE_ROBOT
     Options: ClassVar[type] = NoOptions
     checkpoint: Mapping[str, Any] = MappingProxyType({})
 

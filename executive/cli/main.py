@@ -19,8 +19,18 @@ from executive.cli.mission_run import Finished
 from executive.cli.output import NOT_ACHIEVED, console_for, print_json, refusals, show_table
 from executive.cli.page_view import PageView, queueing
 from executive.cli.requests import Prepared, prepare
-from executive.cli.run_options import FAULT, RANDOM_FAULTS, SCENARIO, SET, START_OR_UNKNOWN
-from executive.cli.shown import control_for, show_files, show_run
+from executive.cli.run_options import (
+    FAULT,
+    RANDOM_FAULTS,
+    SCENARIO,
+    SET,
+    START_OR_UNKNOWN,
+    TIME_LIMIT,
+    TIME_OF_DAY,
+    time_limit_s,
+    time_of_day,
+)
+from executive.cli.shown import control_for, show_files, show_run, voice_for
 from executive.cli.simulated import run_simulated
 from executive.cli.stack_command import STACK
 from executive.cli.sweep import (
@@ -39,6 +49,7 @@ from executive.mission.file.parameters import given_values
 from executive.mission.request import Request, Start
 from executive.mission.scenario import Scenario
 from executive.record.profile import Profile, lines
+from executive.speech.voice import Voice
 from executive.store.missions import MissionStore
 
 World = Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")]
@@ -87,7 +98,10 @@ def run(
     fault: FAULT = None,
     random_faults: RANDOM_FAULTS = 0,
     scenario: SCENARIO = None,
+    day_time: TIME_OF_DAY = None,
+    time_limit: TIME_LIMIT = None,
     anyway: Anyway = False,
+    aloud: Annotated[bool, typer.Option("--voice", help="Say aloud what the robot says, by espeak-ng.")] = False,
     view: Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")] = False,
     view_for: Annotated[float | None, typer.Option(min=0.0, help="The page stays so long (s) after the end.")] = None,
     view_port: Annotated[int, typer.Option(min=0, max=65535, help="The page's port; 0 takes a free one.")] = 0,
@@ -102,12 +116,13 @@ def run(
         later = queueing(prepared, store=kept_in, out=out)
         return PageView(prepared, console, port=view_port, later=later) if wants_page else None
 
-    with refusals():
+    with refusals(), voice_for(aloud) as voice:
         if listen_to is not None:
             say = hear_request(listen_to, file or say, world=world, require_wake=wake is not False, console=console)
         at = None if start is None else Start.of(start)
         asked = Request(say, file, world, wake, tuple(answer or ()), questions, seed, out, not no_record, stack)
         asked = replace(asked, given=given_values(given or ()), start=at, map=own_map)
+        asked = replace(asked, time_of_day=time_of_day(day_time), time_limit_s=time_limit_s(time_limit))
         asked = _disturbed(asked, fault, random_faults, scenario)
         finished, page = _run_kept(
             asked,
@@ -118,6 +133,7 @@ def run(
             console=console,
             page=page_of,
             profile=timing,
+            voice=voice,
         )
     if timing is not None:
         for line in lines(timing.table()):
@@ -217,6 +233,7 @@ def _run_kept(
     console: Console,
     page: PageOf,
     profile: Profile | None,
+    voice: Voice,
 ) -> tuple[Finished, PageView | None]:
     """Run it, shown, and kept in the store so that another process can take it up."""
     prepared = _prepared(asked, anyway=anyway)
@@ -233,7 +250,14 @@ def _run_kept(
             start = partial(run_simulated, prepared, page=shown, durable=durable, profile=profile)
             talk = None if shown is None else shown.conversation
             finished = show_run(
-                start, prepared, console, control=control, quiet=quiet, whole_tree=whole_tree, conversation=talk
+                start,
+                prepared,
+                console,
+                control=control,
+                quiet=quiet,
+                whole_tree=whole_tree,
+                conversation=talk,
+                voice=voice,
             )
             ended(finished.report)
     show_files(asked.out, console)

@@ -7,16 +7,19 @@ from dataclasses import dataclass, replace
 
 from executive.cli.artifacts import Artifacts, draw_answer
 from executive.cli.backend import Backend
-from executive.cli.durable import Durable
+from executive.cli.durable import Durable, mission_events
+from executive.cli.found_out import with_found_out
 from executive.cli.happening_log import HappeningLog
 from executive.cli.page_view import PageView, log_map
 from executive.cli.profiling import profiled
 from executive.cli.report import RefereeReport, RunReport
+from executive.cli.report_file import TREE_FILE, write_report
 from executive.cli.requests import Prepared
 from executive.cli.signals import HUNG_UP, cancelled_by_signals
 from executive.cli.warm_up import warm_up
+from executive.mission.request import Request
 from executive.record.announce import announce
-from executive.record.event_log import EventLog
+from executive.record.event_log import EventLog, Listener
 from executive.record.profile import Profile
 from executive.record.schemas import WORK
 from executive.record.work import CountedDetector, Work
@@ -55,11 +58,13 @@ def run_request(
     page: PageView | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
+    listener: Listener | None = None,
 ) -> Finished:
-    """Run a request on a backend and write log, tree and what that has recorded into its folder.
+    """Run a request on a backend and write log, tree, report and what that has recorded into its folder.
 
-    The observer is told after each tick; through `control` the run is held, cancelled, and so on; `page` shows it;
-    with `durable` another process can take it up, or this one takes up another's; `profile` times the subsystems.
+    The observer is told after each tick, the listener of each logged message; through `control` the run is held,
+    cancelled, and so on; `page` shows it; with `durable` another process can take it up, or this one takes
+    up another's; `profile` times the subsystems.
     Raises InputError when the world cannot be used.
     """
     tree, out, clock, work = prepared.tree, prepared.request.out, backend.clock, Work()
@@ -69,6 +74,8 @@ def run_request(
     robot = with_faults(entry.robot, clock, _to_come(scenario.faults, clock.now()), since_s=0.0)
     entry = replace(entry, robot=robot, detector=CountedDetector(entry.detector, work))
     log = EventLog(out / ("log.mcap" if durable is None else durable.log), clock)
+    if listener is not None:
+        log.listen(listener)
     artifacts = Artifacts(log)
     try:
         if page is not None:
@@ -84,7 +91,7 @@ def run_request(
                 clock=clock,
                 worker=worker,
                 publish=artifacts if profile is None else profile.timed("log", artifacts),
-                settings=RunSettings(seed=prepared.request.seed),
+                settings=_settings(prepared.request),
                 control=controlled,
                 observer=both(observer, page, watched),
                 work=work,
@@ -96,12 +103,26 @@ def run_request(
         log(WORK, counts)
     finally:
         log.close()
+    events = mission_events(log.path)
+    artifacts.recall(events)
     finished = _judged(prepared, backend, result, log)
+    report = with_found_out(replace(finished.report, work=counts), prepared.knowledge, result, artifacts, events)
     draw_answer(artifacts, out)
     recording = backend.leave(artifacts, out)
+    tree = result.trees.get(prepared.tree.robot_name, prepared.tree)
+    write_report(prepared, report, tree, finished.tree, artifacts, events)
     if page is not None:
         page.end(recording)
-    return replace(finished, report=replace(finished.report, work=counts))
+    return replace(finished, report=report)
+
+
+def _settings(request: Request) -> RunSettings:
+    """The settings of a run: seed, time of day, and time limit."""
+    usual = RunSettings(seed=request.seed)
+    limit_s = usual.time_limit_s if request.time_limit_s is None else request.time_limit_s
+    hours, minutes = map(int, (request.time_of_day or "0:0").split(":"))
+    time_s = None if request.time_of_day is None else 3600.0 * hours + 60.0 * minutes
+    return replace(usual, time_limit_s=limit_s, time_of_day_s=time_s)
 
 
 def _to_come(faults: Sequence[str], now_s: float) -> list[Fault]:
@@ -121,7 +142,7 @@ def _judged(prepared: Prepared, backend: Backend, result: RunResult, log: EventL
     tree = result.trees.get(prepared.tree.robot_name, prepared.tree)
     view = node_view(tree.root, result.worst.states)
     picture = to_svg(folded_to(what_ran(view), DRAWN_NODES), title=prepared.mission.name)
-    (prepared.request.out / "tree.svg").write_text(picture, encoding="utf-8")
+    (prepared.request.out / TREE_FILE).write_text(picture, encoding="utf-8")
     referee = backend.judge(tree, result.worst)
     return Finished(_report(prepared, tree, result, referee, log=str(log.path)), view)
 

@@ -16,6 +16,7 @@ from executive.language.similar import Corrected, WordFacts, correct_spelling
 from executive.language.steps import Trace, trace_sentence
 from executive.language.wake import strip_wake
 from executive.mission.command import Command
+from executive.mission.file.model import MissionStep
 from executive.mission.knowledge import Knowledge
 
 __all__ = ["Status", "Understanding", "parse_lines", "understand", "understand_asking"]
@@ -34,6 +35,7 @@ class Status(enum.Enum):
 class Understanding:
     """What a sentence means: commands when `status` is OK, else the reason in one line.
 
+    `steps` is the whole mission where it decides, repeats, waits or the like, and empty otherwise.
     `question` is what the robot asks back, `notes` say which name was taken for which, `memory` is what was spoken of,
     `trace` how the answer came about.
     """
@@ -47,6 +49,7 @@ class Understanding:
     notes: tuple[str, ...] = ()
     memory: Memory | None = None
     trace: Trace | None = field(default=None, compare=False, repr=False)
+    steps: tuple[MissionStep, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The answer as JSON values."""

@@ -8,20 +8,23 @@ from typing import Final
 from executive.mission.command import Command, Task, Thing
 from executive.mission.knowledge import Knowledge
 
-__all__ = ["UNNAMED", "InGripper", "after_command", "cannot_take", "is_same", "objection"]
+__all__ = ["UNNAMED", "UNSURE", "InGripper", "after_command", "cannot_take", "is_same", "objection"]
 
 
 @dataclass(frozen=True)
 class InGripper:
-    """What is held; `thing` is None where only that something is held is known."""
+    """What is held; `thing` is None where only that something is held is known; not even that unless `sure`."""
 
     thing: Thing | None = None
+    sure: bool = True
 
     def __str__(self) -> str:
         return "an object" if self.thing is None else f"the {self.thing}"
 
 
 UNNAMED: Final = InGripper()
+UNSURE: Final = InGripper(sure=False)
+"""After a branch that may have been taken or not."""
 
 
 def after_command(command: Command, held: InGripper | None, knowledge: Knowledge) -> InGripper | None:

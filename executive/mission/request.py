@@ -56,8 +56,11 @@ class Request:
     folder of the map that it has in place of the world's own. `scenario` is what goes wrong and happens meanwhile, and
     `scenario_files` hold more of it.
 
-    What stands below `given` is filled once it is understood. Then another process can take it up: a sentence has the
-    answers in their places, `text` is that of the file, and `scenario` holds all that its files say and the seed draws.
+    The run begins at `time_of_day` ("14:30"; None: what it is) and is ended after `time_limit_s` (None: as usual).
+
+    What stands below `time_limit_s` is filled once it is understood. Then another process can take it up: a sentence
+    has the answers in their places, `text` is that of the file, and `scenario` holds all that its files say and the
+    seed draws.
     """
 
     sentence: str | None = None
@@ -75,6 +78,8 @@ class Request:
     scenario: Scenario = NO_SCENARIO
     scenario_files: tuple[Path, ...] = ()
     given: Mapping[str, Any] = field(default_factory=dict)
+    time_of_day: str | None = None
+    time_limit_s: float | None = None
     name: str = ""
     world_name: str = ""
     robot: str = ""

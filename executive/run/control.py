@@ -49,7 +49,8 @@ class ControlState:
     """What can be seen of a run's control at one moment.
 
     `version` grows with every change. `missions` gives for each robot the missions begun and not ended, the one under
-    way last. `at` is the path id of the breakpoint that the run waits at.
+    way last. `at` is the path id of the breakpoint that the run waits at; `buttons` are those that missions wait for
+    or decide by.
     """
 
     version: int = 0
@@ -59,6 +60,7 @@ class ControlState:
     questions: tuple[OpenQuestion, ...] = ()
     breakpoints: frozenset[str] = frozenset()
     missions: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    buttons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -79,9 +81,13 @@ class Replacement:
 
 @dataclass(frozen=True)
 class ControlRequests:
-    """What is asked of the run now; `preempts` are missions to do first, `instead` and `later` as they say."""
+    """What is asked of the run now; `preempts` are missions to do first, `instead` and `later` as they say.
+
+    `insists` says that a run that is cancelled already was cancelled once more.
+    """
 
     cancel: str | None = None
+    insists: bool = False
     hold: str | None = None
     breakpoints: frozenset[str] = frozenset()
     events: tuple[Event, ...] = ()
@@ -124,6 +130,8 @@ class Control:
         self._lost: Mapping[str, str] = MappingProxyType({})
         self._missions: Mapping[str, tuple[str, ...]] = MappingProxyType({})
         self._known: frozenset[str] = frozenset()
+        self._presses: Mapping[str, int] = MappingProxyType({})
+        self._buttons: tuple[str, ...] = ()
 
     @property
     @_locked
@@ -131,7 +139,14 @@ class Control:
         """The present state."""
         (mode, reason), asked = self._mode(), self._requests
         return ControlState(
-            self._version, mode, reason, self._at, self._questions.open, asked.breakpoints, self._missions
+            self._version,
+            mode,
+            reason,
+            self._at,
+            self._questions.open,
+            asked.breakpoints,
+            self._missions,
+            self._buttons,
         )
 
     @_locked
@@ -178,10 +193,28 @@ class Control:
 
     @_locked
     def cancel(self, reason: str = "cancelled by the operator") -> None:
-        """End the run; the first reason stays."""
+        """End the run; the first reason stays. Once more: at once, without what missions always do in the end."""
         if self._requests.cancel is None and not self._ended:
             self._ask_for(cancel=reason)
             self._note("cancel", reason)
+        elif not self._requests.insists and not self._ended:
+            self._ask_for(insists=True)
+            self._note("cancel", f"once more: {reason}")
+
+    @_locked
+    def press(self, button: str) -> None:
+        """Press a button that missions wait for or decide by. Raises ValueError: no mission of the run has it."""
+        if self._begun and button not in self._buttons:
+            known = f"there are: {', '.join(self._buttons)}" if self._buttons else "there are none"
+            raise ValueError(f"the run has no button '{button}'; {known}")
+        self._presses = MappingProxyType({**self._presses, button: self._presses.get(button, 0) + 1})
+        self._note("button", button)
+
+    @property
+    @_locked
+    def presses(self) -> Mapping[str, int]:
+        """How often each button was pressed."""
+        return self._presses
 
     @_locked
     def stop_button(self, reason: str = "the stop button is pressed") -> None:
@@ -266,6 +299,7 @@ class Control:
     def mission_begun(self, robot_name: str, tree: CompiledTree) -> None:
         """A mission begins, on top of those that a robot has begun."""
         self._known |= frozenset(tree.path_ids)
+        self._buttons = tuple(dict.fromkeys((*self._buttons, *tree.buttons)))
         stack = (*self._missions.get(robot_name, ()), tree.mission_name)
         self._missions = MappingProxyType({**self._missions, robot_name: stack})
         self._bump()
@@ -282,7 +316,7 @@ class Control:
         mode, reason = self._mode()
         held = mode is Mode.STOPPED or (mode is Mode.PAUSED and self._stride is None)
         requests = replace(self._requests, hold=reason if held else None)
-        self._requests = ControlRequests(requests.cancel, breakpoints=requests.breakpoints)
+        self._requests = ControlRequests(requests.cancel, requests.insists, breakpoints=requests.breakpoints)
         return requests
 
     @_locked

@@ -53,6 +53,7 @@ class QuestionManager:
         if pending is None:
             raise ValueError(f"the question '{question_id}' is not open (any more)")
         options = pending.open.options
+        text = next((option for option in options if option.lower() == text.strip().lower()), text)
         if options and text not in options:
             raise ValueError(f"'{text}' is no answer to '{question_id}'; choose one of: {', '.join(options)}")
         pending.take(text)

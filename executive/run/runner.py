@@ -50,7 +50,9 @@ class RunEntry:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """Seed, tick period and limits. `time_limit_s` counts the robots' clock for the whole run, without pauses.
+    """Seed, tick period and limits. `time_limit_s` counts the robots' clock for the whole run, without pauses, and
+    `endings_limit_s` what missions that were cancelled always do in the end. `time_of_day_s` is the time of day (s
+    after midnight) at which the run begins; None: what it is on this machine.
 
     The other limits are the watchdog's, on the wall clock: for one verb, for taking a picture, for one robot's tick.
     """
@@ -58,6 +60,8 @@ class RunSettings:
     seed: int = 0
     tick_period_s: float = 0.05
     time_limit_s: float = 1200.0
+    endings_limit_s: float = 120.0
+    time_of_day_s: float | None = None
     verb_limit_s: float = VERB_LIMIT_S
     image_limit_s: float = IMAGE_LIMIT_S
     tick_limit_s: float = TICK_LIMIT_S
@@ -147,6 +151,8 @@ class _Run:
         self._ticks = 0
         self._meter = TickMeter(self._publish, clock, limit_s=settings.tick_period_s)
         self._begun_s, self._begun_wall_s = clock.now(), time.perf_counter()
+        told_s = settings.time_of_day_s
+        self._day_began_s = (_time_of_day_s() if told_s is None else told_s) - self._begun_s
         self._time = StoppableTime(clock)
 
     def run(self, entries: Sequence[RunEntry]) -> RunResult:
@@ -165,6 +171,8 @@ class _Run:
         except (Exception, VerbHung, KeyboardInterrupt) as stop:
             self._publish.ending = True
             ending = self._ending(stop)
+            if isinstance(stop, _CancelledError | _TimeOverError):
+                self._end_early()
             full = stop if disk_is_full(stop) else None
         finally:
             self._publish.ending = True
@@ -174,6 +182,29 @@ class _Run:
         if full is not None:
             raise full
         return self._result(entries, ending)
+
+    def _end_early(self) -> None:
+        """Do what missions always do in the end, for `endings_limit_s` at most; a second cancel ends that as well."""
+        until_s = self._clock.now() + self._settings.endings_limit_s
+        try:
+            for session in self._sessions:
+                session.end_early()
+            while any(session.ends for session in self._sessions) and self._clock.now() < until_s:
+                requests = self._control.poll()
+                self._tell(requests.events)
+                if requests.insists:
+                    return
+                self._clock.advance(self._settings.tick_period_s)
+                for session in self._sessions:
+                    if session.ends:
+                        session.sense()
+                        if session.may_move() and requests.hold is None:
+                            session.tick_end()
+                self._ticks += 1
+                if self.observer is not None:
+                    self.observer(self._progress())
+        except (Exception, VerbHung, KeyboardInterrupt):
+            self._publish(ERROR_TOPIC, {"node": "runner", "traceback": traceback.format_exc()})
 
     def _open(self, entry: RunEntry) -> Session:
         settings = self._settings
@@ -192,6 +223,8 @@ class _Run:
             board=Board(slug(entry.tree.robot_name)),
             ask=lambda question: self._control.ask(question, self._clock),
             stop_pressed=lambda: self._control.stop_pressed,
+            presses=lambda: self._control.presses,
+            day_began_s=self._day_began_s,
             detector=entry.detector,
             work=self.work,
             stack=entry.stack,
@@ -296,6 +329,12 @@ class _Run:
         trees = {session.name: session.main_tree for session in self._sessions}
         overruns, work = self._meter.overruns, self.work.totals()
         return RunResult(robots + absent, self._ticks, overruns, sim_time_s, wall_time_s, trees, work)
+
+
+def _time_of_day_s() -> float:
+    """The time of day on this machine (s after midnight)."""
+    now = time.localtime()
+    return 3600.0 * now.tm_hour + 60.0 * now.tm_min + now.tm_sec
 
 
 def _for_robot(session: Session, trees: Sequence[CompiledTree]) -> Sequence[CompiledTree]:

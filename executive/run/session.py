@@ -151,6 +151,22 @@ class Session:
             self._begin(tree, self._start_of(self._top))
         return changed
 
+    @property
+    def ends(self) -> bool:
+        """True while missions that were ended early still do what is always done in the end."""
+        return self.result is None and any(run.ends for run in self._stack)
+
+    def end_early(self) -> None:
+        """Stop all missions where they are; what is always done in the end is left to `tick_end`."""
+        for run in reversed(self._stack):
+            run.end_early()
+
+    def tick_end(self) -> None:
+        """Tick once what is always done in the end, of the latest mission first."""
+        run = next((run for run in reversed(self._stack) if run.ends), None)
+        if run is not None:
+            run.tick(frozenset())
+
     def hold(self) -> None:
         """Suspend the mission and stop the robot; done once until the next tick."""
         if not self._held:

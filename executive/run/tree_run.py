@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from py_trees.common import Status
 
+from executive.mission.goal import GoalKind
 from executive.record.profile import Profile
 from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
+from executive.run.findings import Findings, claim, told
 from executive.run.journal import Journal, TickNote
 from executive.run.outcome import Outcome, RobotResult
 from executive.tree.behaviours.answer import Answer
-from executive.tree.behaviours.context import RunContext
-from executive.tree.behaviours.explained import Explained
+from executive.tree.behaviours.context import Endings, RunContext
+from executive.tree.behaviours.explained import Explained, message_of
 from executive.tree.behaviours.gate import Gate
+from executive.tree.behaviours.policies import Skip
 from executive.tree.behaviours.skill_leaf import SkillLeaf
 from executive.tree.behaviours.suspension import suspend
 from executive.tree.compiler import CompiledTree
@@ -44,9 +47,13 @@ class TreeRun:
         self, tree: CompiledTree, context: RunContext, journal: Journal | None = None, profile: Profile | None = None
     ) -> None:
         self.tree = tree
-        self.context = context
+        names = tree.robot_name, tree.mission_name
+        self._findings = Findings(context.publish, context.clock, context.board, *names)
+        self.context = context = replace(context, publish=self._findings, endings=Endings())
         self.journal = journal
         self.root = tree.build(context)
+        self._ended_early = self._suspended = False
+        self._endings: list[str] = []
         self._observed = Observed(self.root)
         self._leaves = tuple(node for node in self._observed.nodes if isinstance(node, SkillLeaf))
         self._skills = frozenset(leaf.path_id for leaf in self._leaves)
@@ -60,8 +67,13 @@ class TreeRun:
 
     @property
     def finished(self) -> bool:
-        """True when the tree has come to an end."""
-        return self.root.status in (Status.SUCCESS, Status.FAILURE)
+        """True when the tree has come to an end, and all is done that is always done in the end."""
+        return self.root.status in (Status.SUCCESS, Status.FAILURE) and self.context.endings.due is None
+
+    @property
+    def ends(self) -> bool:
+        """True while it only does what is always done in the end, since it was ended early."""
+        return self._ended_early and self.context.endings.due is not None
 
     @property
     def waiting_at(self) -> str | None:
@@ -78,11 +90,36 @@ class TreeRun:
         self._breakpoints = breakpoints
         if not breakpoints <= self._gates.keys():
             self._set_gates(breakpoints)
-        self.root.tick_once()
+        self._tick()
         changes = self.log_changes()
         if self.journal is not None:
             self.journal.note(self._tick_note(changes))
         return bool(changes)
+
+    def _tick(self) -> None:
+        """Tick the tree; or, while the rest of it stands still, what a node that was stopped was still to do."""
+        endings = self.context.endings
+        due = endings.due
+        if due is None:
+            self._suspended = False
+            if not self._ended_early:
+                self.root.tick_once()
+            return
+        if not self._suspended:
+            self._suspended = True
+            suspend(self.root)
+        for _ in due.tick():
+            pass
+        if due.status != Status.RUNNING:
+            endings.done()
+            if due.status == Status.FAILURE:
+                self._endings.append(f"in the end: {message_of(due)}")
+
+    def end_early(self) -> None:
+        """Stop the tree where it is, and do no more of it than what is always done in the end."""
+        if not self._ended_early and not self.finished:
+            self.root.stop(Status.INVALID)
+            self._ended_early = True
 
     def suspend(self) -> None:
         """Keep the place and let go of the robot."""
@@ -109,7 +146,9 @@ class TreeRun:
 
         Each part is done through `attempt`, so that a defect in one does not keep the others from being done.
         """
-        if not self.finished:
+        for node in self.context.endings.close():
+            attempt("stop what is done in the end", lambda node=node: node.stop(Status.INVALID))  # type: ignore[misc]
+        if not self.finished and not self._ended_early:
             attempt("stop the tree", lambda: self.root.stop(Status.INVALID))
         for leaf in self._leaves:
             attempt(f"end {leaf.path_id}", leaf.abandon)
@@ -125,13 +164,30 @@ class TreeRun:
             outcome = Outcome.ERROR
         if ending is not None and not self.finished:
             outcome, cause, message = ending.outcome, ending.cause, ending.message
+        if self._endings:
+            message = "; ".join((message, *self._endings))
         answers = {
             node.path_id: node.answer
             for node in self._observed.nodes
             if isinstance(node, Answer) and node.answer is not None
         }
+        findings, said = self._findings.findings, self._findings.said
+        if findings and outcome is Outcome.SUCCESS:
+            message = claim("" if self._tells_nothing_more() else message, findings, self._skipped())
+        elif findings and outcome is Outcome.FAILURE:
+            message = f"{message} (found out: {told(findings)})"
         name, mission = self.tree.robot_name, self.tree.mission_name
-        return RobotResult(name, outcome, cause, message, answers, self.states, mission, preempting)
+        return RobotResult(name, outcome, cause, message, answers, self.states, mission, preempting, findings, said)
+
+    def _tells_nothing_more(self) -> bool:
+        """Whether the last sentence of a mission that gave answers is one of them, or merely where the robot stands."""
+        last = self.tree.parts[-1] if self.tree.parts else None
+        return last is None or last.goal is None or last.goal.kind in (GoalKind.WENT, GoalKind.ANSWERED)
+
+    def _skipped(self) -> Sequence[str]:
+        """What was skipped, and why."""
+        nodes = (node for node in self._observed.nodes if isinstance(node, Skip) and node.status is Status.SUCCESS)
+        return [f"{node.step} ({node.skipped})" for node in nodes if node.skipped is not None]
 
     def _set_gates(self, breakpoints: frozenset[str]) -> None:
         for node in self._observed.nodes:
@@ -146,10 +202,11 @@ class TreeRun:
         context = self.context
         running = (leaf for leaf in self._leaves if leaf.status is Status.RUNNING)
         checkpoints = {leaf.path_id: leaf.checkpoint for leaf in running if leaf.checkpoint}
-        now_s, pose = context.clock.now(), None
+        now_s, pose, charge = context.clock.now(), None, None
         if changes or now_s >= self._pose_due_s:
             self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.known_pose()
-        return TickNote(now_s, changes, context.board.values(), pose, checkpoints)
+            charge = context.robot.battery().charge
+        return TickNote(now_s, changes, context.board.values(), pose, checkpoints, charge)
 
     def _transition(self, change: Change) -> dict[str, object]:
         after = change.after

@@ -43,7 +43,10 @@ class Memory:
 
 _WORLD: Final = -1
 """The world decides whether the robot's name must be said; the column takes no NULL."""
-_AS_THEY_ARE: Final = ("name", "world_name", "robot", "seed", "fingerprint", "sentence", "text", "world")
+_AS_THEY_ARE: Final = (
+    *("name", "world_name", "robot", "seed", "fingerprint", "sentence", "text", "world"),
+    *("time_of_day", "time_limit_s"),
+)
 
 
 def row_of(request: Request) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from executive.mission.command import Task
 from executive.mission.errors import InputError, listing, suggestion
-from executive.mission.gripper import UNNAMED, InGripper, after_command, cannot_take, objection
+from executive.mission.gripper import InGripper, cannot_take, objection
 from executive.mission.knowledge import Knowledge
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
@@ -90,13 +90,11 @@ def check_tree(
 def _gripper_errors(tree: CompiledTree, knowledge: Knowledge, held: InGripper | None) -> Iterator[InputError]:
     """The steps that need something else in the gripper than the steps before leave there."""
     for part in tree.parts:
-        against = None
+        against, before = None, held if part.opening else part.held
         if part.command is not None:
-            against = objection(part.command, held, knowledge)
-            held = after_command(part.command, held, knowledge)
+            against = objection(part.command, before, knowledge)
         elif part.skill is not None:
-            against = _skill_objection(part.skill, held)
-            held = {None: held, True: UNNAMED, False: None}[part.skill.gripper_after]
+            against = _skill_objection(part.skill, before)
         if against is not None:
             yield _at(part, tree, *against)
 
@@ -105,7 +103,7 @@ def _skill_objection(skill: type[Skill[Any]], held: InGripper | None) -> tuple[s
     """Why a skill cannot run with what is held, and a hint; None when it can."""
     if skill.gripper_before is True and held is None:
         return f"{skill.name} needs an object in the gripper, and no step before has grasped one", "grasp one first"
-    if skill.gripper_before is False and held is not None:
+    if skill.gripper_before is False and held is not None and held.sure:
         return cannot_take(held, "another object")
     return None
 

@@ -11,7 +11,10 @@ from py_trees.behaviour import Behaviour
 from executive.tree.behaviours import (
     answer,
     aside,
+    ask,
+    blocks,
     composites,
+    decisions,
     decorators,
     fallen,
     interrupts,
@@ -32,7 +35,10 @@ Changes = Mapping[str, Callable[[Any], object]]
 _HOMES: Final = (
     answer,
     aside,
+    ask,
+    blocks,
     composites,
+    decisions,
     decorators,
     fallen,
     interrupts,

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, Failed, Running, Skill, SkillContext, Step, Succeeded
+from skills.api import Cause, Failed, Part, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import compose, relative
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
@@ -46,6 +46,7 @@ class BackOff(Skill[BackOffInputs]):
 
     name: ClassVar[str] = "back_off"
     Inputs: ClassVar[type] = BackOffInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
     Options: ClassVar[type] = BackOffOptions
     options: BackOffOptions
     causes: ClassVar[Mapping[Cause, str]] = {

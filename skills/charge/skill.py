@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from skills.api import Cause, Failed, Running, Skill, Step, Succeeded
+from skills.api import Cause, Failed, Part, Running, Skill, Step, Succeeded
 from skills.quantities import Duration, Share
 
 
@@ -30,6 +30,7 @@ class Charge(Skill[ChargeInputs]):
 
     name: ClassVar[str] = "charge"
     Inputs: ClassVar[type] = ChargeInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
     Options: ClassVar[type] = ChargeOptions
     options: ChargeOptions
     causes: ClassVar[Mapping[Cause, str]] = {

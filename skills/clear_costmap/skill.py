@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from skills.api import Cause, Failed, ForgettingCostmap, Running, Skill, Step, Succeeded
+from skills.api import Cause, Failed, ForgettingCostmap, Part, Running, Skill, Step, Succeeded
 from skills.quantities import Delay
 
 
@@ -22,6 +22,7 @@ class ClearCostmap(Skill[ClearCostmapInputs]):
 
     name: ClassVar[str] = "clear_costmap"
     Inputs: ClassVar[type] = ClearCostmapInputs
+    uses: ClassVar[frozenset[Part]] = frozenset()
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "this robot's costmap has no layer that can be cleared"
     }

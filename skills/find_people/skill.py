@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import shapely
 
-from skills.api import Cause, ObjectObservation, Succeeded, Thing
+from skills.api import Cause, ObjectObservation, Part, Succeeded, Thing
 from skills.arm.routine import Routine, SkillFailure
 from skills.detect.words import counted
 from skills.navigate.moving import MovingSkill
@@ -57,6 +57,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
 
     name = "find_people"
     Inputs = FindPeopleInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
     Options: ClassVar[type] = FindPeopleOptions
     options: FindPeopleOptions
     outputs: ClassVar[Mapping[str, type]] = {

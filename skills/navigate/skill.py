@@ -9,7 +9,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, Costmap, Failed, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
+from skills.api import (
+    Cause,
+    Costmap,
+    Failed,
+    Job,
+    Part,
+    PlanningError,
+    Running,
+    Skill,
+    SkillContext,
+    Step,
+    Succeeded,
+)
 from skills.geometry import relative
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
@@ -74,6 +86,7 @@ class Navigate(Skill[NavigateInputs]):
 
     name: ClassVar[str] = "navigate"
     Inputs: ClassVar[type] = NavigateInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
     Options: ClassVar[type] = NavigateOptions
     outputs: ClassVar[Mapping[str, type]] = {}
     causes: ClassVar[Mapping[Cause, str]] = {

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, Succeeded
+from skills.api import Cause, Part, Succeeded
 from skills.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
 from skills.arm.routine import Routine, SkillFailure
 from skills.quantities import Angle, Turn
@@ -29,6 +29,7 @@ class PoseArm(ArmSkill[PoseArmInputs]):
 
     name = "pose_arm"
     Inputs = PoseArmInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "the pose is not one of this robot's arm",
         Cause.PLANNING: "the arm finds no free path",

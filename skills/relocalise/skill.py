@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, Succeeded
+from skills.api import Cause, LocalisationEstimate, Localiser, Part, Running, SearchingLocaliser, Succeeded
 from skills.arm.routine import Routine, SkillFailure
 from skills.navigate.low_obstacles import WatchOptions, low_points
 from skills.navigate.moving import MovingSkill
@@ -57,6 +57,7 @@ class Relocalise(MovingSkill[RelocaliseInputs]):
 
     name: ClassVar[str] = "relocalise"
     Inputs: ClassVar[type] = RelocaliseInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
     Options: ClassVar[type] = RelocaliseOptions
     options: RelocaliseOptions
     causes: ClassVar[Mapping[Cause, str]] = {

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, Succeeded
+from skills.api import Cause, Part, Succeeded
 from skills.arm.arm_skill import ArmSkill
 from skills.arm.poses import carry_configuration
 from skills.arm.routine import Routine
@@ -27,6 +27,7 @@ class Stow(ArmSkill[StowInputs]):
 
     name = "stow"
     Inputs = StowInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.ARM})
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PLANNING: "the arm finds no free path",
         Cause.EXECUTION: "the arm did not reach its goal",

@@ -10,6 +10,8 @@ from typing import Any, Final
 
 from executive.mission.command import Command
 from executive.mission.errors import InputError, SourceLine
+from executive.mission.expression import Value
+from executive.mission.file.blocks import Block, Group, steps_of
 
 __all__ = [
     "DEFAULT_WORLD",
@@ -110,9 +112,10 @@ class SkillCall:
 
 @dataclass(frozen=True)
 class MissionStep:
-    """One step, one of three: commands, or a skill, or the steps of another mission. `source` is None when spoken.
+    """One step: commands, a skill, the steps of another mission, or a block. `source` is None when it was spoken.
 
-    With `elsewhere`, an object that is not in its place is also searched for elsewhere.
+    With `elsewhere`, an object that is not in its place is also searched for elsewhere. `gives` maps what a status
+    check answers ("answer", "count") to names, under which later steps read them.
     """
 
     commands: tuple[Command, ...] = ()
@@ -121,6 +124,17 @@ class MissionStep:
     skill: SkillCall | None = None
     used: Mission | None = None
     elsewhere: bool = True
+    block: Block | None = None
+    gives: Mapping[str, str] = field(default_factory=dict)
+
+    def walk(self) -> Iterator[MissionStep]:
+        """Itself and all steps that it holds, those of a used mission included."""
+        yield self
+        if self.used is not None:
+            yield from self.used.walk()
+        if self.block is not None:
+            for step in steps_of(self.block):
+                yield from step.walk()
 
 
 @dataclass(frozen=True)
@@ -128,6 +142,8 @@ class Mission:
     """What one robot is to do in one world.
 
     `source` is the line of its name, None when it was spoken; `notes` say which name in a sentence was taken for which.
+    `variables` are its values by name, as they are at the beginning. `whole` is what is watched while its steps run and
+    what is done at the end (a group without steps of its own); None for nothing.
     """
 
     name: str
@@ -137,6 +153,8 @@ class Mission:
     policy: StepPolicy = StepPolicy()
     source: SourceLine | None = None
     notes: tuple[str, ...] = ()
+    variables: Mapping[str, Value] = field(default_factory=dict)
+    whole: Group | None = None
 
     @property
     def commands(self) -> tuple[Command, ...]:
@@ -144,8 +162,7 @@ class Mission:
         return tuple(command for step in self.walk() for command in step.commands)
 
     def walk(self) -> Iterator[MissionStep]:
-        """All steps in order; a step that uses another mission comes before that mission's steps."""
-        for step in self.steps:
-            yield step
-            if step.used is not None:
-                yield from step.used.walk()
+        """All steps in order; a step that holds others comes before them."""
+        own = () if self.whole is None else tuple(steps_of(self.whole))
+        for step in (*self.steps, *own):
+            yield from step.walk()

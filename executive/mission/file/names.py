@@ -8,7 +8,8 @@ from typing import Final
 from executive.mission.command import START, TIME_UNITS_S, Command, Task, Thing, parse_command
 from executive.mission.errors import InputError, Problems, suggestion
 from executive.mission.file.model import KeyPath
-from executive.mission.file.schema import MissionFile
+from executive.mission.file.schema import StepFile
+from executive.mission.file.scope import Scope
 from executive.mission.knowledge import Knowledge
 
 __all__ = ["typed_command"]
@@ -16,44 +17,43 @@ __all__ = ["typed_command"]
 _NOTHING: Final = "Nothing"
 
 
-def typed_command(file: MissionFile, index: int, knowledge: Knowledge) -> Command:
-    """The command of the step `index`, which gives its parts, in the world's own names.
+def typed_command(scope: Scope, step: StepFile, path: KeyPath, knowledge: Knowledge) -> Command:
+    """The command of the step at `path`, which gives its parts, in the world's own names.
 
     Raises:
         InputError: a part that is no name, or names that the world does not have.
     """
-    step, path = file.steps[index], ("steps", index)
     task = _NOTHING if step.do is None else step.do.value
     parts = [part or _NOTHING for part in (step.take, step.to, task, step.object)]
     try:
         command = parse_command("Take [{}] to [{}] and do [{}] to [{}]".format(*parts))
     except ValueError as error:
-        raise file.error(path, str(error), "write names in plain words") from error
+        raise scope.error(path, str(error), "write names in plain words") from error
     problems = Problems()
-    for unknown in _unknown_names(file, path, command, knowledge):
+    for unknown in _unknown_names(scope, path, command, knowledge):
         problems.add(unknown)
     problems.raise_any()
     return _known(command, knowledge)
 
 
-def _unknown_names(file: MissionFile, path: KeyPath, command: Command, knowledge: Knowledge) -> Iterator[InputError]:
+def _unknown_names(scope: Scope, path: KeyPath, command: Command, knowledge: Knowledge) -> Iterator[InputError]:
     waits = command.task is Task.WAIT and command.object is not None and command.object.name in TIME_UNITS_S
     for key, thing in (("take", command.item), ("object", None if waits else command.object)):
         person = command.task is Task.FIND and thing is not None and knowledge.somebody(thing.name) is not None
         if thing is not None and knowledge.thing(thing.name) is None and not person:
-            yield _unknown(file, (*path, key), "object", thing.name, knowledge.thing_names(), knowledge)
+            yield _unknown(scope, (*path, key), "object", thing.name, knowledge.thing_names(), knowledge)
     goals = (*knowledge.place_names(), *knowledge.people, START)
     if command.goal is not None and _goal(command.goal, knowledge) is None:
-        yield _unknown(file, (*path, "to"), "place or person", command.goal, goals, knowledge)
+        yield _unknown(scope, (*path, "to"), "place or person", command.goal, goals, knowledge)
     if command.goal_at is not None and knowledge.place(command.goal_at) is None:
-        yield _unknown(file, (*path, "to"), "place", command.goal_at, knowledge.place_names(), knowledge)
+        yield _unknown(scope, (*path, "to"), "place", command.goal_at, knowledge.place_names(), knowledge)
 
 
 def _unknown(
-    file: MissionFile, path: KeyPath, kind: str, name: str, known: Sequence[str], knowledge: Knowledge
+    scope: Scope, path: KeyPath, kind: str, name: str, known: Sequence[str], knowledge: Knowledge
 ) -> InputError:
     hint = suggestion(name, knowledge.spellings(known), shown=known)
-    return file.error(path, f"unknown {kind} {name!r}", hint)
+    return scope.error(path, f"unknown {kind} {name!r}", hint)
 
 
 def _known(command: Command, knowledge: Knowledge) -> Command:

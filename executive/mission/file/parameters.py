@@ -1,28 +1,42 @@
 """Parameters of mission files: `${name}` in a value stands for what the parameter holds; `$${` is a plain `${`.
 
+A parameter is declared by its default, whose type it keeps, or as {type: .., default: .., choices: [..]}.
+
 A value that is nothing but `${name}` takes the parameter's own type, so that `timeout: ${limit}` can be a number;
 within a longer text the parameter's text is put in.
 """
 
 from __future__ import annotations
 
+import json
+import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import yaml
 
 from executive.mission.errors import InputError, did_you_mean, listing, suggestion
+from executive.mission.expression import Value
 from executive.mission.file.model import KeyPath
 from executive.mission.yaml_source import YamlSource
 
-__all__ = ["Given", "given_values", "with_parameters"]
+__all__ = ["Given", "given_values", "round_source", "values_in_json", "with_parameters"]
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _SCALARS: Final = (str, bool, int, float)
 DECLARED: Final = "parameters"
+_TYPES: Final[Mapping[str, tuple[type, ...]]] = {
+    "text": (str,),
+    "number": (int, float),
+    "truth": (bool,),
+    "place": (str,),
+    "object": (str,),
+    "person": (str,),
+}
+_TEXTS: Final = frozenset(name for name, kinds in _TYPES.items() if str in kinds)
 
 Given = Mapping[str, Any]
 
@@ -36,11 +50,31 @@ def given_values(settings: Iterable[str]) -> dict[str, Any]:
             value = yaml.safe_load(text)
         except yaml.YAMLError:
             value = None
-        if not equals or not _NAME.fullmatch(name) or not isinstance(value, _SCALARS):
+        if not equals or not _can_be_given(name, value):
             hint = "give a name, =, and a text, a number, true or false"
             raise InputError(f"--set {setting[:60]}: it is not NAME=VALUE", hint=hint)
         values[name] = value
     return values
+
+
+def values_in_json(text: bytes) -> dict[str, Any]:
+    """Values in a JSON object, each as `given_values` takes them; none in an empty text. Raises InputError."""
+    try:
+        values = json.loads(text) if text.strip() else {}
+    except (ValueError, RecursionError):
+        values = None
+    if not isinstance(values, dict):
+        raise InputError("the values are no JSON object", hint='give one such as {"room": "kitchen"}, or nothing')
+    wrong = next((name for name, value in values.items() if not _can_be_given(name, value)), None)
+    if wrong is not None:
+        hint = "give each name a text, a number, true or false"
+        raise InputError(f"'{wrong[:60]}' is not a name with a value", hint=hint)
+    return values
+
+
+def _can_be_given(name: str, value: Any) -> bool:
+    finite = not isinstance(value, float) or math.isfinite(value)
+    return bool(_NAME.fullmatch(name)) and isinstance(value, _SCALARS) and finite
 
 
 def with_parameters(source: YamlSource, given: Given) -> YamlSource:
@@ -57,50 +91,132 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
         known = f"it has {listing(declared)}" if declared else "it declares none"
         hint = suggestion(unknown[0], declared, known)
         raise InputError(f"{source.path.name} has no parameter '{unknown[0]}'", hint=hint)
-    values = {**declared, **given}
-    for name, value in values.items():
+    values: dict[str, Any] = {}
+    for name, parameter in declared.items():
+        value = _fitting(parameter, given.get(name, parameter.default), name, source, is_given=name in given)
         if value is None:
             hint = f"give it a default, or 'with: {{{name}: ...}}' where the file is used"
             raise source.error((DECLARED, name), f"parameter '{name}' has no value", hint)
+        values[name] = value
+    filled = {
+        name: {**each, "default": values[name]} if isinstance(each, dict) else values[name]
+        for name, each in (source.data.get(DECLARED) or {}).items()
+        if name in values
+    }
     data = {
-        key: part if key == DECLARED else _put_in(part, values, source, (key,)) for key, part in source.data.items()
+        key: filled if key == DECLARED and declared else _put_in(part, values, source, (key,))
+        for key, part in source.data.items()
     }
     return replace(source, data=data)
 
 
-def _declared(source: YamlSource) -> dict[str, Any]:
-    """The parameters with their defaults; what is no mapping is left to the schema to refuse."""
+@dataclass(frozen=True)
+class _Parameter:
+    """A parameter as it is declared; without a `kind` any plain value will do."""
+
+    kind: str | None
+    default: Any
+    choices: tuple[Any, ...] = ()
+
+
+def _fitting(parameter: _Parameter, value: Any, name: str, source: YamlSource, *, is_given: bool) -> Any:
+    """The value as the parameter's type. Raises InputError: it is of another type, or none of the choices."""
+    if value is None:
+        return None
+    if parameter.kind in _TEXTS and isinstance(value, int | float) and not isinstance(value, bool):
+        value = str(value)
+    here = () if is_given else (DECLARED, name)
+    kind = _TYPES.get(parameter.kind or "", _SCALARS)
+    fits = isinstance(value, kind) and (bool in kind or not isinstance(value, bool))
+    if not fits:
+        what = f"parameter '{name}' is a {parameter.kind}, and {str(value)[:60]!r} is none"
+        raise source.error(here, what, f"give it a {parameter.kind}")
+    if parameter.choices and value not in parameter.choices:
+        what = f"parameter '{name}' cannot be {str(value)[:60]!r}"
+        raise source.error(here, what, f"it is one of {listing(map(str, parameter.choices), last='or')}")
+    return value
+
+
+def round_source(source: YamlSource, steps: KeyPath, name: str, value: Value) -> YamlSource:
+    """The steps at a path with the value of a round of their `for_each` put in, as a document {steps: ..} of their own.
+
+    Raises InputError: `${..}` of a name that is neither the round's nor that of a `for_each` within.
+    """
+    data: Any = source.data
+    for part in steps:
+        data = data[part]
+    lines = {("steps", *path[len(steps) :]): line for path, line in source.lines.items() if path[: len(steps)] == steps}
+    first = source.line(steps)
+    below = replace(source, data={"steps": data}, lines=lines, first_line=first)
+    return replace(below, data=_put_in(below.data, {name: value}, below, ()))
+
+
+def _declared(source: YamlSource) -> dict[str, _Parameter]:
+    """The parameters; what is no mapping is left to the schema to refuse."""
     declared = source.data.get(DECLARED)
     if not isinstance(declared, dict):
         return {}
+    found = {}
     for name, default in declared.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             hint = "use letters, digits and underscores, a letter first"
             raise source.error((DECLARED, str(name)), f"{name!r} cannot be a parameter's name", hint)
+        if isinstance(default, dict):
+            kind, choices = default.get("type"), default.get("choices")
+            if kind not in _TYPES:
+                hint = f"its type is one of {listing(_TYPES, last='or')}"
+                raise source.error((DECLARED, name), f"parameter '{name}' has no type", hint)
+            listed = tuple(choices) if isinstance(choices, list) else ()
+            found[name] = _Parameter(str(kind), default.get("default"), listed)
+            continue
         if default is not None and not isinstance(default, _SCALARS):
-            hint = "give it a text, a number, true or false"
+            hint = "give it a text, a number, true or false, or {type: .., default: ..}"
             raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {type(default).__name__}", hint)
-    return dict(declared)
+        found[name] = _Parameter(_kind(default), default)
+    return found
 
 
-def _put_in(value: Any, values: Mapping[str, Any], source: YamlSource, path: KeyPath) -> Any:
+def _kind(default: Any) -> str | None:
+    """The type of a parameter with this default."""
+    if default is None:
+        return None
+    return "truth" if isinstance(default, bool) else "number" if isinstance(default, int | float) else "text"
+
+
+def _put_in(
+    value: Any, values: Mapping[str, Any], source: YamlSource, path: KeyPath, rounds: frozenset[str] = frozenset()
+) -> Any:
+    """`rounds` are the names of the `for_each` around it: what reads them is left for their rounds."""
     if isinstance(value, str):
-        return _text(value, values, source, path)
+        return _text(value, values, source, path, rounds)
     if isinstance(value, dict):
-        return {key: _put_in(part, values, source, (*path, str(key))) for key, part in value.items()}
+        within = rounds | _rounds_name(value)
+        return {
+            key: _put_in(part, values, source, (*path, str(key)), within if key == "steps" else rounds)
+            for key, part in value.items()
+        }
     if isinstance(value, list):
-        return [_put_in(part, values, source, (*path, index)) for index, part in enumerate(value)]
+        return [_put_in(part, values, source, (*path, index), rounds) for index, part in enumerate(value)]
     return value
 
 
-def _text(text: str, values: Mapping[str, Any], source: YamlSource, path: KeyPath) -> Any:
+def _rounds_name(step: Mapping[str, Any]) -> frozenset[str]:
+    """The name that a `for_each` gives to the value of each round."""
+    repeat = step.get("repeat")
+    name = repeat.get("as") if isinstance(repeat, Mapping) and "for_each" in repeat else None
+    return frozenset({name}) if isinstance(name, str) else frozenset()
+
+
+def _text(text: str, values: Mapping[str, Any], source: YamlSource, path: KeyPath, rounds: frozenset[str]) -> Any:
     if "${" not in text:
         return text
     whole = _REFERENCE.fullmatch(text)
-    if whole is not None and not whole[1]:
+    if whole is not None and not whole[1] and whole[2] not in rounds:
         return _value(whole[2], values, source, path)
 
     def replaced(match: re.Match[str]) -> str:
+        if match[2] in rounds or (match[1] and rounds):
+            return match[0]
         return f"${{{match[2]}}}" if match[1] else str(_value(match[2], values, source, path))
 
     return _REFERENCE.sub(replaced, text)

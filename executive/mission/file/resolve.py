@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -12,13 +12,18 @@ from typing import Final
 from executive.language import DependencyParser, Status, Understanding
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
 from executive.language.understand import understand_asking
-from executive.mission.command import Command
-from executive.mission.errors import InputError, Problems
-from executive.mission.file.model import Mission, MissionStep, SkillCall
+from executive.mission.command import START, Command
+from executive.mission.condition import Condition
+from executive.mission.errors import InputError, Problems, suggestion
+from executive.mission.file.block_steps import condition_of, read_block, round_values
+from executive.mission.file.blocks import Block, Group, Handler
+from executive.mission.file.condition_schema import ConditionFile
+from executive.mission.file.model import KeyPath, Mission, MissionStep, SkillCall
 from executive.mission.file.names import typed_command
 from executive.mission.file.overrides import overridden
-from executive.mission.file.parameters import Given, with_parameters
-from executive.mission.file.schema import MissionFile, StepFile, with_source
+from executive.mission.file.parameters import Given, round_source, with_parameters
+from executive.mission.file.schema import HandlerFile, MissionFile, ParameterFile, RoundFile, StepFile, with_source
+from executive.mission.file.scope import Scope
 from executive.mission.knowledge import Knowledge
 from executive.mission.yaml_source import read_yaml, validate
 
@@ -78,32 +83,126 @@ class _Resolver:
 
     def mission(self, file: MissionFile, chain: tuple[Path, ...]) -> Mission:
         """The mission of a file that the files of `chain` led to, itself the last."""
-        problems, steps = Problems(), []
-        for index in range(len(file.steps)):
+        scope, problems = Scope(file, file.source, chain), Problems()
+        steps: tuple[MissionStep, ...] = ()
+        whole: Group | None = None
+        for name, parameter in (file.parameters or {}).items():
             with problems:
-                steps.append(self._step(file, index, chain))
+                self._refuse_unknown(scope, name, parameter)
+        with problems:
+            steps = self.steps(scope, file.steps, ("steps",))
+        with problems:
+            whole = self._whole(scope, file)
         problems.raise_any()
-        source = file.source_line(("name",))
-        return Mission(file.name, self.world, self.robot_name, tuple(steps), file.over(None), source, self._notes())
+        return Mission(
+            file.name,
+            self.world,
+            self.robot_name,
+            steps,
+            file.over(None),
+            file.source_line(("name",)),
+            self._notes(),
+            file.variables or {},
+            whole,
+        )
 
-    def _step(self, file: MissionFile, index: int, chain: tuple[Path, ...]) -> MissionStep:
-        step, path = file.steps[index], ("steps", index)
-        self.steps_so_far += 1
-        if self.steps_so_far > MAX_STEPS:
-            raise file.error(path, f"the mission has more than {MAX_STEPS} steps", "use fewer files, or fewer times")
-        source, policy = file.source_line(path), step.over(file.each)
-        if step.use is not None:
-            return MissionStep(source=source, policy=policy, used=self._used(file, index, chain))
-        if step.skill is not None:
-            return MissionStep(source=source, policy=policy, skill=_skill_call(file, index))
-        if step.say is None:
-            commands: tuple[Command, ...] = (typed_command(file, index, self.knowledge),)
-            return MissionStep(commands, source, policy, elsewhere=step.elsewhere is not False)
-        answer = self._understand(step.say)
+    def steps(self, scope: Scope, steps: Sequence[StepFile], path: KeyPath) -> tuple[MissionStep, ...]:
+        """The steps of a list that stands at `path`. Raises InputError: all that is wrong with them."""
+        problems, made = Problems(), []
+        for index, step in enumerate(steps):
+            with problems:
+                made.append(self._step(scope, step, (*path, index)))
+        problems.raise_any()
+        return tuple(made)
+
+    def condition(self, scope: Scope, condition: ConditionFile, path: KeyPath) -> Condition:
+        """The condition that stands at `path`. Raises InputError."""
+        return condition_of(self, scope, condition, path)
+
+    def handlers(self, scope: Scope, handlers: Sequence[HandlerFile], path: KeyPath) -> tuple[Handler, ...]:
+        """What interrupts a group or a mission, from a list at `path`. Raises InputError."""
+        return tuple(
+            Handler(
+                self.condition(scope, each.if_, (*path, index, "if")),
+                self.steps(scope, each.do, (*path, index, "do")),
+                each.times,
+            )
+            for index, each in enumerate(handlers)
+        )
+
+    def rounds(self, scope: Scope, step: StepFile, path: KeyPath) -> tuple[MissionStep, ...]:
+        """One group for each value of a `for_each`. Raises InputError."""
+        assert step.repeat is not None and step.repeat.as_ is not None and scope.source is not None
+        made, below = [], (*path, "steps")
+        for value in round_values(scope, step.repeat, path, self.knowledge):
+            source = round_source(scope.source, below, step.repeat.as_, value)
+            steps = validate(RoundFile, source).steps
+            group = Group(self.steps(replace(scope, source=source), steps, ("steps",)), name=str(value))
+            made.append(MissionStep(source=scope.line(path), block=group))
+        return tuple(made)
+
+    def find_command(self, scope: Scope, path: KeyPath, found: str, at: str | None) -> Command:
+        """The status check for something or somebody. Raises InputError: an unknown name."""
+        step = StepFile.model_validate({"do": "find", "object": found, "to": at})
+        return typed_command(scope, step, path, self.knowledge)
+
+    def meaning(self, scope: Scope, path: KeyPath, sentence: str) -> Understanding:
+        """What a sentence at `path` means. Raises InputError: it is not understood."""
+        answer = self._understand(sentence)
         if answer.status is not Status.OK:
             hint = "say it in other words, or write take, to, do and object"
-            raise file.error((*path, "say"), (answer.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], hint)
-        return MissionStep(answer.commands, source, policy, elsewhere=step.elsewhere is not False)
+            raise scope.error(path, (answer.reason or _NOT_UNDERSTOOD)[:REASON_LETTERS], hint)
+        return answer
+
+    def _step(self, scope: Scope, step: StepFile, path: KeyPath) -> MissionStep:
+        self.steps_so_far += 1
+        if self.steps_so_far > MAX_STEPS:
+            raise scope.error(path, f"the mission has more than {MAX_STEPS} steps", "use fewer files, or fewer times")
+        made = MissionStep(
+            source=scope.line(path),
+            policy=step.over(scope.file.each),
+            elsewhere=step.elsewhere is not False,
+            gives=step.gives or {},
+        )
+        if step.use is not None:
+            return replace(made, used=self._used(scope, step, path))
+        if step.skill is not None:
+            return replace(made, skill=_skill_call(scope, step, path), gives={})
+        block: Block | None = read_block(self, scope, step, path)
+        if block is not None:
+            return replace(made, block=block, gives={})
+        if step.say is None:
+            return replace(made, commands=(typed_command(scope, step, path, self.knowledge),))
+        meant = self.meaning(scope, (*path, "say"), step.say)
+        if meant.steps:
+            return replace(made, block=Group(meant.steps, name=step.say), gives={})
+        return replace(made, commands=meant.commands)
+
+    def _refuse_unknown(self, scope: Scope, name: str, parameter: ParameterFile) -> None:
+        """Refuse a parameter that names no place, object or person of the world."""
+        known = {
+            "place": (self.knowledge.place, self.knowledge.place_names()),
+            "object": (self.knowledge.thing, self.knowledge.thing_names()),
+            "person": (self.knowledge.person, tuple(self.knowledge.people)),
+        }
+        if parameter.type in known:
+            find, names = known[parameter.type]
+            said = str(parameter.default)
+            if said != START and find(said) is None:
+                what = f"parameter '{name}': unknown {parameter.type} '{said[:60]}'"
+                hint = suggestion(said, self.knowledge.spellings(names), shown=names)
+                raise scope.error(("parameters", name), what, hint)
+
+    def _whole(self, scope: Scope, file: MissionFile) -> Group | None:
+        """What is watched while a file's steps run, and done in the end."""
+        if file.always is None and file.while_ is None and file.when is None:
+            return None
+        return Group(
+            (),
+            always=self.steps(scope, file.always or (), ("always",)),
+            holds=None if file.while_ is None else self.condition(scope, file.while_.holds, ("while", "holds")),
+            when=self.handlers(scope, file.when or (), ("when",)),
+        )
 
     def _understand(self, sentence: str) -> Understanding:
         """What a sentence means; one that stands there again means the same."""
@@ -122,38 +221,41 @@ class _Resolver:
     def _notes(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(note for meant in self.understood.values() for note in meant.notes))
 
-    def _used(self, file: MissionFile, index: int, chain: tuple[Path, ...]) -> Mission:
+    def _used(self, scope: Scope, step: StepFile, path: KeyPath) -> Mission:
         """The mission of the file that a step uses."""
-        step, path = file.steps[index], ("steps", index, "use")
         assert step.use is not None
-        used_path = _found(file, index)
+        used_path, chain, at = _found(scope, step.use, (*path, "use")), scope.chain, (*path, "use")
         if used_path.resolve() in chain:
             names = [one.name for one in (*chain[chain.index(used_path.resolve()) :], used_path)]
-            raise file.error(path, f"the files use each other in a circle: {' -> '.join(names)}", "break the circle")
+            raise scope.error(at, f"the files use each other in a circle: {' -> '.join(names)}", "break the circle")
         if len(chain) >= MAX_DEPTH:
             what = f"more than {MAX_DEPTH} files use each other in a row"
-            raise file.error(path, what, "put what they say into fewer files")
-        here = file.source_line(path)
+            raise scope.error(at, what, "put what they say into fewer files")
+        here = scope.line(at)
         try:
             used = load_mission(used_path, step.with_ or {})
-            _refuse_top_keys(used, file)
+            _refuse_top_keys(used, scope.file)
             return self.mission(used, (*chain, used_path.resolve()))
         except InputError as error:
             raise error if here is None else error.within(here.file, here.line) from error
 
 
-def _found(file: MissionFile, index: int) -> Path:
-    """The file that a step uses, as seen from the folder of the file in which the step stands."""
-    step = file.steps[index]
-    assert step.use is not None
-    folder = Path() if file.source is None else file.source.path.parent
-    path = folder / step.use
-    if _is_file(path):
-        return path
-    beside = sorted(one.name for one in folder.glob("*.yaml"))
-    near = difflib.get_close_matches(step.use, beside, n=1)
+def _found(scope: Scope, use: str, path: KeyPath) -> Path:
+    """The file that a step uses, as seen from the folder of the file in which the step stands.
+
+    Raises InputError: there is none, or it lies outside of the folder of the first file.
+    """
+    found = scope.folder / use
+    home = scope.chain[0].parent if scope.chain else scope.folder.resolve()
+    if not found.resolve().is_relative_to(home):
+        hint = f"put it into {home.name or home} or a folder in it"
+        raise scope.error(path, f"'{use[:60]}' leaves the folder of the mission", hint)
+    if _is_file(found):
+        return found
+    beside = sorted(one.name for one in scope.folder.glob("*.yaml"))
+    near = difflib.get_close_matches(use, beside, n=1)
     hint = f"did you mean '{near[0]}'?" if near else "give its path from this file's folder"
-    raise file.error(("steps", index, "use"), f"there is no mission file '{step.use}'", hint)
+    raise scope.error(path, f"there is no mission file '{use}'", hint)
 
 
 def _is_file(path: Path) -> bool:
@@ -173,16 +275,14 @@ def _refuse_top_keys(used: MissionFile, user: MissionFile) -> None:
             raise used.error((key,), f"'{key}' of a file that is used cannot differ from that of its user", hint)
 
 
-def _skill_call(file: MissionFile, index: int) -> SkillCall:
-    step: StepFile = file.steps[index]
-    prefix = ("steps", index)
-    lines: Mapping[tuple[str | int, ...], int] = {} if file.source is None else file.source.lines
-    below = {path[2:]: line for path, line in lines.items() if path[:2] == prefix}
+def _skill_call(scope: Scope, step: StepFile, path: KeyPath) -> SkillCall:
+    lines: Mapping[KeyPath, int] = {} if scope.source is None else scope.source.lines
+    below = {each[len(path) :]: line for each, line in lines.items() if each[: len(path)] == path}
     assert step.skill is not None
     return SkillCall(
         skill=step.skill,
         values=step.with_ or {},
         gives=step.gives or {},
-        file=None if file.source is None else file.source.path,
+        file=None if scope.source is None else scope.source.path,
         places=below,
     )

@@ -7,11 +7,30 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StrictBool, StrictInt, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    StrictBool,
+    StrictInt,
+    field_validator,
+    model_validator,
+)
 
 from executive.language.questions import QuestionPolicy
 from executive.mission.command import Task
 from executive.mission.errors import InputError, listing
+from executive.mission.file.condition_schema import (
+    Condition,
+    DockFile,
+    RepeatFile,
+    Rounds,
+    Span,
+    Strict,
+    WaitFile,
+    WhileFile,
+)
 from executive.mission.file.model import (
     DEFAULT_WORLD,
     KeyPath,
@@ -27,24 +46,61 @@ from executive.mission.file.people import RouteFile
 from executive.mission.yaml_source import Name, Text, YamlSource
 from skills.quantities import Duration, bounds, without_range, without_unit
 
-__all__ = ["AskFile", "GuardsFile", "MissionFile", "PolicyFile", "StepFile", "mission_json_schema"]
+__all__ = [
+    "GuardsFile",
+    "HandlerFile",
+    "MissionFile",
+    "PolicyFile",
+    "QuestionFile",
+    "RoundFile",
+    "StepFile",
+    "mission_json_schema",
+]
 
 Seconds = Annotated[Duration, Field(strict=True)]
 Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
+Steps = Annotated[tuple["StepFile", ...], Field(min_length=1)]
+Choices = Annotated[
+    dict[Name, "Steps | None"],
+    Field(min_length=1),
+    BeforeValidator(
+        lambda data: dict.fromkeys(data) if isinstance(data, list) and all(isinstance(c, str) for c in data) else data,
+        json_schema_input_type=dict[Name, "Steps | None"] | tuple[Name, ...],
+    ),
+]
 Attempts = Annotated[StrictInt, Field(ge=0, le=100)]
 Objects = Annotated[StrictInt, Field(ge=0, le=10)]
 Scalar = str | StrictBool | StrictInt | Annotated[float, Field(strict=True)] | None
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
-FORMS: Final = "'say', some of 'take', 'to', 'do' and 'object', 'skill', or 'use'"
+BLOCKS: Final = ("if", "repeat", "try", "together", "wait", "check", "dock", "group", "speak", "ask", "set")
+FORMS: Final = f"'say', some of 'take', 'to', 'do' and 'object', 'skill', 'use', or one of {listing(BLOCKS, last='or')}"
 ONCE: Final = 1
 _NO_SKILLS: Final[Mapping[str, type]] = MappingProxyType({})
+_BESIDE: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {
+        "with": ("skill", "use"),
+        "elsewhere": ("say", "take", "to", "do", "object"),
+        "gives": ("skill", "ask", "check", "say", "do"),
+        "then": ("if",),
+        "else": ("if", "try"),
+        "steps": ("repeat",),
+        "done_when": ("together",),
+        "name": ("group",),
+        "always": ("group",),
+        "while": ("group",),
+        "when": ("group",),
+        "choices": ("ask",),
+        "match": ("ask",),
+        "limit": ("ask",),
+        "default": ("ask",),
+    }
+)
+"""With which forms of a step a key goes."""
+_NEEDED: Final[Mapping[str, str]] = MappingProxyType({"if": "then", "try": "else", "repeat": "steps"})
+_FIELDS: Final = MappingProxyType({"with": "with_", "if": "if_", "else": "else_", "try": "try_", "while": "while_"})
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=False)
-
-
-class GuardsFile(_Strict):
+class GuardsFile(Strict):
     """What must hold while it runs; when it does not, the step fails."""
 
     battery: Share | None = Field(None, description="The least charge of the battery, from 0 to 1.")
@@ -59,7 +115,7 @@ class GuardsFile(_Strict):
     )
 
 
-class AskFile(_Strict):
+class QuestionFile(Strict):
     """The question to the operator for `on_failure: ask`."""
 
     text: Text | None = Field(None, description="The question; by default it tells what failed and why.")
@@ -67,7 +123,7 @@ class AskFile(_Strict):
     default: Literal["skip", "stop"] = Field("stop", description="The answer when nobody answers in time.")
 
 
-class PolicyFile(_Strict):
+class PolicyFile(Strict):
     """How something runs."""
 
     timeout: Seconds | None = Field(None, description="Seconds on the robot's clock for each attempt.")
@@ -78,7 +134,7 @@ class PolicyFile(_Strict):
         "says), then stop. skip: note it and go on. ask: ask the operator. return: go back to where the robot started, "
         "then stop. stop: the mission fails.",
     )
-    ask: AskFile | None = Field(None, description="The question for `on_failure: ask`.")
+    question: QuestionFile | None = Field(None, description="The question for `on_failure: ask`.")
     guards: GuardsFile | None = Field(None, description="What must hold while it runs.")
     pick_ups: Objects | None = Field(
         None, description="How often an object that falls on the way is picked up again; by default, twice."
@@ -91,21 +147,23 @@ class PolicyFile(_Strict):
 
     @model_validator(mode="after")
     def _asks_where_it_says_so(self) -> PolicyFile:
-        if self.ask is not None and self.on_failure is not OnFailure.ASK:
-            raise ValueError("'ask' is the question of 'on_failure: ask', which does not stand beside it")
+        if self.question is not None and self.on_failure is not OnFailure.ASK:
+            raise ValueError("'question' is that of 'on_failure: ask', which does not stand beside it")
         return self
 
     def over(self, below: PolicyFile | None) -> StepPolicy:
         """This policy, with what it leaves open taken from `below`."""
         on_failure = self._own_or(below, "on_failure") or OnFailure.STOP
         retries = self._own_or(below, "retries")
-        ask: AskFile | None = self._own_or(below, "ask")
+        question: QuestionFile | None = self._own_or(below, "question")
         guards: GuardsFile | None = self._own_or(below, "guards")
         return StepPolicy(
             timeout_s=self._own_or(below, "timeout"),
             retries=(ONCE if on_failure is OnFailure.RETRY else 0) if retries is None else retries,
             on_failure=on_failure,
-            question=OperatorQuestion() if ask is None else OperatorQuestion(ask.text, ask.limit, ask.default),
+            question=OperatorQuestion()
+            if question is None
+            else OperatorQuestion(question.text, question.limit, question.default),
             guards=StepGuards()
             if guards is None
             else StepGuards(guards.battery, bool(guards.localised), guards.time, guards.stale),
@@ -118,8 +176,14 @@ class PolicyFile(_Strict):
         return getattr(below, key, None) if own is None else own
 
 
+def is_for_each(step: Mapping[str, Any]) -> bool:
+    """Whether the data of a step make a round for each of several values."""
+    repeat = step.get("repeat")
+    return isinstance(repeat, Mapping) and "for_each" in repeat
+
+
 class StepFile(PolicyFile):
-    """A step: a sentence, the parts of a command, a skill with its ports, or another mission file."""
+    """A step: a sentence, the parts of a command, a skill with its ports, another mission file, or a block of steps."""
 
     say: Text | None = Field(None, description="What to do, in English.")
     take: Text | None = Field(None, description="What is carried; a number may stand before it.")
@@ -135,26 +199,118 @@ class StepFile(PolicyFile):
         None, alias="with", description="The skill's input ports, or the parameters of the used file."
     )
     gives: dict[str, Name] | None = Field(
-        None, description="Names for the skill's output ports; later steps read them with {from: NAME}."
+        None,
+        description="Names for the skill's output ports, or for the answer; later steps read them with {from: NAME} "
+        "and in expressions.",
     )
+    if_: Condition | None = Field(None, alias="if", description="A condition that decides between `then` and `else`.")
+    then: Steps | None = Field(None, description="The steps when the condition of `if` holds.")
+    else_: Steps | None = Field(
+        None, alias="else", description="The steps when the condition of `if` does not hold, or when `try` failed."
+    )
+    repeat: RepeatFile | None = Field(None, description="How often, and until when, `steps` are repeated.")
+    steps: Steps | None = Field(None, description="The steps that `repeat` repeats.")
+    try_: Steps | None = Field(None, alias="try", description="Steps; as soon as one fails, those of `else` are done.")
+    together: Annotated[tuple[StepFile, ...], Field(min_length=2)] | None = Field(
+        None, description="Steps that run side by side: those that move different parts of the robot, or none."
+    )
+    done_when: Literal["all", "any"] | Rounds | None = Field(
+        None, description="How many steps of `together` must be done: all of them unless said."
+    )
+    wait: WaitFile | None = Field(None, description="Wait for a condition, some time, or until a time of day.")
+    check: Condition | None = Field(None, description="Answer whether a condition holds, as part of the result.")
+    dock: DockFile | None = Field(None, description="Go to the dock and charge.")
+    group: Steps | None = Field(None, description="Steps in a row that share a policy.")
+    name: Name | None = Field(None, description="What the group is called.")
+    always: Steps | None = Field(
+        None, description="Steps at the end of the group, whatever happened, also when the mission is cancelled."
+    )
+    while_: WhileFile | None = Field(None, alias="while", description="What must hold while the group runs.")
+    when: tuple[HandlerFile, ...] | None = Field(
+        None, description="What interrupts the group, the most important first."
+    )
+    speak: Text | None = Field(None, description="What to say to the people around; {NAME} puts in a value.")
+    ask: Text | None = Field(None, description="A question to the people around, or to the operator.")
+    choices: Choices | None = Field(
+        None, description="The answers to choose from, perhaps with the steps that each leads to."
+    )
+    match: Literal["place", "person", "object", "number", "text"] | None = Field(
+        None, description="What the answer is, where there are no choices."
+    )
+    limit: Span = Field(60.0, description="How long to wait for an answer (robot's clock).")
+    default: Scalar = Field(None, description="The answer when nobody answers in time; without one the step fails.")
+    set: dict[Name, Scalar] | None = Field(None, description="Values by name: numbers, truths or expressions.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short_forms(cls, data: Any) -> Any:
+        """`dock` may stand alone; the steps of a `for_each` are read once for each value, by the resolver."""
+        if data == "dock":
+            return {"dock": {}}
+        if not isinstance(data, dict):
+            return data
+        if data.get("dock") is None and "dock" in data:
+            data = {**data, "dock": {}}
+        if is_for_each(data) and "steps" in data:
+            data = {key: value for key, value in data.items() if key != "steps"}
+        return data
 
     @model_validator(mode="after")
     def _one_form(self) -> StepFile:
-        parts = [name for name in COMMAND_KEYS if getattr(self, name) is not None]
-        forms = [key for key in ("say", "skill", "use") if getattr(self, key) is not None]
+        parts = [name for name in COMMAND_KEYS if self._has(name)]
+        forms = [key for key in ("say", "skill", "use", *BLOCKS) if self._has(key)]
         if len(forms) > 1 or (forms and parts):
             raise ValueError(f"a step has either '{forms[0]}' or {listing([*forms[1:], *parts])}, not both")
         if not forms and not parts:
             raise ValueError(f"the step is empty: give it {FORMS}")
         if self.do is not Task.CHARGE and (self.do is None) != (self.object is None):
             raise ValueError("'do' and 'object' go together")
-        if self.with_ is not None and self.skill is None and self.use is None:
-            raise ValueError("'with' goes with 'skill' or 'use'")
-        if self.elsewhere is not None and (self.skill is not None or self.use is not None):
-            raise ValueError("'elsewhere' goes with a sentence or a command")
-        if self.gives is not None and self.skill is None:
-            raise ValueError("'gives' goes with 'skill'")
+        for key, with_one_of in _BESIDE.items():
+            if self._has(key) and not {*forms, *parts} & set(with_one_of):
+                raise ValueError(f"'{key}' goes with {listing(map(repr, with_one_of), last='or')}")
+        needed = _NEEDED.get(forms[0]) if forms else None
+        if needed is not None and not self._has(needed) and not (self.repeat and self.repeat.for_each is not None):
+            raise ValueError(f"'{forms[0]}' needs '{needed}' beside it")
+        if self.choices is not None and self.match is not None:
+            raise ValueError("an answer is one of 'choices' or what 'match' says, not both")
         return self
+
+    def _has(self, key: str) -> bool:
+        """Whether the file gives this key."""
+        return _FIELDS.get(key, key) in self.model_fields_set and getattr(self, _FIELDS.get(key, key)) is not None
+
+
+class HandlerFile(Strict):
+    """What interrupts a group or a mission."""
+
+    if_: Condition = Field(alias="if", description="When this begins to hold, the steps are interrupted.")
+    do: Steps = Field(description="What is done then; afterwards the steps go on.")
+    times: Rounds = Field(10, description="How often at most; once more is a failure.")
+
+
+class RoundFile(Strict):
+    """The steps of one round of a `for_each`."""
+
+    steps: Steps
+
+
+class ParameterFile(Strict):
+    """A parameter of a mission file."""
+
+    type: Literal["text", "number", "truth", "place", "object", "person"] | None = Field(
+        None, description="What it is; a place, object or person is checked against the world."
+    )
+    default: Scalar = Field(None, description="Its value where none is given.")
+    choices: tuple[Scalar, ...] | None = Field(None, description="The values that it may have.")
+    description: Text | None = Field(None, description="What it is for.")
+
+
+def _short_parameter(value: object) -> object:
+    """A parameter may be declared by its default alone."""
+    return value if isinstance(value, dict) else {"default": value}
+
+
+Parameter = Annotated[ParameterFile, BeforeValidator(_short_parameter, json_schema_input_type=ParameterFile | Scalar)]
 
 
 class MissionFile(PolicyFile):
@@ -178,9 +334,10 @@ class MissionFile(PolicyFile):
     objects: dict[Name, ObjectFile] | None = Field(
         None, description="Objects that lie there at the beginning besides those of the world, by name."
     )
-    parameters: dict[str, Scalar] | None = Field(
+    parameters: dict[str, Parameter] | None = Field(
         None,
-        description="Parameters with their defaults, read as ${name} in values; one without a default must be given.",
+        description="Parameters with their defaults, or {type: .., default: ..}, read as ${name} in values; one "
+        "without a default must be given.",
     )
     questions: QuestionPolicy | None = Field(
         None,
@@ -188,7 +345,17 @@ class MissionFile(PolicyFile):
         "first: the likeliest is taken. refuse (the default): the file is refused.",
     )
     each: PolicyFile | None = Field(None, description="The policy of every step that does not say otherwise.")
-    steps: Annotated[tuple[StepFile, ...], Field(min_length=1)] = Field(description="What to do, one after the other.")
+    variables: dict[Name, str | StrictBool | StrictInt | Annotated[float, Field(strict=True)]] | None = Field(
+        None, description="Values by name, as they are at the beginning; steps change them with `set` and `gives`."
+    )
+    steps: Steps = Field(description="What to do, one after the other.")
+    always: Steps | None = Field(
+        None, description="Steps at the end, whatever happened, also when the mission is cancelled."
+    )
+    while_: WhileFile | None = Field(None, alias="while", description="What must hold while the mission runs.")
+    when: tuple[HandlerFile, ...] | None = Field(
+        None, description="What interrupts the mission, the most important first."
+    )
     _source: YamlSource | None = PrivateAttr(default=None)
 
     @field_validator("on_failure")
@@ -198,12 +365,12 @@ class MissionFile(PolicyFile):
             raise ValueError("a whole mission cannot be skipped; set 'on_failure: skip' under 'each' or on a step")
         return on_failure
 
-    @field_validator("ask")
+    @field_validator("question")
     @classmethod
-    def _cannot_skip_when_asked(cls, ask: AskFile | None) -> AskFile | None:
-        if ask is not None and ask.default == "skip":
+    def _cannot_skip_when_asked(cls, question: QuestionFile | None) -> QuestionFile | None:
+        if question is not None and question.default == "skip":
             raise ValueError("a whole mission cannot be skipped; set 'default' to stop")
-        return ask
+        return question
 
     @property
     def source(self) -> YamlSource | None:
@@ -217,6 +384,10 @@ class MissionFile(PolicyFile):
     def source_line(self, path: KeyPath) -> SourceLine | None:
         """Where `path` stands in the file."""
         return None if self._source is None else SourceLine(self._source.path, self._source.line(path))
+
+
+StepFile.model_rebuild()
+MissionFile.model_rebuild()
 
 
 def with_source(file: MissionFile, source: YamlSource) -> MissionFile:
@@ -233,7 +404,7 @@ def mission_json_schema(inputs: Mapping[str, type] = _NO_SKILLS) -> dict[str, An
     schema = MissionFile.model_json_schema(by_alias=True)
     described: dict[str, Any] = _open_to_parameters(schema)
     step = described["$defs"]["StepFile"]
-    step["anyOf"] = [{"required": [key]} for key in ("say", *COMMAND_KEYS, "skill", "use")]
+    step["anyOf"] = [{"required": [key]} for key in ("say", *COMMAND_KEYS, "skill", "use", *BLOCKS)]
     step["allOf"] = [
         {
             "if": {"properties": {"skill": {"const": name}}, "required": ["skill"]},

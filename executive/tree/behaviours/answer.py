@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 from py_trees.common import Status
 
@@ -31,7 +31,8 @@ class Answer(ExplainedDecorator):
 
     With `tallies` the child looks at all surfaces, and what its leaves saw, each under a blackboard key, is counted,
     each object once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
-    looked at, and else FAILURE as above.
+    looked at, and else FAILURE as above. How many were counted goes to `count_key`, where
+    there is one.
     """
 
     question: str
@@ -44,6 +45,7 @@ class Answer(ExplainedDecorator):
     tallies: Mapping[str, str] = field(default_factory=dict)
     needed: int = 1
     yes_or_no: bool = True
+    count_key: str = ""
     answer: bool | None = field(default=None, init=False)
 
     def initialise(self) -> None:
@@ -69,6 +71,8 @@ class Answer(ExplainedDecorator):
         looks: list[tuple[ObjectObservation, ...]] = [self.board.get(key) for key in seen]
         found = told_apart(looks)
         enough = len(found) >= self.needed
+        if self.count_key:
+            self.board.put(self.count_key, float(len(found)))
         if unseen and not enough:
             return self._not_looked(nodes, unseen)
         limits = f", as far as was seen: not {', '.join(unseen)}" if unseen else ""
@@ -104,6 +108,9 @@ def _obstacle(nodes: Mapping[str, Explained]) -> Cause:
     return next((cause for cause in causes if cause not in (None, Cause.POSTCONDITION)), None) or Cause.EXECUTION
 
 
-KINDS: Final[Mapping[str, NodeKind]] = {
-    "answer": NodeKind(Answer, ("child", "board", "publish"), writes=lambda options: {options["key"]: bool})
-}
+def _writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
+    count = options.get("count_key")
+    return {options["key"]: bool, **({count: float} if count else {})}
+
+
+KINDS: Final[Mapping[str, NodeKind]] = {"answer": NodeKind(Answer, ("child", "board", "publish"), writes=_writes)}

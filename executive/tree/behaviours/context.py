@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+
+from py_trees.behaviour import Behaviour
 
 from executive.tree.behaviours.board import Board
 from skills.api import SkillContext
@@ -22,15 +24,56 @@ def never_pressed() -> str | None:
     return None
 
 
+def no_presses() -> Mapping[str, int]:
+    """How often each button was pressed where there are none."""
+    return {}
+
+
+class Endings:
+    """What a mission is to do in the end whatever happened, and could not do where it stands in the tree.
+
+    The run takes it over from a node that was stopped from outside, and does it before anything else.
+    """
+
+    def __init__(self) -> None:
+        self._due: list[Behaviour] = []
+        self._closed = False
+
+    @property
+    def due(self) -> Behaviour | None:
+        """What is to be ticked now; None when nothing is left."""
+        return self._due[0] if self._due else None
+
+    def take(self, node: Behaviour) -> bool:
+        """Take a node over, perhaps in the middle of its work; False when the run does no more of that."""
+        if not self._closed:
+            self._due.append(node)
+        return not self._closed
+
+    def done(self) -> None:
+        """What was due has come to its end."""
+        self._due.pop(0)
+
+    def close(self) -> tuple[Behaviour, ...]:
+        """Take nothing any more; what was still due."""
+        left, self._due, self._closed = tuple(self._due), [], True
+        return left
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunContext(SkillContext):
     """What the run lends to all nodes of a robot's tree: what skills may touch, the blackboard, the stop button.
 
-    `seed` is the run's. `stop_pressed` says why nothing may move while a stop button is pressed, else None.
+    `seed` is the run's. `stop_pressed` says why nothing may move while a stop button is pressed, else None. `presses`
+    counts how often each of the operator's buttons was pressed. `day_began_s` is the time of day (s after midnight) at
+    zero of the robot's clock.
     """
 
     board: Board
     stop_pressed: Callable[[], str | None] = never_pressed
+    presses: Callable[[], Mapping[str, int]] = no_presses
+    day_began_s: float = 0.0
+    endings: Endings = field(default_factory=Endings)
 
     def known_pose(self) -> Pose2D | None:
         """Where the robot believes to be, the planar part of X_WB; None while it is not localised."""

@@ -6,17 +6,28 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from py_trees.common import Status
-
 from executive.mission.command import START, Command, Task
-from executive.mission.errors import InputError, Problems, SourceLine
-from executive.mission.file.model import Mission, MissionStep, StepPolicy
+from executive.mission.errors import InputError, Problems, SourceLine, listing
+from executive.mission.expression import kind_of, literal
+from executive.mission.file.model import Mission, MissionStep, OnFailure, SkillCall, StepPolicy
 from executive.mission.goal import GoalCondition, clearing_goals, command_goal, drive_goal
-from executive.mission.gripper import UNNAMED, InGripper, after_command, is_same
+from executive.mission.gripper import UNNAMED, after_command, is_same
 from executive.mission.knowledge import Knowledge, Pose
 from executive.tree.behaviours.board import Constant
+from executive.tree.compiling.blocks import (
+    PYTHON_TYPES,
+    Flow,
+    answering,
+    block_name,
+    block_plan,
+    block_words,
+    framed,
+    give,
+    set_plan,
+)
 from executive.tree.compiling.builder import PICK_UPS, PlanBuilder, Registry, slug, start_key
 from executive.tree.compiling.clearing import clear_plan, is_clearing, refuse_everything
+from executive.tree.compiling.part import Assembled, StepPart
 from executive.tree.compiling.policies import PolicyFrame, needs_way_back, under_policy
 from executive.tree.compiling.search import surfaces_elsewhere
 from executive.tree.compiling.skill_steps import skill_plan
@@ -31,38 +42,8 @@ __all__ = ["Assembled", "StepPart", "assemble", "step_name"]
 NAVIGATE: Final = "navigate"
 NO_POLICY: Final = StepPolicy()
 _SKIPPING: Final = frozenset({"skip", "ask"})
-
-
-@dataclass(frozen=True)
-class StepPart:
-    """A part of a mission with something to show for it: a command, or a skill on its own.
-
-    `path_id` is that of its subtree, `skill` the skill on its own, `goal` what is to be so when it is done; of skills
-    on their own only a drive to a fixed pose has one. `excused` are pairs of path ids: when the first succeeded
-    although the second failed, the part was skipped.
-    """
-
-    path_id: str
-    command: Command | None = None
-    skill: type[Skill[Any]] | None = None
-    goal: GoalCondition | None = None
-    excused: tuple[tuple[str, str], ...] = ()
-
-    def was_skipped(self, statuses: Mapping[str, Status]) -> bool:
-        """Whether a node above let its failure pass; `statuses` are those at the end, by path id."""
-        ends = ((statuses.get(above), statuses.get(below)) for above, below in self.excused)
-        return (Status.SUCCESS, Status.FAILURE) in ends
-
-
-@dataclass(frozen=True)
-class Assembled:
-    """Nodes in a row, and what they are to bring about, in order."""
-
-    nodes: tuple[NodeSpec, ...] = ()
-    parts: tuple[StepPart, ...] = ()
-
-    def __add__(self, other: Assembled) -> Assembled:
-        return Assembled(self.nodes + other.nodes, self.parts + other.parts)
+_ANSWERS: Final[Mapping[str, tuple[str, type]]] = {"answer": ("key", bool), "count": ("count_key", float)}
+"""What a status check can give: the option of its answer node that names the key, and the type."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +66,7 @@ def assemble(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> t
     move_aside = mission.policy.move_aside or 0
     assembler = _Assembler(knowledge, registry, start_key(mission.robot_name, mission.name), pick_ups, move_aside)
     builder = assembler.builder(base, mission.source)
-    steps = assembler.level(mission, base)
+    steps = assembler.mission(mission, base)
     remember = [builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)]
     first = remember if _leads_back(mission) else []
     if mission.policy == NO_POLICY and not _may_skip(steps.nodes):
@@ -109,8 +90,8 @@ def step_name(command: Command) -> str:
 class _Assembler:
     """Makes the subtrees of one mission.
 
-    `pick_ups` and `move_aside` count for steps that do not say otherwise; `names` are the outputs of the skills so far,
-    with their blackboard keys, and `held` is what the gripper holds by then.
+    `pick_ups` and `move_aside` count for steps that do not say otherwise; `flow` is what is known by then. Values that
+    steps set have blackboard keys below `values_base`.
     """
 
     knowledge: Knowledge
@@ -118,19 +99,39 @@ class _Assembler:
     start_key: str
     pick_ups: int = PICK_UPS
     move_aside: int = 0
-    names: dict[str, str] = field(default_factory=dict)
-    held: InGripper | None = None
+    values_base: str = ""
+    flow: Flow = field(default_factory=Flow)
 
     def builder(self, path_id: str, source: SourceLine | None) -> PlanBuilder:
         """The builder of nodes that belong to no one command."""
         return PlanBuilder(self.knowledge, self.registry, path_id, self.start_key, Command(goal=START), source)
 
-    def level(self, mission: Mission, base: str) -> Assembled:
-        """The subtrees of a mission's steps: those under a policy each as one, the others' parts as they are."""
+    def mission(self, mission: Mission, base: str) -> Assembled:
+        """The subtrees of a mission's steps, under what is watched meanwhile, after its values are set."""
+        builder, outer = self.builder(base, mission.source), (self.values_base, self.flow.declared)
+        known = dict(self.flow.names)
+        first: tuple[NodeSpec, ...] = ()
+        self.values_base = f"{base}/values"
+        if mission.variables:
+            first = (self._declare(mission, builder),)
+        before = self.flow.copy()
+        steps = self.level(mission.steps, base)
+        if mission.whole is not None:
+            row = replace(steps, nodes=(builder.node("sequence", "steps", *steps.nodes, part="all"),))
+            steps = framed(self, row, mission.whole, builder.at("whole"), before)
+        self.values_base, self.flow.declared = outer
+        self.flow.names.update({name: known[name] for name in mission.variables if name in known})
+        return replace(steps, nodes=(*first, *steps.nodes))
+
+    def level(self, steps: Sequence[MissionStep], base: str) -> Assembled:
+        """The subtrees of steps: those under a policy each as one, the others' parts as they are."""
         made, problems = Assembled(), Problems()
-        for items, policy in _groups(mission.steps):
+        for items, policy in _groups(steps):
             with problems:
+                before = self.flow.copy()
                 group = self._group(items, base)
+                if policy.on_failure in (OnFailure.SKIP, OnFailure.ASK):
+                    self.flow.may_lack(before)
                 if policy != NO_POLICY:
                     builder = self.builder(f"{base}/step-{items[0].place}", items[0].step.source)
                     words = f"step {items[0].place}: {_words(items)}"
@@ -166,9 +167,14 @@ class _Assembler:
         else:
             node = trips_plan(builder, bring)
             goals = (command_goal(get, self.knowledge), command_goal(bring, self.knowledge))
-        self.held = None
-        parts = (StepPart(node.path_id, each, goal=goal) for each, goal in zip((get, bring), goals, strict=True))
-        return Assembled((node,), tuple(parts))
+        held, opening = self.flow.held, self.flow.opening
+        self.flow.held, self.flow.opening = None, False
+        got = after_command(get, held, self.knowledge)
+        parts = (
+            StepPart(node.path_id, get, goal=goals[0], held=held, opening=opening),
+            StepPart(node.path_id, bring, goal=goals[1], held=got, opening=False),
+        )
+        return Assembled((node,), parts)
 
     def _item(self, item: _Item, following: Command | None, base: str) -> Assembled:
         """The subtree of one command, skill or used mission; `following` is the command right after it."""
@@ -176,34 +182,70 @@ class _Assembler:
         if step.used is not None:
             return self._used(step, step.used, f"{base}/{item.number}-{slug(step.used.name)}")
         if step.skill is not None:
-            path_id = f"{base}/{item.number}-{slug(step.skill.skill)}"
-            leaf = skill_plan(
-                step.skill,
-                path_id,
-                step.source,
-                knowledge=self.knowledge,
-                registry=self.registry,
-                names=self.names,
-            )
-            skill: type[Skill[Any]] = leaf.options["skill"]
-            self.held = {None: self.held, True: UNNAMED, False: None}[skill.gripper_after]
-            return Assembled((leaf,), (StepPart(path_id, skill=skill, goal=_drive_goal(leaf)),))
+            return self._skill(step, step.skill, f"{base}/{item.number}-{slug(step.skill.skill)}")
+        if step.block is not None:
+            builder = self.builder(f"{base}/{item.number}-{block_name(step.block)}", step.source)
+            return block_plan(self, step.block, builder, step.policy)
+        flow = self.flow
         builder = replace(self._command_builder(item, base), avoided=_goals(following, self.knowledge))
         refuse_several(builder)
         refuse_everything(builder)
-        command = builder.command
-        carried = None if self.held is None else self.held.thing
-        in_gripper = is_same(self.held, command.object, self.knowledge)
+        command, held, opening = builder.command, flow.held, flow.opening
+        carried = None if held is None else held.thing
+        in_gripper = is_same(held, command.object, self.knowledge)
         builder = replace(builder, in_gripper=in_gripper, carried=carried)
-        node = step_plan(builder)
-        self.held = after_command(command, self.held, self.knowledge)
+        node = self._giving(step, command, step_plan(builder), builder)
+        flow.held = after_command(command, held, self.knowledge)
+        flow.opening = opening and command.task is not Task.GRASP and flow.held == held and not _lets_go(command)
         goal = command_goal(command, self.knowledge, _elsewhere(builder))
-        return Assembled((node,), (StepPart(builder.path_id, command, goal=goal),))
+        return Assembled(
+            (node,), (StepPart(builder.path_id, command, goal=goal, held=held, opening=opening, node=node.path_id),)
+        )
+
+    def _skill(self, step: MissionStep, call: SkillCall, path_id: str) -> Assembled:
+        """The leaf of a skill on its own."""
+        flow, builder = self.flow, self.builder(path_id, step.source)
+        leaf = skill_plan(
+            call,
+            path_id,
+            step.source,
+            knowledge=self.knowledge,
+            registry=self.registry,
+            names={name: named.key for name, named in flow.names.items()},
+            gives_to=lambda name, key, kind: give(self, name, key, kind, builder),
+        )
+        skill: type[Skill[Any]] = leaf.options["skill"]
+        part = StepPart(path_id, skill=skill, goal=_drive_goal(leaf), held=flow.held, opening=flow.opening)
+        flow.held = {None: flow.held, True: UNNAMED, False: None}[skill.gripper_after]
+        flow.opening = flow.opening and skill.gripper_after is None
+        return Assembled((leaf,), (part,))
+
+    def _giving(self, step: MissionStep, command: Command, node: NodeSpec, builder: PlanBuilder) -> NodeSpec:
+        """The subtree of a status check whose answer later steps read. Raises InputError: it gives no such thing."""
+        keys: dict[str, str] = {}
+        for port, name in step.gives.items():
+            known = ("answer", "count") if command.object_count != 1 else ("answer",)
+            if command.task is not Task.FIND or port not in known:
+                said = listing(known) if command.task is Task.FIND else "no answer"
+                hint = "write {answer: NAME} beside a question, or {count: NAME} beside one that counts"
+                raise InputError.at(step.source, f"this step gives {said}, not '{port}'", hint=hint)
+            option, kind = _ANSWERS[port]
+            keys[option] = give(self, name, f"{builder.path_id}/{port}", kind, builder)
+        return answering(node, keys) if keys else node
+
+    def _declare(self, mission: Mission, builder: PlanBuilder) -> NodeSpec:
+        """The leaf that gives a mission's values as they are at the beginning."""
+        flow, values = self.flow, {}
+        for name, value in mission.variables.items():
+            key = give(self, name, f"{self.values_base}/{name}", PYTHON_TYPES[kind_of(value)], builder)
+            values[key] = literal(value)
+        flow.declared = frozenset(mission.variables)
+        return set_plan(builder, values, flow.names, "values", "values at the beginning")
 
     def _used(self, step: MissionStep, used: Mission, base: str) -> Assembled:
         """The subtree of a mission that a step uses."""
         try:
-            steps = self.level(used, base)
+            steps = self.mission(used, base)
         except InputError as error:
             raise error if step.source is None else error.within(step.source.file, step.source.line) from error
         builder = self.builder(base, step.source)
@@ -223,6 +265,11 @@ class _Assembler:
             pick_ups=self.pick_ups if own.pick_ups is None else own.pick_ups,
             move_aside=self.move_aside if own.move_aside is None else own.move_aside,
         )
+
+
+def _lets_go(command: Command) -> bool:
+    """Whether a command ends with nothing in the gripper."""
+    return command.item is not None or command.task is Task.PLACE
 
 
 def _go_together(get: Command, bring: Command) -> bool:
@@ -272,13 +319,10 @@ def _drive_goal(leaf: NodeSpec) -> GoalCondition | None:
 
 
 def _under(body: Assembled, policy: StepPolicy, frame: PolicyFrame) -> Assembled:
-    """One node under its policy; where that may skip it, its parts are excused."""
+    """One node under its policy."""
     (below,) = body.nodes
     node = under_policy(below, policy, frame)
-    if node.kind not in _SKIPPING:
-        return Assembled((node,), body.parts)
-    excuse = (node.path_id, node.children[0].path_id)
-    return Assembled((node,), tuple(replace(part, excused=(*part.excused, excuse)) for part in body.parts))
+    return Assembled((node,), body.parts)
 
 
 def _may_skip(nodes: Sequence[NodeSpec]) -> bool:
@@ -298,6 +342,8 @@ def _words(items: Sequence[_Item]) -> str:
     step = items[0].step
     if step.used is not None:
         return step.used.name
+    if step.block is not None:
+        return block_words(step.block)
     commands = [item.command for item in items if item.command is not None]
     return step.skill.skill if step.skill is not None else ", then ".join(map(_command_words, commands))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from executive.mission.errors import SourceLine, listing, suggestion
@@ -26,16 +26,20 @@ def skill_plan(
     *,
     knowledge: Knowledge,
     registry: Registry,
-    names: dict[str, str],
+    names: Mapping[str, str],
+    gives_to: Callable[[str, str, type], str],
 ) -> NodeSpec:
-    """The leaf of a skill step. `names` are the outputs of earlier steps and their blackboard keys; its own are added.
+    """The leaf of a skill step. `names` are the values of earlier steps and their blackboard keys; `gives_to` gives the
+    key for a value of this step, by its name, its own key and its type.
 
     Raises InputError: no such skill, a value that does not fit its port, an unknown port or name.
     """
     skill = _registered(call, registry)
     inputs = _inputs(call, skill, knowledge, names)
-    outputs = {port: f"{path_id}/{slug(port)}" for port in _given_ports(call, skill)}
-    names.update({call.gives[port]: key for port, key in outputs.items()})
+    outputs = {
+        port: gives_to(call.gives[port], f"{path_id}/{slug(port)}", skill.outputs[port])
+        for port in _given_ports(call, skill)
+    }
     return skill_spec(skill, call.skill, path_id, source, inputs, outputs)
 
 

@@ -50,6 +50,15 @@
       }
     }
 
+    // What the robot says stays in sight for as long as people need to read it.
+    hear(robot, text) {
+      byId("announced").textContent = `${robot} says: ${text}`;
+      byId("said").textContent = `${robot}: ${text}`;
+      byId("said").classList.remove("bad");
+      clearTimeout(this.clearing);
+      this.clearing = setTimeout(() => { byId("said").textContent = ""; }, 6000 + 60 * text.length);
+    }
+
     async answer(text) {
       this.saying = true;
       if (await this.do("say", { text })) byId("sentence").value = "";
@@ -65,8 +74,23 @@
       this.saying = false;
     }
 
+    drawButtons(names) {
+      const key = JSON.stringify(names);
+      if (key === this.shown) return;
+      this.shown = key;
+      byId("buttons").replaceChildren(...names.map((name) => {
+        const button = document.createElement("button");
+        button.type = "button";
+        button.textContent = name;
+        button.title = `The mission waits for this button, or decides by it`;
+        button.addEventListener("click", () => this.do("press", { name }));
+        return button;
+      }));
+    }
+
     draw(state, ended) {
       this.state = state;
+      this.drawButtons(state ? state.buttons || [] : []);
       const mode = state ? state.mode : "ready", over = ended || mode === "ended";
       const paused = mode === "paused", stopped = mode === "stopped";
       byId("pause").querySelector("span").textContent = paused ? "Go on" : "Pause";
@@ -75,6 +99,7 @@
       byId("stop").querySelector("span").textContent = stopped ? "Release" : "Stop";
       byId("stop").setAttribute("aria-pressed", stopped);
       for (const id of ["pause", "step", "cancel", "stop"]) byId(id).disabled = over;
+      for (const button of byId("buttons").children) button.disabled = over;
       byId("say").querySelector("[type=submit]").disabled = over;
     }
 

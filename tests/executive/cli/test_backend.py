@@ -85,7 +85,7 @@ def test_its_work_is_in_report_and_log_and_its_parts_are_timed(prepared):
 def test_log_and_tree_are_left_as_after_a_simulated_run(prepared):
     run_request(prepared, ScriptedBackend())
     out = prepared.request.out
-    assert sorted(path.name for path in out.iterdir()) == ["log.mcap", "tree.svg"]
+    assert sorted(path.name for path in out.iterdir()) == ["log.mcap", "report.html", "tree.svg"]
     topics = {event.topic for event in read_events(out / "log.mcap")}
     assert {"map", "run", "tree", "transitions", "pose", "state", "outcome"} <= topics
 

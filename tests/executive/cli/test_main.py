@@ -140,7 +140,7 @@ def test_run_json_has_exactly_the_contract_on_the_last_line(no_plant, tmp_path):
     values = json.loads(result.stdout.splitlines()[-1])
     assert list(values) == [
         "outcome", "cause", "message", "referee", "commands", "world", "seed", "sim_time_s", "wall_time_s",
-        "real_time_factor", "ticks", "log", "work",
+        "real_time_factor", "ticks", "log", "work", "answers", "said", "seen_objects",
     ]  # fmt: skip
     assert list(values["referee"]) == ["success", "why", "collisions", "drops", "people_hit", "hit_by_people"]
     assert (result.exit_code, len(result.stdout.splitlines())) == (0, 1)

@@ -20,7 +20,7 @@ steps:
   - say: go to the hall
     on_failure: ask
     retries: 0
-    ask: {text: What now?, limit: 9, default: skip}
+    question: {text: What now?, limit: 9, default: skip}
   - skill: navigate
     with: {x: 5.2, y: 4.5}
 """
@@ -65,7 +65,7 @@ def test_moving_aside_is_allowed_for_a_step_or_for_each(load):
         ("timeout: 600", "timeout: true", 2, "timeout: should be a number"),
         ("timeout: 600", "timeout: .nan", 2, "above 0"),
         ("timeout: 600", "on_failure: skip", 2, "a whole mission cannot be skipped"),
-        ("timeout: 600", "on_failure: ask\nask: {default: skip}", 3, "a whole mission cannot be skipped"),
+        ("timeout: 600", "on_failure: ask\nquestion: {default: skip}", 3, "a whole mission cannot be skipped"),
         ("retries: 1", "retries: 1.5", 3, "each.retries: should be a whole number"),
         ("retries: 1", "retries: -1", 3, "at least 0"),
         ("on_failure: skip", "on_failure: skipp", 3, "did you mean 'skip'?"),
@@ -74,15 +74,15 @@ def test_moving_aside_is_allowed_for_a_step_or_for_each(load):
         ("battery: 0.3", "batery: 0.3", 7, "did you mean 'battery'?"),
         ("localised: true", 'localised: "yes"', 7, "guards.localised: should be true or false"),
         ("stale: fail", "stale: faill", 7, "did you mean 'fail'?"),
-        ("on_failure: ask\n", "on_failure: stop\n", 8, "'ask' is the question of 'on_failure: ask'"),
+        ("on_failure: ask\n", "on_failure: stop\n", 8, "'question' is that of 'on_failure: ask'"),
         ("default: skip", "default: retry", 11, "'skip' or 'stop'"),
         ("default: skip", "default: panic", 11, "'skip' or 'stop'"),
         ("skill: navigate", "skil: navigate", 12, "did you mean 'skill'?"),
         ("skill: navigate", "to: hall", 12, "'with' goes with 'skill' or 'use'"),
         ("skill: navigate", "skill: navigate\n    to: hall", 12, "either 'skill' or to, not both"),
         ("skill: navigate", "skill: navigate\n    use: x.yaml", 12, "either 'skill' or use, not both"),
-        ("skill: navigate", "skill: navigate\n    elsewhere: false", 12, "'elsewhere' goes with a sentence"),
-        ("say: go to the hall", "say: go to the hall\n    gives: {a: b}", 8, "'gives' goes with 'skill'"),
+        ("skill: navigate", "skill: navigate\n    elsewhere: false", 12, "'elsewhere' goes with 'say'"),
+        ("say: go to the hall", "to: hall\n    gives: {a: b}", 8, "'gives' goes with 'skill'"),
     ],
 )
 def test_what_does_not_fit_is_refused_with_its_line_and_the_hint(load, old, new, line, says):

@@ -1,0 +1,345 @@
+"""The small expression language of mission files: `count + 1`, `battery < 0.3 and not holding`, `"{count} beers"`.
+
+Numbers, texts, true and false, names; + - * / // %; comparisons; and, or, not; `A if C else B`; brackets; and the
+functions of `FUNCTIONS`. The grammar is a closed part of Python's, read by `ast`: nothing is ever executed. An
+expression is checked against the types of its names before a mission runs, and evaluated while it runs.
+"""
+
+from __future__ import annotations
+
+import ast
+import enum
+import functools
+import math
+import operator
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final
+
+from executive.mission.errors import suggestion
+
+__all__ = ["FUNCTIONS", "Expression", "ExpressionError", "Kind", "Template", "Value", "kind_of", "literal"]
+
+Value = bool | int | float | str
+MOST_LETTERS: Final = 500
+MOST_TEXT: Final = 2000
+MOST_DEPTH: Final = 30
+LARGEST: Final = 1e15
+
+
+class ExpressionError(ValueError):
+    """An expression that cannot be read, does not fit the types of its names, or has no value; `hint` is the fix."""
+
+    def __init__(self, message: str, hint: str = "") -> None:
+        super().__init__(message)
+        self.message, self.hint = message, hint
+
+
+class Kind(enum.Enum):
+    """The types of values."""
+
+    NUMBER = "number"
+    TEXT = "text"
+    TRUTH = "true or false"
+    OTHER = "object"  # an output of a skill that only ports can take
+
+    def __str__(self) -> str:
+        return self.value
+
+
+_KINDS: Final[Mapping[type, Kind]] = {bool: Kind.TRUTH, int: Kind.NUMBER, float: Kind.NUMBER, str: Kind.TEXT}
+
+
+def kind_of(type_or_value: Any) -> Kind:
+    """The kind of a Python type or of a value; OTHER where it is none that an expression can hold."""
+    kind = type_or_value if isinstance(type_or_value, type) else type(type_or_value)
+    return _KINDS.get(kind, Kind.OTHER)
+
+
+@dataclass(frozen=True)
+class _Function:
+    """A function by name: the kinds it takes (None: any number of numbers), what it gives, how it is worked out."""
+
+    takes: tuple[Kind, ...] | None
+    gives: Kind
+    work: Callable[..., Value]
+
+
+FUNCTIONS: Final[Mapping[str, _Function]] = MappingProxyType(
+    {
+        "abs": _Function((Kind.NUMBER,), Kind.NUMBER, abs),
+        "min": _Function(None, Kind.NUMBER, min),
+        "max": _Function(None, Kind.NUMBER, max),
+        "round": _Function((Kind.NUMBER,), Kind.NUMBER, round),
+        "length": _Function((Kind.TEXT,), Kind.NUMBER, len),
+        "lower": _Function((Kind.TEXT,), Kind.TEXT, str.lower),
+    }
+)
+
+
+@dataclass(frozen=True)
+class Expression:
+    """An expression, by its text. Raises ExpressionError: it cannot be read."""
+
+    text: str
+
+    def __post_init__(self) -> None:
+        _parsed(self.text)
+
+    def __str__(self) -> str:
+        return self.text
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names that it reads."""
+        functions = {id(node.func) for node in ast.walk(_parsed(self.text)) if isinstance(node, ast.Call)}
+        nodes = (node for node in ast.walk(_parsed(self.text)) if isinstance(node, ast.Name))
+        return frozenset(node.id for node in nodes if id(node) not in functions) - set(_CONSTANTS)
+
+    def kind(self, kinds: Mapping[str, Kind]) -> Kind:
+        """The type of its value. Raises ExpressionError: an unknown name, or types that do not fit."""
+        kind = _kind(_parsed(self.text).body, kinds)
+        if not self.names:
+            self.value({})
+        return kind
+
+    def value(self, values: Mapping[str, Value]) -> Value:
+        """Its value. Raises ExpressionError: division by zero, a value too large, or a name without a value."""
+        return _checked(_value(_parsed(self.text).body, values))
+
+
+@dataclass(frozen=True)
+class Template:
+    """A text with expressions in braces: "I saw {count} beers"; `{{` is a brace. Raises ExpressionError."""
+
+    text: str
+
+    def __post_init__(self) -> None:
+        _pieces(self.text)
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        """The expressions in it, in order."""
+        return tuple(piece for piece in _pieces(self.text) if isinstance(piece, Expression))
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names that it reads."""
+        return frozenset(name for each in self.expressions for name in each.names)
+
+    def filled(self, values: Mapping[str, Value]) -> str:
+        """The text with the values put in. Raises ExpressionError."""
+        return "".join(piece if isinstance(piece, str) else _shown(piece.value(values)) for piece in _pieces(self.text))
+
+
+def literal(value: Value) -> Expression:
+    """The expression of a plain value."""
+    return Expression(repr(value) if not isinstance(value, bool) else str(value).lower())
+
+
+@functools.lru_cache(maxsize=4096)
+def _pieces(text: str) -> tuple[str | Expression, ...]:
+    pieces: list[str | Expression] = []
+    last = 0
+    for match in re.finditer(r"\{\{|\}\}|\{([^{}]*)\}|[{}]", text):
+        pieces.append(text[last : match.start()])
+        found, last = match[0], match.end()
+        if found in ("{", "}"):
+            raise ExpressionError(f"a brace '{found}' stands alone", "write an expression in {braces}, or {{")
+        pieces.append(found[0] if found in ("{{", "}}") else Expression(match[1]))
+    return tuple(piece for piece in (*pieces, text[last:]) if piece != "")
+
+
+def _shown(value: Value) -> str:
+    """A value as a person reads it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+@functools.lru_cache(maxsize=4096)
+def _parsed(text: str) -> ast.Expression:
+    """The syntax tree of an expression of the closed grammar."""
+    if len(text) > MOST_LETTERS:
+        raise ExpressionError(f"the expression has {len(text)} letters", f"write {MOST_LETTERS} at most")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ExpressionError(f"'{text[:60]}' is no expression", _HINT) from None
+    _refuse_others(tree.body, 0)
+    return tree
+
+
+def _refuse_others(node: ast.expr, depth: int) -> None:
+    """Refuse what the grammar does not have."""
+    if depth > MOST_DEPTH:
+        raise ExpressionError("the expression is nested too deeply", "use 'set' to name a part of it")
+    if isinstance(node, ast.Constant):
+        if not isinstance(node.value, bool | int | float | str):
+            raise ExpressionError(f"{ast.unparse(node)[:40]} is no value", _HINT)
+        _checked(node.value)
+        return
+    if isinstance(node, ast.Name):
+        return
+    for child in _parts(node):
+        _refuse_others(child, depth + 1)
+
+
+def _parts(node: ast.expr) -> tuple[ast.expr, ...]:
+    """The operands of a node. Raises ExpressionError: it is none of the grammar's."""
+    match node:
+        case ast.BinOp(left, op, right) if type(op) in _ARITHMETIC:
+            return left, right
+        case ast.UnaryOp(ast.Not() | ast.USub() | ast.UAdd(), operand):
+            return (operand,)
+        case ast.BoolOp(_, values):
+            return tuple(values)
+        case ast.Compare(left, ops, comparators) if all(type(op) in _COMPARISONS for op in ops):
+            return left, *comparators
+        case ast.IfExp(test, body, orelse):
+            return test, body, orelse
+        case ast.Call(ast.Name(name), arguments, []) if not any(isinstance(a, ast.Starred) for a in arguments):
+            if name not in FUNCTIONS:
+                raise ExpressionError(f"there is no function '{name}'", suggestion(name, FUNCTIONS))
+            return tuple(arguments)
+    raise ExpressionError(f"'{ast.unparse(node)[:40]}' cannot stand in an expression", _HINT)
+
+
+def _kind(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
+    """The type of a node's value. Raises ExpressionError."""
+    match node:
+        case ast.Constant(value):
+            return kind_of(value)
+        case ast.Name(name) if name in _CONSTANTS:
+            return Kind.TRUTH
+        case ast.Name(name):
+            if name not in kinds:
+                known = sorted(kinds)
+                raise ExpressionError(f"unknown name '{name}'", suggestion(name, known) if known else _HINT)
+            if kinds[name] is Kind.OTHER:
+                raise ExpressionError(f"'{name}' is no number, text or truth", "ports take it as {from: " + name + "}")
+            return kinds[name]
+        case ast.BinOp(left, op, right):
+            both = {_kind(left, kinds), _kind(right, kinds)}
+            if both == {Kind.TEXT} and isinstance(op, ast.Add):
+                return Kind.TEXT
+            _want(both, Kind.NUMBER, node)
+            return Kind.NUMBER
+        case ast.UnaryOp(op, operand):
+            wanted = Kind.TRUTH if isinstance(op, ast.Not) else Kind.NUMBER
+            _want({_kind(operand, kinds)}, wanted, node)
+            return wanted
+        case ast.BoolOp(_, values):
+            _want({_kind(value, kinds) for value in values}, Kind.TRUTH, node)
+            return Kind.TRUTH
+        case ast.Compare(left, ops, comparators):
+            _comparison(node, [_kind(each, kinds) for each in (left, *comparators)], ops)
+            return Kind.TRUTH
+        case ast.IfExp(test, body, orelse):
+            _want({_kind(test, kinds)}, Kind.TRUTH, node)
+            first = _kind(body, kinds)
+            _want({_kind(orelse, kinds)}, first, node)
+            return first
+        case ast.Call(ast.Name(name), arguments):
+            return _call(node, FUNCTIONS[name], [_kind(each, kinds) for each in arguments])
+    raise ExpressionError(f"'{ast.unparse(node)[:40]}' cannot stand in an expression", _HINT)
+
+
+def _want(found: set[Kind], wanted: Kind, node: ast.expr) -> None:
+    if found - {wanted}:
+        other = next(iter(found - {wanted}))
+        raise ExpressionError(f"'{ast.unparse(node)[:60]}' mixes {wanted} with {other}", f"every part must be {wanted}")
+
+
+def _comparison(node: ast.Compare, kinds: list[Kind], ops: list[ast.cmpop]) -> None:
+    for first, op, second in zip(kinds, ops, kinds[1:], strict=False):
+        if first is not second:
+            raise ExpressionError(f"'{ast.unparse(node)[:60]}' compares {first} with {second}", "compare one type")
+        if first is Kind.TRUTH and not isinstance(op, ast.Eq | ast.NotEq):
+            raise ExpressionError(f"'{ast.unparse(node)[:60]}' orders true and false", "use == or !=")
+    sides = (node.left, *node.comparators)
+    if any(isinstance(each, ast.Name) and each.id == CLOCK for each in sides):
+        for each in sides:
+            if isinstance(each, ast.Constant) and not TIME_OF_DAY.fullmatch(f"{each.value!s}"):
+                raise ExpressionError(f"{each.value!r} is no time of day", 'write it as "08:30"')
+
+
+def _call(node: ast.expr, function: _Function, kinds: list[Kind]) -> Kind:
+    wanted = [Kind.NUMBER] * max(1, len(kinds)) if function.takes is None else list(function.takes)
+    if kinds != wanted:
+        told = "one or more numbers" if function.takes is None else " and ".join(map(str, wanted))
+        raise ExpressionError(f"'{ast.unparse(node)[:60]}' takes {told}", "give it what it takes")
+    return function.gives
+
+
+def _value(node: ast.expr, values: Mapping[str, Value]) -> Any:
+    match node:
+        case ast.Constant(value):
+            return value
+        case ast.Name(name) if name in _CONSTANTS:
+            return _CONSTANTS[name]
+        case ast.Name(name):
+            if name not in values:
+                raise ExpressionError(f"'{name}' has no value yet", "give it one under 'variables'")
+            return values[name]
+        case ast.BinOp(left, op, right):
+            return _worked_out(node, _ARITHMETIC[type(op)], _value(left, values), _value(right, values))
+        case ast.UnaryOp(op, operand):
+            value = _value(operand, values)
+            return not value if isinstance(op, ast.Not) else -value if isinstance(op, ast.USub) else value
+        case ast.BoolOp(op, parts):
+            every = all if isinstance(op, ast.And) else any
+            return every(_value(part, values) for part in parts)
+        case ast.Compare(left, ops, comparators):
+            sides = [_value(each, values) for each in (left, *comparators)]
+            return all(
+                _COMPARISONS[type(op)](one, other) for one, op, other in zip(sides, ops, sides[1:], strict=False)
+            )
+        case ast.IfExp(test, body, orelse):
+            return _value(body if _value(test, values) else orelse, values)
+        case ast.Call(ast.Name(name), arguments):
+            return FUNCTIONS[name].work(*(_value(each, values) for each in arguments))
+    raise ExpressionError(f"'{ast.unparse(node)[:40]}' has no value", _HINT)
+
+
+def _worked_out(node: ast.expr, work: Callable[[Any, Any], Any], left: Any, right: Any) -> Any:
+    try:
+        return _checked(work(left, right))
+    except ZeroDivisionError:
+        raise ExpressionError(f"'{ast.unparse(node)[:60]}' divides by zero", "ask for zero first, with 'if'") from None
+    except OverflowError:
+        raise ExpressionError(f"'{ast.unparse(node)[:60]}' is too large a number", "use smaller numbers") from None
+
+
+def _checked(value: Any) -> Value:
+    """The value, unless it is larger than anyone needs. Raises ExpressionError."""
+    if isinstance(value, str):
+        if len(value) > MOST_TEXT:
+            raise ExpressionError(f"a text of {len(value)} letters", f"keep it below {MOST_TEXT}")
+    elif not isinstance(value, bool) and not (math.isfinite(value) and abs(value) <= LARGEST):
+        raise ExpressionError("a number that is too large", "use smaller numbers")
+    return value  # type: ignore[no-any-return]
+
+
+CLOCK: Final = "clock"
+TIME_OF_DAY: Final = re.compile(r"([01]\d|2[0-3]):[0-5]\d")
+_HINT: Final = "write it as in 'count + 1', 'battery < 0.3 and not holding' or 'drink == \"tea\"'"
+_CONSTANTS: Final[Mapping[str, bool]] = {"true": True, "false": False}
+_ARITHMETIC: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv,
+    ast.Mod: operator.mod,
+}
+_COMPARISONS: Final[Mapping[type[ast.cmpop], Callable[[Any, Any], Any]]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}

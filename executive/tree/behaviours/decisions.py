@@ -1,0 +1,429 @@
+"""What a mission decides by while it runs: decisions as plain data, and the nodes that make them.
+
+A decision is true, false, or not known yet (None): a look that it takes has not been taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, Protocol
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Composite
+
+from executive.mission.expression import Expression, ExpressionError, Template, Value
+from executive.tree.behaviours.answer import ANSWER_TOPIC
+from executive.tree.behaviours.board import Board
+from executive.tree.behaviours.conditions import Condition, Verdict, Waiting
+from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.decorators import ExplainedDecorator
+from executive.tree.behaviours.explained import ExplainedLeaf, ExplainedNode, cause_of, message_of
+from executive.tree.node import NodeKind, NodeSpec
+from skills.api import Cause, Failed
+from skills.robot import Clock
+
+DAY_S: Final = 86_400.0
+Keys = Mapping[str, str]
+"""Blackboard keys by the names that expressions read."""
+
+
+@dataclass
+class View:
+    """What decisions look at: the run, when the tree was made (s), and how often each button was pressed by then."""
+
+    context: RunContext
+    begun_s: float = field(init=False)
+    presses: Mapping[str, int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.begun_s, self.presses = self.context.clock.now(), self.context.presses()
+
+    def values(self, keys: Keys) -> Mapping[str, Value]:
+        """The readings, and the values of names that are kept under blackboard keys; what has none is left out."""
+        context, board = self.context, self.context.board
+        now_s = context.clock.now()
+        minutes = int((context.day_began_s + now_s) % DAY_S // 60)
+        return {
+            "battery": context.robot.battery().charge,
+            "localised": context.localiser.estimate().localised,
+            "holding": context.robot.gripper().holding,
+            "elapsed": now_s - self.begun_s,
+            "clock": f"{minutes // 60:02d}:{minutes % 60:02d}",
+            **{name: board.get(key) for name, key in keys.items() if key in board},
+        }
+
+    def pressed(self, button: str) -> bool:
+        """Whether a button has been pressed since."""
+        return self.context.presses().get(button, 0) > self.presses.get(button, 0)
+
+    def forget_presses(self) -> None:
+        """Count presses of buttons from now on."""
+        self.presses = self.context.presses()
+
+
+class Decision(Protocol):
+    """Something that is true, false or not known yet."""
+
+    def holds(self, view: View) -> bool | None:
+        """Whether it holds now. Raises ExpressionError: an expression has no value."""
+
+
+@dataclass(frozen=True)
+class ValueHolds:
+    """An expression of values and readings."""
+
+    expression: Expression
+    keys: Keys = field(default_factory=dict)
+
+    def holds(self, view: View) -> bool | None:
+        """Its value."""
+        return bool(self.expression.value(view.values(self.keys)))
+
+
+@dataclass(frozen=True)
+class AnswerIs:
+    """The answer of a look, under a blackboard key."""
+
+    key: str
+
+    def holds(self, view: View) -> bool | None:
+        """The answer; None before the look."""
+        return bool(view.context.board.get(self.key)) if self.key in view.context.board else None
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A button has been pressed."""
+
+    button: str
+
+    def holds(self, view: View) -> bool | None:
+        """Whether it has."""
+        return view.pressed(self.button)
+
+
+@dataclass(frozen=True)
+class AllHold:
+    """All of several; false as soon as one is."""
+
+    parts: tuple[Decision, ...]
+
+    def holds(self, view: View) -> bool | None:
+        """False when one is, else None when one is not known."""
+        found = [part.holds(view) for part in self.parts]
+        return False if False in found else None if None in found else True
+
+
+@dataclass(frozen=True)
+class AnyHolds:
+    """One of several; true as soon as one is."""
+
+    parts: tuple[Decision, ...]
+
+    def holds(self, view: View) -> bool | None:
+        """True when one is, else None when one is not known."""
+        found = [part.holds(view) for part in self.parts]
+        return True if True in found else None if None in found else False
+
+
+@dataclass(frozen=True)
+class DoesNotHold:
+    """The opposite."""
+
+    part: Decision
+
+    def holds(self, view: View) -> bool | None:
+        """The opposite, where it is known."""
+        found = self.part.holds(view)
+        return None if found is None else not found
+
+
+def buttons_of(node: NodeSpec) -> Iterator[str]:
+    """The buttons that a node decides by."""
+    condition = node.options.get("condition")
+    yield from _buttons(condition.decision if isinstance(condition, MustHold) else node.options.get("decision"))
+
+
+def _buttons(decision: Any) -> Iterator[str]:
+    match decision:
+        case Pressed(button):
+            yield button
+        case AllHold(parts) | AnyHolds(parts):
+            for part in parts:
+                yield from _buttons(part)
+        case DoesNotHold(part):
+            yield from _buttons(part)
+
+
+@dataclass
+class MustHold(Condition):
+    """A decision that must be true while nodes run; PRECONDITION when it is not, ERROR where it has no value."""
+
+    decision: Decision
+    words: str
+    _view: View | None = field(default=None, init=False, repr=False, compare=False)
+
+    def for_run(self, context: RunContext) -> MustHold:
+        """A copy that counts from now."""
+        mine = MustHold(self.decision, self.words, stale=self.stale)
+        mine._view = View(context)
+        return mine
+
+    def judged(self, context: RunContext) -> Verdict:
+        """A failure when it does not hold."""
+        holds = self._holds(context)
+        if isinstance(holds, Failed):
+            return holds
+        if holds is None:
+            return Waiting(f"cannot tell yet whether {self.words}")
+        return None if holds else Failed(Cause.PRECONDITION, f"it does not hold any more that {self.words}")
+
+    def _holds(self, context: RunContext) -> bool | Failed | None:
+        view = self._view = self._view or View(context)
+        try:
+            return self.decision.holds(view)
+        except ExpressionError as error:
+            return Failed(Cause.ERROR, f"{self.words}: {error.message}")
+
+
+@dataclass
+class MustNotBegin(MustHold):
+    """Calls an interrupt when the decision becomes true; once it was called, not before it was false in between."""
+
+    _called: bool = field(default=False, init=False, repr=False, compare=False)
+
+    def for_run(self, context: RunContext) -> MustNotBegin:
+        """A copy that counts from now."""
+        mine = MustNotBegin(self.decision, self.words, stale=self.stale)
+        mine._view = View(context)
+        return mine
+
+    def begin(self, context: RunContext) -> None:
+        """The steps begin: nothing was called yet."""
+        super().begin(context)
+        self._called = False
+
+    def called(self) -> None:
+        """The interrupt has begun."""
+        self._called = True
+        if self._view is not None:
+            self._view.forget_presses()
+
+    def judged(self, context: RunContext) -> Verdict:
+        """A failure, which calls the interrupt, when it has become true."""
+        holds = self._holds(context)
+        if isinstance(holds, Failed):
+            return holds
+        self._called = self._called and holds is True
+        return Failed(Cause.PRECONDITION, self.words) if holds and not self._called else None
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Decide(ExplainedNode, Composite):
+    """Decides, and takes the looks (its children) one after the other only as long as the decision needs them.
+
+    Decided: SUCCESS, the answer under `key`. A look RUNNING: RUNNING. A look FAILURE: FAILURE with its cause. An
+    expression without a value: FAILURE with PRECONDITION. Without a look left and not decided: FAILURE with ERROR.
+    `looks` are the blackboard keys of the looks' answers, which are forgotten when it begins.
+    """
+
+    decision: Decision
+    words: str
+    key: str
+    looks: Sequence[str] = ()
+    context: RunContext
+    children: list[Behaviour]
+    _next: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        Composite.__init__(self, self.name, list(self.children))
+        self.view = View(self.context)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Decide, or take the next look."""
+        if self.status != Status.RUNNING:
+            self._restart()
+        while True:
+            if self._decided():
+                break
+            if self._next == len(self.children):
+                self._end(Failed(Cause.ERROR, f"it cannot be told whether {self.words}"))
+                break
+            child = self.current_child = self.children[self._next]
+            yield from child.tick()
+            if child.status == Status.RUNNING:
+                self.status, self.cause, self.message = Status.RUNNING, None, message_of(child)
+                break
+            if child.status != Status.SUCCESS:
+                self._end(Failed(cause_of(child), f"cannot tell whether {self.words}: {message_of(child)}"))
+                break
+            self._next += 1
+        yield self
+
+    def stop(self, new_status: Status = Status.INVALID) -> None:
+        """Stop the look that is taken."""
+        interrupted = new_status == Status.INVALID and self.status == Status.RUNNING
+        for child in self.children:
+            if new_status == Status.INVALID and (not interrupted or child.status == Status.RUNNING):
+                child.stop(Status.INVALID)
+        if interrupted:
+            self.explain_cancelled()
+        elif new_status == Status.INVALID:
+            self.clear_explanation()
+        self.status = new_status
+        self.iterator = self.tick()
+
+    def _restart(self) -> None:
+        self._next = 0
+        self.clear_explanation()
+        self.context.board.forget(self.looks)
+        for child in self.children:
+            child.stop(Status.INVALID)
+
+    def _decided(self) -> bool:
+        """Whether it has come to an end."""
+        try:
+            holds = self.decision.holds(self.view)
+        except ExpressionError as error:
+            self._end(Failed(Cause.PRECONDITION, f"{self.words}: {error.message}"))
+            return True
+        if holds is None:
+            return False
+        self.context.board.put(self.key, holds)
+        self.cause, self.message = None, f"{'yes' if holds else 'no'}: {self.words}"
+        self.stop(Status.SUCCESS)
+        return True
+
+    def _end(self, failure: Failed) -> None:
+        self.cause, self.message = failure.cause, failure.message
+        self.stop(Status.FAILURE)
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Check(ExplainedDecorator):
+    """Makes the decision of its child an answer of the mission: it is published under `ANSWER_TOPIC`.
+
+    As the child; `key` is where the child leaves its answer.
+    """
+
+    question: str
+    key: str
+    context: RunContext
+
+    def update(self) -> Status:
+        """The child's status, and the answer when it is there."""
+        status = self.pass_on()
+        if status == Status.SUCCESS:
+            answer = self.context.board.get(self.key)
+            note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
+            self.context.publish(ANSWER_TOPIC, note)
+        return status
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class WaitFor(ExplainedDecorator):
+    """Waits until its child, a decision, is true; it is asked anew `every_s` after it was false.
+
+    Child RUNNING: RUNNING. Answer true: SUCCESS. Answer false: RUNNING. Child FAILURE: FAILURE with its cause.
+    """
+
+    key: str
+    words: str
+    every_s: float
+    board: Board
+    clock: Clock
+
+    def initialise(self) -> None:
+        """Ask at once; presses of buttons count from now on."""
+        self._due_s = self.clock.now()
+        if isinstance(self.decorated, Decide):
+            self.decorated.view.forget_presses()
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Ask, when it is time."""
+        if self.status == Status.RUNNING and self.clock.now() < self._due_s - 1e-9:
+            yield self
+            return
+        yield from super().tick()
+
+    def update(self) -> Status:
+        """Whether it holds."""
+        status = self.pass_on()
+        if status != Status.SUCCESS:
+            return status
+        if self.board.get(self.key):
+            return status
+        self._due_s = self.clock.now() + self.every_s
+        self.message = f"waits until {self.words}"
+        return Status.RUNNING
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class WaitUntilClock(ExplainedLeaf):
+    """RUNNING until a time of day (s after midnight), then SUCCESS; at once when it was up to twelve hours ago."""
+
+    time_s: float
+    words: str
+    context: RunContext
+
+    def initialise(self) -> None:
+        """See how far it is until then."""
+        self.clear_explanation()
+        now_s = self.context.clock.now()
+        ahead_s = (self.time_s - self.context.day_began_s - now_s) % DAY_S
+        self._end_s = now_s + ahead_s if ahead_s <= DAY_S / 2 else now_s
+
+    def update(self) -> Status:
+        """Wait until the time has come."""
+        done = self.context.clock.now() >= self._end_s - 1e-9
+        self.message = f"it is {self.words}" if done else f"waits until {self.words}"
+        return Status.SUCCESS if done else Status.RUNNING
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class SetValues(ExplainedLeaf):
+    """Works values out in order, each under its blackboard key; a text with braces is filled.
+
+    SUCCESS when all have a value; FAILURE with PRECONDITION at the first that has none.
+    """
+
+    values: Mapping[str, Expression | Template]
+    keys: Keys
+    kinds: Mapping[str, type]
+    context: RunContext
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.view = View(self.context)
+
+    def update(self) -> Status:
+        """Work them out."""
+        self.clear_explanation()
+        told = []
+        for key, each in self.values.items():
+            try:
+                known = self.view.values(self.keys)
+                value = each.filled(known) if isinstance(each, Template) else each.value(known)
+            except ExpressionError as error:
+                self.cause, self.message = Cause.PRECONDITION, f"{each.text}: {error.message}"
+                return Status.FAILURE
+            self.context.board.put(key, float(value) if self.kinds[key] is float else value)
+            told.append(f"{key.rsplit('/', 1)[-1]} = {value}")
+        self.message = ", ".join(told)
+        return Status.SUCCESS
+
+
+def _kinds(options: Mapping[str, Any]) -> Mapping[str, Any]:
+    kinds: Mapping[str, Any] = options["kinds"]
+    return kinds
+
+
+KINDS: Final[Mapping[str, NodeKind]] = {
+    "decide": NodeKind(Decide, ("children", "context"), writes=lambda options: {options["key"]: bool}),
+    "check": NodeKind(Check, ("child", "context")),
+    "wait for": NodeKind(WaitFor, ("child", "board", "clock")),
+    "wait until": NodeKind(WaitUntilClock, ("context",)),
+    "set": NodeKind(SetValues, ("context",), writes=_kinds),
+}

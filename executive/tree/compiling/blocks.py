@@ -1,0 +1,538 @@
+"""The subtrees of blocks: what a mission decides, repeats, tries, does side by side, waits for, says and asks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any, Final, Protocol
+
+from executive.mission.command import Command, Task
+from executive.mission.condition import READINGS, Condition, Look, ValueIs, parts_of
+from executive.mission.errors import InputError, suggestion
+from executive.mission.expression import Expression, Kind, Template, Value, kind_of
+from executive.mission.file.blocks import (
+    Ask,
+    Block,
+    Check,
+    Choose,
+    Dock,
+    Group,
+    Repeat,
+    Set,
+    Speak,
+    Together,
+    Try,
+    Wait,
+)
+from executive.mission.file.model import MissionStep, StepPolicy
+from executive.mission.goal import command_goal
+from executive.mission.gripper import UNSURE, InGripper
+from executive.tree.behaviours.board import FromBoard
+from executive.tree.behaviours.decisions import MustHold, MustNotBegin
+from executive.tree.compiling.builder import PlanBuilder, pose_2d, slug
+from executive.tree.compiling.decisions import (
+    Decided,
+    Named,
+    decide_plan,
+    decision_of,
+    instant_decision,
+    keys_of,
+    kind_in,
+)
+from executive.tree.compiling.interrupts import HANDLING, dock_plan
+from executive.tree.compiling.part import Assembled, StepPart
+from executive.tree.node import NodeSpec
+from skills.api import Part
+
+__all__ = [
+    "PYTHON_TYPES",
+    "Assembler",
+    "Flow",
+    "answering",
+    "block_name",
+    "block_plan",
+    "block_words",
+    "framed",
+    "give",
+    "set_plan",
+]
+
+PYTHON_TYPES: Final[Mapping[Kind, type]] = {Kind.NUMBER: float, Kind.TEXT: str, Kind.TRUTH: bool}
+
+
+@dataclass
+class Flow:
+    """What is known at one point of a mission, when all goes well up to there.
+
+    `names` are the values that surely have been given by then, `seen` all that any step may have given; `declared` are
+    those that always have one. `held` is what the gripper holds; `opening` as long as it is what it held at first.
+    """
+
+    names: dict[str, Named] = field(default_factory=dict)
+    seen: set[str] = field(default_factory=set)
+    declared: frozenset[str] = frozenset()
+    held: InGripper | None = None
+    opening: bool = True
+
+    def copy(self) -> Flow:
+        """The same, for a branch."""
+        return Flow(dict(self.names), self.seen, self.declared, self.held, self.opening)
+
+    def join(self, branches: Sequence[Flow]) -> None:
+        """Go on after one of several branches, nobody knows which."""
+        first, *others = branches
+        shared = {n: named for n, named in first.names.items() if all(b.names.get(n) == named for b in others)}
+        self.names.clear()
+        self.names.update(shared)
+        self.held = first.held if all(branch.held == first.held for branch in others) else UNSURE
+        self.opening = all(branch.opening for branch in branches)
+
+    def may_lack(self, before: Flow) -> None:
+        """Go on although the last step may have been skipped: what it gave may be missing."""
+        self.names = {name: named for name, named in self.names.items() if before.names.get(name) == named}
+
+
+class Assembler(Protocol):
+    """What makes the subtrees of the steps in a block."""
+
+    flow: Flow
+    values_base: str
+
+    def level(self, steps: Sequence[MissionStep], base: str) -> Assembled:
+        """The subtrees of steps in a row; the flow goes on after them."""
+
+    def builder(self, path_id: str, source: Any) -> PlanBuilder:
+        """The builder of nodes that belong to no one command."""
+
+
+def block_plan(assembler: Assembler, block: Block, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    """The one subtree of a block, and what its parts are to bring about. Raises InputError."""
+    return _PLANS[type(block)](assembler, block, builder, policy)
+
+
+def framed(assembler: Assembler, body: Assembled, group: Group, builder: PlanBuilder, before: Flow) -> Assembled:
+    """Steps under what is watched meanwhile, and with what is always done in the end; `before` is their flow."""
+    (node,), parts = body.nodes, body.parts
+    if group.when:
+        after, calls = assembler.flow, []
+        for number, handler in enumerate(group.when, start=1):
+            below = builder.at(f"when-{number}")
+            decision = instant_decision(handler.condition, below, before.names)
+            assembler.flow = before.copy()
+            work = _row(assembler, handler.steps, below, f"when {handler.condition}")
+            parts += work.parts
+            calls.append(
+                below.node(
+                    "interrupt",
+                    f"when {handler.condition}",
+                    *work.nodes,
+                    condition=MustNotBegin(decision, str(handler.condition)),
+                    spares=HANDLING,
+                    uses=handler.times,
+                )
+            )
+        assembler.flow = after
+        after.join([after.copy(), after.copy()])
+        node = builder.node("interrupts", f"{node.name}, watched", *calls, node, part="watched")
+    if group.holds is not None:
+        decision = instant_decision(group.holds, builder.at("while"), before.names)
+        condition = MustHold(decision, str(group.holds))
+        node = builder.node("guard", f"while {group.holds}", node, part="while", condition=condition)
+    if group.always:
+        assembler.flow.join([before.copy(), assembler.flow.copy()])
+        last = _row(assembler, group.always, builder.at("always"), "in the end")
+        parts += last.parts
+        node = builder.node("always", "in the end, whatever happens", node, *last.nodes, part="whatever-happens")
+    return Assembled((node,), parts)
+
+
+def set_plan(
+    builder: PlanBuilder, values: Mapping[str, Expression | Template], names: Mapping[str, Named], part: str, name: str
+) -> NodeSpec:
+    """A leaf that works values out; `values` are by the keys of `names`' entries that they go to."""
+    keys = {key for each in values.values() for key in keys_of(each, names).items()}
+    kinds = {named.key: named.type for named in names.values() if named.key in values}
+    options = {"values": MappingProxyType(dict(values)), "keys": MappingProxyType(dict(sorted(keys)))}
+    return builder.node("set", name, part=part, **options, kinds=MappingProxyType(kinds))
+
+
+def block_name(block: Block) -> str:
+    """A block as a part of a path id."""
+    return slug(block.name) if isinstance(block, Group) and block.name else _NAMES[type(block)]
+
+
+def block_words(block: Block) -> str:
+    """What a block is called in sentences."""
+    match block:
+        case Choose(condition):
+            return f"if {condition}"
+        case Group(name=str(name)):
+            return name
+        case Wait(condition=condition) if condition is not None:
+            return f"wait until {condition}"
+        case Check(condition):
+            return f"check whether {condition}"
+        case Speak(text) | Ask(text):
+            return f'{_NAMES[type(block)]} "{text.text}"'
+    return _NAMES[type(block)]
+
+
+def _row(assembler: Assembler, steps: Sequence[MissionStep], builder: PlanBuilder, name: str) -> Assembled:
+    """Steps in a row as one node at the builder's path id."""
+    made = assembler.level(steps, builder.path_id)
+    return replace(made, nodes=(builder.node("sequence", name, *made.nodes, part="steps"),))
+
+
+def _branch(
+    assembler: Assembler, steps: Sequence[MissionStep], builder: PlanBuilder, name: str, before: Flow
+) -> tuple[Assembled, Flow]:
+    """A branch that begins with the flow `before`; the assembler's own flow stays as it is."""
+    here, assembler.flow = assembler.flow, before.copy()
+    made = _row(assembler, steps, builder, name) if steps else Assembled()
+    assembler.flow, after = here, assembler.flow
+    return made, after
+
+
+def _decided(
+    assembler: Assembler, condition: Condition, builder: PlanBuilder
+) -> tuple[NodeSpec, str, tuple[StepPart, ...]]:
+    """The node that decides, the key of its answer, and the checks that it makes."""
+    decided = decision_of(condition, builder, _readable(assembler))
+    key = f"{builder.path_id}/decided"
+    return decide_plan(condition, decided, builder, key), key, _checks(decided, builder)
+
+
+def _checks(decided: Decided, builder: PlanBuilder) -> tuple[StepPart, ...]:
+    return tuple(
+        StepPart(path, look.command, goal=command_goal(look.command, builder.knowledge))
+        for path, look in decided.checks
+    )
+
+
+def _readable(assembler: Assembler) -> Mapping[str, Named]:
+    return assembler.flow.names
+
+
+def _choose(assembler: Assembler, block: Choose, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    decide, key, parts = _decided(assembler, block.condition, builder.at("if"))
+    flow = assembler.flow
+    then, after_then = _branch(assembler, block.then, builder.at("then"), "then", flow)
+    other, after_other = _branch(assembler, block.otherwise, builder.at("else"), "else", flow)
+    flow.join([after_then, after_other])
+    branches = {True: 1, False: 2} if block.otherwise else {True: 1}
+    nodes = (decide, *then.nodes, *other.nodes)
+    node = builder.node("choose", f"{block.condition}?", *nodes, branches=MappingProxyType(branches), key=key)
+    return Assembled((node,), (*parts, *then.parts, *other.parts))
+
+
+def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    condition = block.until or block.while_
+    mode = "times" if condition is None else "until" if block.until is not None else "while"
+    _refuse_endless(block, condition, builder, policy)
+    before, nodes, key = assembler.flow.copy(), [], ""
+    parts: tuple[StepPart, ...] = ()
+    if mode == "while" and condition is not None:
+        decide, key, parts = _decided(assembler, condition, builder.at("while"))
+        nodes = [decide]
+    body = _row(assembler, block.steps, builder.at("round"), "round")
+    if mode == "until" and condition is not None:
+        decide, key, parts = _decided(assembler, condition, builder.at("until"))
+        nodes = [decide]
+    if mode == "while":
+        assembler.flow.join([before, assembler.flow.copy()])
+    elif assembler.flow.held != before.held:
+        assembler.flow.held = UNSURE
+    words = "" if condition is None else str(condition)
+    often = f"{mode} {words}" if condition is not None else f"{block.times} times" if block.times else "for ever"
+    every = f", every {block.every_s:g} s" if block.every_s else ""
+    node = builder.node(
+        "repeat",
+        f"{often}{every}",
+        *nodes,
+        *body.nodes,
+        mode=mode,
+        words=words,
+        count=f"{builder.path_id}/rounds",
+        key=key,
+        times=block.times,
+        every_s=block.every_s or 0.0,
+    )
+    return Assembled((node,), (*parts, *body.parts))
+
+
+def _refuse_endless(block: Repeat, condition: Condition | None, builder: PlanBuilder, policy: StepPolicy) -> None:
+    """Refuse rounds that go on for ever: nothing that the condition reads can change. Raises InputError."""
+    if condition is None or block.times is not None or policy.timeout_s is not None:
+        return
+    read: set[str] = set()
+    for part in parts_of(condition):
+        if not isinstance(part, ValueIs):
+            return
+        read |= part.expression.names
+    if not read & (set(READINGS) | _given(block.steps)):
+        hint = "give 'times' or 'timeout', or 'set' in a round what it reads"
+        raise InputError.at(builder.source, f"nothing in a round changes whether {condition}", hint=hint)
+
+
+def _given(steps: Iterable[MissionStep]) -> set[str]:
+    """The names that steps may give a value."""
+    found: set[str] = set()
+    for step in (below for each in steps for below in each.walk()):
+        found |= set(step.gives.values()) | set(() if step.skill is None else step.skill.gives.values())
+        match step.block:
+            case Set(values):
+                found |= set(values)
+            case Check(gives=str(name)) | Ask(gives=str(name)):
+                found.add(name)
+    return found
+
+
+def _try(assembler: Assembler, block: Try, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    flow = assembler.flow
+    tried, after_tried = _branch(assembler, block.steps, builder.at("try"), "try", flow)
+    midway = flow.copy()
+    if after_tried.held != flow.held:
+        midway.held, midway.opening = UNSURE, False
+    other, after_other = _branch(assembler, block.otherwise, builder.at("else"), "else", midway)
+    flow.join([after_tried, after_other])
+    return Assembled((builder.node("try", "else the other", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
+
+
+def _together(assembler: Assembler, block: Together, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    flow, made, afters = assembler.flow, [], []
+    for number, step in enumerate(block.steps, start=1):
+        branch, after = _branch(assembler, (step,), builder.at(f"branch-{number}"), f"branch {number}", flow)
+        made.append(branch)
+        afters.append(after)
+    _refuse_collisions([each.nodes[0] for each in made], builder)
+    everything = block.needed is None or block.needed == len(block.steps)
+    if everything:
+        for after in afters:
+            flow.names.update(after.names)
+    moved = [after.held for after in afters if after.held != flow.held]
+    if moved:
+        flow.held, flow.opening = (moved[0] if everything else UNSURE), False
+    needed = block.needed or len(block.steps)
+    name = "side by side" if everything else f"side by side, until {needed} of {len(block.steps)} are done"
+    node = builder.node("together", name, *(each.nodes[0] for each in made), needed=needed)
+    return Assembled((node,), tuple(part for each in made for part in each.parts))
+
+
+def _refuse_collisions(branches: Sequence[NodeSpec], builder: PlanBuilder) -> None:
+    """Refuse branches that use the same part of the robot. Raises InputError."""
+    users: dict[Part, int] = {}
+    for number, branch in enumerate(branches, start=1):
+        for part in sorted(_used_parts(branch), key=lambda each: each.value):
+            if users.setdefault(part, number) != number:
+                what = f"steps {users[part]} and {number} both use the {part.value}"
+                hint = "do them one after the other"
+                raise InputError.at(branch.source or builder.source, f"{what}, and cannot go together", hint=hint)
+
+
+def _used_parts(branch: NodeSpec) -> frozenset[Part]:
+    """The parts of the robot that skills below a node use."""
+    skills = (node.options["skill"] for node in branch.walk() if node.kind == "skill")
+    return frozenset(part for skill in skills for part in skill.uses)
+
+
+def _group(assembler: Assembler, block: Group, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    before = assembler.flow.copy()
+    body = _row(assembler, block.steps, builder, block.name or "group")
+    return framed(assembler, body, block, builder, before)
+
+
+def _wait(assembler: Assembler, block: Wait, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    if block.seconds is not None:
+        return Assembled((builder.pause("wait", f"wait {block.seconds:g} s", block.seconds),))
+    if block.until_clock_s is not None:
+        minutes = int(block.until_clock_s // 60)
+        words = f"{minutes // 60:02d}:{minutes % 60:02d}"
+        return Assembled((builder.node("wait until", f"wait until {words}", time_s=block.until_clock_s, words=words),))
+    assert block.condition is not None
+    decide, key, parts = _decided(assembler, block.condition, builder.at("for"))
+    words, every_s = str(block.condition), block.every_s if decide.children else 0.0
+    name = f"wait until {words}"
+    return Assembled((builder.node("wait for", name, decide, key=key, words=words, every_s=every_s),), parts)
+
+
+def _check(assembler: Assembler, block: Check, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    below = builder.at("check")
+    decided = decision_of(block.condition, below, _readable(assembler))
+    if isinstance(block.condition, Look):
+        key = _give_key(assembler, block.gives, f"{decided.looks[0].path_id}/answer", bool, builder)
+        return Assembled((answering(decided.looks[0], {"key": key}),), _checks(decided, builder))
+    key = _give_key(assembler, block.gives, f"{below.path_id}/decided", bool, builder)
+    decide = decide_plan(block.condition, decided, below, key)
+    question = str(block.condition)
+    node = builder.node("check", f"{question}?", decide, question=question, key=key)
+    return Assembled((node,), _checks(decided, builder))
+
+
+def _dock(assembler: Assembler, block: Dock, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    facts = builder.knowledge
+    if facts.dock is None:
+        hint = "add 'dock' to its knowledge"
+        raise InputError.at(builder.source, "this world has no dock to charge at", hint=hint)
+    level = facts.battery.charged if block.level is None else block.level
+    node = dock_plan(builder, pose_2d(facts.dock), level)
+    command = Command(task=Task.CHARGE)
+    return Assembled((node,), (StepPart(node.path_id, command, goal=command_goal(command, facts)),))
+
+
+def _speak(assembler: Assembler, block: Speak, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    if not block.text.names:
+        return Assembled((builder.skill("speak", {"text": block.text.filled({})}),))
+    _check_template(block.text, builder, assembler)
+    key = f"{builder.path_id}/text"
+    names = {**_readable(assembler), "": Named(key, str)}
+    fill = set_plan(builder, {key: block.text}, names, "fill", "put the values in")
+    return Assembled((builder.sequence("speak", fill, builder.skill("speak", {"text": FromBoard(key)})),))
+
+
+def _ask(assembler: Assembler, block: Ask, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    _check_template(block.text, builder, assembler)
+    kind = float if block.match == "number" else str
+    key = _give_key(assembler, block.gives, f"{builder.path_id}/answer", kind, builder)
+    names = {choice.lower(): choice for choice in block.choices} or _spoken(block.match, builder)
+    default = _default(block, names, builder)
+    leaf = builder.node(
+        "question",
+        f"ask: {block.text.text}",
+        part="question",
+        text=block.text,
+        keys=MappingProxyType(dict(keys_of(block.text, _readable(assembler)))),
+        options=tuple(block.choices),
+        names=MappingProxyType(names),
+        gives=kind,
+        limit_s=block.limit_s,
+        default=default,
+        key=key,
+    )
+    if not any(block.choices.values()):
+        return Assembled((leaf,))
+    flow, afters, branches, nodes = assembler.flow, [], {}, [leaf]
+    parts: tuple[StepPart, ...] = ()
+    for choice, steps in block.choices.items():
+        branch, after = _branch(assembler, steps, builder.at(f"answer-{slug(choice)}"), f"if {choice}", flow)
+        afters.append(after)
+        parts += branch.parts
+        if branch.nodes:
+            branches[choice] = len(nodes)
+            nodes += branch.nodes
+    flow.join(afters)
+    node = builder.node("choose", "by the answer", *nodes, branches=MappingProxyType(branches), key=key)
+    return Assembled((node,), parts)
+
+
+def _spoken(match: str | None, builder: PlanBuilder) -> dict[str, str]:
+    """What people may say for the names of the world, in lower case, and what it means."""
+    knowledge = builder.knowledge
+    groups: Mapping[str, tuple[Sequence[str], Callable[[str], str | None]]] = {
+        "place": (knowledge.place_names(), knowledge.place),
+        "person": (tuple(knowledge.people), knowledge.person),
+        "object": (knowledge.thing_names(), knowledge.thing),
+    }
+    if match is None or match not in groups:
+        return {}
+    known, meaning = groups[match]
+    spoken = {word.lower(): meaning(word) for word in knowledge.spellings(known)}
+    return {word: name for word, name in spoken.items() if name is not None}
+
+
+def _default(block: Ask, names: Mapping[str, str], builder: PlanBuilder) -> Value | None:
+    """The default as the answer's own type. Raises InputError: it is no answer."""
+    default = block.default
+    if default is None or block.choices:
+        return default
+    if block.match == "number":
+        if kind_of(default) is not Kind.NUMBER:
+            raise InputError.at(builder.source, f"the default {default!r} is no number", hint="give a number")
+        return float(default)
+    if names and str(default).lower() not in names:
+        known = sorted(set(names.values()))
+        raise InputError.at(builder.source, f"the default '{default}' is unknown", hint=suggestion(str(default), known))
+    return names.get(str(default).lower(), str(default))
+
+
+def _set(assembler: Assembler, block: Set, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
+    values: dict[str, Expression | Template] = {}
+    for name, expression in block.values.items():
+        kind = kind_in(expression, builder, _readable(assembler))
+        key = _give_key(assembler, name, "", PYTHON_TYPES[kind], builder)
+        values[key] = expression
+    words = ", ".join(f"{name} = {expression}" for name, expression in block.values.items())
+    return Assembled((set_plan(builder, values, _readable(assembler), "set", f"set {words}"),))
+
+
+def _check_template(text: Template, builder: PlanBuilder, assembler: Assembler) -> None:
+    for expression in text.expressions:
+        kind_in(expression, builder, _readable(assembler))
+
+
+def _give_key(assembler: Assembler, name: str | None, key: str, kind: type, builder: PlanBuilder) -> str:
+    """Where a value of this type goes that is given the name `name` (None: none); without a `key`, to the name's own.
+
+    Raises InputError: the name is no word, or is declared with another type.
+    """
+    if name is None:
+        return key
+    return give(assembler, name, key or f"{assembler.values_base}/{name}", kind, builder)
+
+
+def give(assembler: Assembler, name: str, key: str, kind: type, builder: PlanBuilder) -> str:
+    """Let later steps read a value under `name`; the key that it goes to, that of a declared one where it is declared.
+
+    Raises InputError: the name is no word, is that of a reading, or is declared with another type.
+    """
+    flow = assembler.flow
+    if not name.isidentifier() or name in READINGS or name in ("true", "false"):
+        hint = "use letters, digits and underscores, and no name of a reading"
+        raise InputError.at(builder.source, f"'{name[:60]}' cannot be the name of a value", hint=hint)
+    if name in flow.declared and kind_of(kind) is not kind_of(flow.names[name].type):
+        what = f"'{name}' is declared as {kind_of(flow.names[name].type)}, and gets {kind_of(kind)}"
+        raise InputError.at(builder.source, what, hint="use another name")
+    key = flow.names[name].key if name in flow.declared else key
+    flow.names[name] = Named(key, kind)
+    flow.seen.add(name)
+    return key
+
+
+def answering(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
+    """A status check whose answer goes elsewhere: options of its answer node by name."""
+    if node.kind == "answer":
+        return replace(node, options=MappingProxyType({**node.options, **keys}))
+    return replace(node, children=tuple(answering(child, keys) for child in node.children))
+
+
+_NAMES: Final[Mapping[type, str]] = MappingProxyType(
+    {
+        Choose: "if",
+        Repeat: "repeat",
+        Try: "try",
+        Together: "together",
+        Group: "group",
+        Wait: "wait",
+        Check: "check",
+        Dock: "dock",
+        Speak: "speak",
+        Ask: "ask",
+        Set: "set",
+    }
+)
+_Plan = Callable[[Assembler, Any, PlanBuilder, StepPolicy], Assembled]
+_PLANS: Final[Mapping[type, _Plan]] = MappingProxyType(
+    {
+        Choose: _choose,
+        Repeat: _repeat,
+        Try: _try,
+        Together: _together,
+        Group: _group,
+        Wait: _wait,
+        Check: _check,
+        Dock: _dock,
+        Speak: _speak,
+        Ask: _ask,
+        Set: _set,
+    }
+)

@@ -1,0 +1,126 @@
+"""From the conditions of a mission to decisions, and the looks that they take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from executive.mission.condition import (
+    READINGS,
+    AllOf,
+    AnyOf,
+    ButtonPressed,
+    Condition,
+    DoorOpen,
+    Look,
+    Not,
+    ValueIs,
+    parts_of,
+)
+from executive.mission.errors import InputError
+from executive.mission.expression import Expression, ExpressionError, Kind, Template, kind_of
+from executive.tree.behaviours.decisions import (
+    AllHold,
+    AnswerIs,
+    AnyHolds,
+    Decision,
+    DoesNotHold,
+    Pressed,
+    ValueHolds,
+)
+from executive.tree.compiling.builder import PlanBuilder
+from executive.tree.compiling.doors import door_plan
+from executive.tree.compiling.steps import find_plan
+from executive.tree.compiling.trips import refuse_several
+from executive.tree.node import NodeSpec
+
+__all__ = ["Decided", "Named", "decide_plan", "decision_of", "instant_decision", "keys_of", "kind_in"]
+
+
+@dataclass(frozen=True)
+class Named:
+    """A value that steps may read: its blackboard key, and its type."""
+
+    key: str
+    type: type
+
+
+@dataclass(frozen=True)
+class Decided:
+    """A decision, the looks that it takes, and the status checks behind them by path id."""
+
+    decision: Decision
+    looks: tuple[NodeSpec, ...] = ()
+    checks: tuple[tuple[str, Look], ...] = ()
+
+
+def decision_of(condition: Condition, builder: PlanBuilder, names: Mapping[str, Named]) -> Decided:
+    """The decision of a condition; `builder` is where its looks stand.
+
+    Raises InputError: an expression that is not true or false, an unknown name, or something that cannot be looked for.
+    """
+    looks: list[NodeSpec] = []
+    checks: list[tuple[str, Look]] = []
+
+    def made(part: Condition) -> Decision:
+        match part:
+            case ValueIs(expression):
+                if kind_in(expression, builder, names) is not Kind.TRUTH:
+                    hint = "compare it with something, as in 'count > 2'"
+                    raise InputError.at(builder.source, f"'{expression}' is not true or false", hint=hint)
+                return ValueHolds(expression, keys_of(expression, names))
+            case Look(command):
+                below = replace(builder.at(f"look-{len(looks) + 1}"), command=command)
+                refuse_several(below)
+                looks.append(find_plan(below))
+                checks.append((below.path_id, part))
+                return AnswerIs(f"{below.path_id}/answer")
+            case DoorOpen(between):
+                below = builder.at(f"look-{len(looks) + 1}")
+                looks.append(door_plan(below, between, key := f"{below.path_id}/answer"))
+                return AnswerIs(key)
+            case ButtonPressed(name):
+                return Pressed(name)
+            case AllOf(parts):
+                return AllHold(tuple(map(made, parts)))
+            case AnyOf(parts):
+                return AnyHolds(tuple(map(made, parts)))
+            case Not(inner):
+                return DoesNotHold(made(inner))
+
+    return Decided(made(condition), tuple(looks), tuple(checks))
+
+
+def instant_decision(condition: Condition, builder: PlanBuilder, names: Mapping[str, Named]) -> Decision:
+    """The decision of a condition that is watched. Raises InputError: it takes a look, or as `decision_of`."""
+    look = next((part for part in parts_of(condition) if isinstance(part, Look | DoorOpen)), None)
+    if look is not None:
+        hint = "look once with 'if', or again and again with 'repeat: {until: ..}'"
+        raise InputError.at(builder.source, f"'{look}' takes a look, and cannot be watched meanwhile", hint=hint)
+    return decision_of(condition, builder, names).decision
+
+
+def decide_plan(condition: Condition, decided: Decided, builder: PlanBuilder, key: str) -> NodeSpec:
+    """The node that decides, and leaves its answer under `key`."""
+    return builder.node(
+        "decide",
+        f"{condition}?",
+        *decided.looks,
+        decision=decided.decision,
+        words=str(condition),
+        key=key,
+        looks=tuple(f"{look.path_id}/answer" for look in decided.looks),
+    )
+
+
+def keys_of(each: Expression | Template, names: Mapping[str, Named]) -> Mapping[str, str]:
+    """The blackboard keys of the values that an expression or text reads."""
+    return {name: names[name].key for name in sorted(each.names) if name in names}
+
+
+def kind_in(expression: Expression, builder: PlanBuilder, names: Mapping[str, Named]) -> Kind:
+    """The type of an expression where these names are known. Raises InputError: they do not fit it."""
+    try:
+        return expression.kind({**READINGS, **{name: kind_of(named.type) for name, named in names.items()}})
+    except ExpressionError as error:
+        raise InputError.at(builder.source, f"'{expression}': {error.message}", hint=error.hint) from error

@@ -1,4 +1,4 @@
-"""Keys that control a run from the terminal: space, s, x, c, answers to questions, and sentences to the robot."""
+"""Keys that control a run from the terminal: space, s, x, c, answers, buttons of missions, sentences to the robot."""
 
 from __future__ import annotations
 
@@ -75,6 +75,8 @@ class Keys:
             self._write(key, question)
         elif question is not None and key.isdecimal() and 1 <= int(key) <= len(question.options):
             self._answer(question, question.options[int(key) - 1])
+        elif key.isdecimal() and 1 <= int(key) <= len(buttons := self._control.state.buttons):
+            self._control.press(buttons[int(key) - 1])
         elif key in _SAY_KEYS and self._say is not None:
             self.typing = replace(self.typing, saying=True, text="", reply="")
         else:
@@ -125,7 +127,11 @@ def prompt_lines(state: ControlState, now_s: float, typing: Typing = Typing()) -
     for waiting in state.questions:
         question, left_s = waiting.question, max(0.0, waiting.until_s - now_s)
         choices = "  ".join(f"[{number}] {option}" for number, option in enumerate(question.options, start=1))
-        lines.append(f"? {question.text}  {choices or typing.text + '_'}  ('{question.default}' in {left_s:.0f} s)")
+        until = f"'{question.default}' in {left_s:.0f} s" if question.default else f"{left_s:.0f} s left"
+        lines.append(f"? {question.text}  {choices or typing.text + '_'}  ({until})")
+    if state.buttons and not state.questions:
+        names = "  ".join(f"[{number}] {name}" for number, name in enumerate(state.buttons, start=1))
+        lines.append(f"buttons: {names}")
     lines += [typing.reply] if typing.reply else []
     if typing.saying:
         return [*lines, f": {typing.text}_", "Enter says it · Esc leaves it"]

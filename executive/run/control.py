@@ -49,7 +49,8 @@ class ControlState:
     """What can be seen of a run's control at one moment.
 
     `version` grows with every change. `missions` gives for each robot the missions begun and not ended, the one under
-    way last. `at` is the path id of the breakpoint that the run waits at.
+    way last. `at` is the path id of the breakpoint that the run waits at; `buttons` are those that missions wait for
+    or decide by.
     """
 
     version: int = 0
@@ -59,6 +60,7 @@ class ControlState:
     questions: tuple[OpenQuestion, ...] = ()
     breakpoints: frozenset[str] = frozenset()
     missions: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    buttons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,7 @@ class Control:
         self._missions: Mapping[str, tuple[str, ...]] = MappingProxyType({})
         self._known: frozenset[str] = frozenset()
         self._presses: Mapping[str, int] = MappingProxyType({})
+        self._buttons: tuple[str, ...] = ()
 
     @property
     @_locked
@@ -136,7 +139,14 @@ class Control:
         """The present state."""
         (mode, reason), asked = self._mode(), self._requests
         return ControlState(
-            self._version, mode, reason, self._at, self._questions.open, asked.breakpoints, self._missions
+            self._version,
+            mode,
+            reason,
+            self._at,
+            self._questions.open,
+            asked.breakpoints,
+            self._missions,
+            self._buttons,
         )
 
     @_locked
@@ -193,7 +203,10 @@ class Control:
 
     @_locked
     def press(self, button: str) -> None:
-        """Press a button that missions wait for or decide by."""
+        """Press a button that missions wait for or decide by. Raises ValueError: no mission of the run has it."""
+        if self._begun and button not in self._buttons:
+            known = f"there are: {', '.join(self._buttons)}" if self._buttons else "there are none"
+            raise ValueError(f"the run has no button '{button}'; {known}")
         self._presses = MappingProxyType({**self._presses, button: self._presses.get(button, 0) + 1})
         self._note("button", button)
 
@@ -286,6 +299,7 @@ class Control:
     def mission_begun(self, robot_name: str, tree: CompiledTree) -> None:
         """A mission begins, on top of those that a robot has begun."""
         self._known |= frozenset(tree.path_ids)
+        self._buttons = tuple(dict.fromkeys((*self._buttons, *tree.buttons)))
         stack = (*self._missions.get(robot_name, ()), tree.mission_name)
         self._missions = MappingProxyType({**self._missions, robot_name: stack})
         self._bump()

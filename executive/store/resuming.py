@@ -51,9 +51,11 @@ class ResumedTree(CompiledTree):
 def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection]:
     """The tree of a mission that goes on, and what it remembers; path ids stay the same.
 
-    What the mission is interrupted for is not taken up, but called for again where need be.
+    What the mission is interrupted for is not taken up, but called for again where need be. A decision stays as it
+    was made, without the looks that it took.
     """
-    skills = {node.path_id: node for node in tree.mission.walk() if node.kind == "skill"}
+    over = frozenset(below for node in tree.mission.walk() if _is_over(node, memory) for below in _paths_below(node))
+    skills = {node.path_id: node for node in tree.mission.walk() if node.kind == "skill" and node.path_id not in over}
     kept = [
         path for path, leaf in skills.items() if all(key in memory.board for key in leaf.options["outputs"].values())
     ]
@@ -78,6 +80,8 @@ class _Change:
 
     def all_of(self, spec: NodeSpec) -> NodeSpec:
         """The spec and all below, children first."""
+        if spec.kind == "interrupt":
+            return spec
         return self._one(dataclasses.replace(spec, children=tuple(map(self.all_of, spec.children))))
 
     def _one(self, spec: NodeSpec) -> NodeSpec:
@@ -86,6 +90,8 @@ class _Change:
             return self._skill(spec)
         if spec.kind in _CONDITIONAL and self._was_reached(path):
             self.made[path] = lambda node: _applies_as_before(node, self._begun(path))
+        elif spec.kind == "repeat" and step is not None and step.status is not Status.INVALID:
+            self.made[path] = _in_its_round
         elif spec.kind in _FORGETTING and step is not None and step.status in (Status.RUNNING, Status.SUCCESS):
             return _with_options(spec, forgets=())
         elif step is None or not step.ended:
@@ -95,7 +101,7 @@ class _Change:
             self.made[path] = _Unguarded if over else lambda node: _AsBefore(node, step)
         elif spec.kind == "ask" and step.status is Status.SUCCESS and self._failed(spec.children[0].path_id):
             return dataclasses.replace(spec, kind="skip", options={"step": spec.options["step"]})
-        elif not spec.children and all(key in self.memory.board for key in writes(spec)):
+        elif (not spec.children or _is_over(spec, self.memory)) and all(k in self.memory.board for k in writes(spec)):
             self.made[path] = lambda node: _AsBefore(node, step)
         return spec
 
@@ -123,6 +129,21 @@ class _Change:
     def _begun(self, path_id: str) -> bool:
         step = self.memory.steps.get(path_id)
         return step is not None and step.status is not Status.INVALID
+
+
+def _is_over(node: NodeSpec, memory: Memory) -> bool:
+    """Whether what is below a node is not taken up: an interrupt, or a decision that was made."""
+    step = memory.steps.get(node.path_id)
+    return node.kind == "interrupt" or (node.kind == "decide" and step is not None and step.status is Status.SUCCESS)
+
+
+def _paths_below(node: NodeSpec) -> Iterator[str]:
+    return (below.path_id for child in node.children for below in child.walk())
+
+
+def _in_its_round(node: Any) -> None:
+    """Let rounds go on with the one that was under way."""
+    node.taken_up = True
 
 
 def _with_options(spec: NodeSpec, **options: Any) -> NodeSpec:

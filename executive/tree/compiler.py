@@ -11,6 +11,7 @@ from executive.mission.errors import InputError
 from executive.mission.file.model import Mission
 from executive.mission.knowledge import Knowledge
 from executive.tree.behaviours.context import RunContext
+from executive.tree.behaviours.decisions import buttons_of
 from executive.tree.compiling.assembly import StepPart, assemble, step_name
 from executive.tree.compiling.builder import PlanBuilder, Registry, start_key
 from executive.tree.compiling.interrupts import watched
@@ -42,6 +43,11 @@ class CompiledTree:
     def build(self, context: RunContext) -> Behaviour:
         """The py_trees tree for one run."""
         return build(self.root, context)
+
+    @property
+    def buttons(self) -> tuple[str, ...]:
+        """The operator's buttons that it waits for or decides by."""
+        return tuple(dict.fromkeys(button for node in self.root.walk() for button in buttons_of(node)))
 
     @property
     def path_ids(self) -> tuple[str, ...]:

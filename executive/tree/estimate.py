@@ -6,7 +6,7 @@ A tree's nodes are followed in the order in which they run without failures: of 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Final, Protocol
@@ -223,6 +223,47 @@ def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
     return binding.value if isinstance(binding, Constant) and isinstance(binding.value, Pose2D) else None
 
 
+def _longest_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    """What decides, then the branch that takes longest."""
+    decides, *branches = node.children
+    begun = _followed(decides, walk, first=first)
+    return begun + _side_by_side(branches, walk, first=first)[0]
+
+
+def _together(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    """All branches at once: the longest of them in time, all of them in distance and charge."""
+    longest, all_of = _side_by_side(node.children, walk, first=first)
+    return Estimate(longest.duration_s, all_of.distance_m, all_of.charge)
+
+
+def _side_by_side(branches: Sequence[NodeSpec], walk: _Walk, *, first: bool) -> tuple[Estimate, Estimate]:
+    """The longest of some branches that begin at one place, and all of them; the walk goes on after the longest."""
+    longest, all_of = Estimate(), Estimate()
+    here, noted, drawn = walk.pose, dict(walk.noted), walk.drawn
+    after = here, noted, drawn
+    for branch in branches:
+        walk.pose, walk.noted, walk.drawn = here, dict(noted), drawn
+        taken = _followed(branch, walk, first=first)
+        all_of += taken
+        if taken.duration_s >= longest.duration_s:
+            longest, after = taken, (walk.pose, walk.noted, walk.drawn)
+    walk.pose, walk.noted, walk.drawn = after
+    return longest, all_of
+
+
+def _rounds(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    """So many rounds as are known before, else one; the second stands for all that follow it."""
+    times = node.options["times"] if node.options["mode"] == "times" and node.options["times"] else 1
+    estimate = _all_of(node, walk, first)
+    if times > 1:
+        again = _all_of(node, walk, first)
+        more = times - 1
+        estimate += Estimate(more * again.duration_s, more * again.distance_m, more * again.charge)
+        pauses_s = max(0.0, more * node.options["every_s"] - estimate.duration_s * more / times)
+        estimate += Estimate(pauses_s, 0.0, pauses_s * walk.estimates.battery.standing_per_s)
+    return estimate
+
+
 _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "skill": _skill,
     "pause": lambda node, walk, first: Estimate(node.options["duration_s"]),
@@ -230,6 +271,10 @@ _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "selector": _first_of,
     "round": _all_that_can,
     "only if known": _if_known,
+    "try": _first_of,
+    "choose": _longest_of,
+    "together": _together,
+    "repeat": _rounds,
 }
 _EXPECTED: Final[Mapping[str, Callable[[NodeSpec], tuple[NodeSpec, ...]]]] = {
     "recover": lambda node: node.children[:1],

@@ -48,6 +48,7 @@ def control_json(state: ControlState) -> dict[str, Any]:
         "mode": state.mode.value,
         "reason": state.reason,
         "at": state.at,
+        "buttons": list(state.buttons),
         "breakpoints": sorted(state.breakpoints),
         "missions": {robot: list(names) for robot, names in state.missions.items()},
         "questions": [
@@ -80,5 +81,6 @@ _CALLS: Final[Mapping[str, tuple[Callable[[Control, Mapping[str, Any]], None], s
     "release": (lambda control, _: control.release_stop_button(), "stop button released"),
     "break": (lambda control, values: control.set_breakpoint(text_of(values, "node")), "breakpoint set"),
     "unbreak": (lambda control, values: control.clear_breakpoint(text_of(values, "node")), "breakpoint cleared"),
+    "press": (lambda control, values: control.press(text_of(values, "name")), "pressed"),
     "answer": (lambda control, values: control.answer(text_of(values, "id"), text_of(values, "text")), "answered"),
 }

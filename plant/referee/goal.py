@@ -50,8 +50,9 @@ class GoalCondition:
     `classes` are the object classes that fulfil it, `wanted` what they are called together (empty: the classes) and
     `count` how many objects (0 counts as 1); `source` is where they were to be taken from (empty: anywhere) or, for an
     answer, where was to be looked; `goal` where they or the robot were to go (any of the regions); `person` the one to
-    be handed to or, where the class is "person", asked for (None: anyone); `answer` what was said; `robot` who was to
-    do it (None: any); with `passing` it is enough that it was so at some time, since later steps may undo it.
+    be handed to or, where the class is "person", asked for (None: anyone); `answer` what was said, and `answered_s`
+    when (None: now; where people are counts now); `robot` who was to do it (None: any); with `passing` it is enough
+    that it was so at some time, since later steps may undo it.
     """
 
     kind: GoalKind
@@ -61,6 +62,7 @@ class GoalCondition:
     goal: tuple[Region, ...] = ()
     person: str | None = None
     answer: bool | None = None
+    answered_s: float | None = None
     robot: str | None = None
     wanted: str = ""
     passing: bool = False

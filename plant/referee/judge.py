@@ -152,17 +152,21 @@ def _judge_near_person(person: str, robot: str, truth: Truth, past: bool) -> Fin
 
 
 def _judge_answered(condition: GoalCondition, truth: Truth, past: bool) -> Finding:
-    """The answer equal to the truth."""
+    """The answer equal to the truth at the time when it was given."""
     if condition.classes == (PERSON,):
         people = ((name, p_W) for name, p_W in truth.persons.items() if condition.person in (None, name))
         there = [f"{name} is in {on}" for name, p_W in people if (on := _region_at(condition.source, p_W)) is not None]
         nothing = f"{condition.person or 'nobody'} is {'not ' if condition.person else ''}in {_where(condition.source)}"
     else:
-        rest = (history for history in _of_class(condition, truth) if history.resting)
+        then_s = condition.answered_s
+        rest = (
+            (each, (each.last.p_WO if each.resting else None) if then_s is None else each.at(then_s))
+            for each in _of_class(condition, truth)
+        )
         there = [
-            f"the {history.name} is on {on}"
-            for history in rest
-            if (on := _region_at(condition.source, history.last.p_WO)) is not None
+            f"the {history.name} {'is' if then_s is None else 'was'} on {on}"
+            for history, p_W in rest
+            if p_W is not None and (on := _region_at(condition.source, p_W)) is not None
         ]
         nothing = f"there is no {_wanted(condition)}{_in(condition.source)}"
     fact = len(there) >= condition.needed

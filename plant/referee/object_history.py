@@ -63,12 +63,16 @@ class Lift:
 
 @dataclass(eq=False)
 class ObjectHistory:
-    """The record of one object; `take` is called with every sample."""
+    """The record of one object; `take` is called with every sample.
+
+    `rests_W` are the places where it rested, `rested_s` since when.
+    """
 
     name: str
     class_name: str
     lifts: list[Lift] = field(default_factory=list)
     rests_W: list[FloatArray] = field(default_factory=list)
+    rested_s: list[float] = field(default_factory=list)
     events: list[str] = field(default_factory=list)
     drops: int = 0
     touches: int = 0
@@ -117,6 +121,13 @@ class ObjectHistory:
         """On something, now or a moment ago."""
         return self.last.time_s - self._supported_s <= FLICKER_S
 
+    def at(self, time_s: float) -> FloatArray | None:
+        """Where it rested at a time; None when it was carried or moved."""
+        places = [(since_s, p_W) for since_s, p_W in zip(self.rested_s, self.rests_W, strict=True) if since_s <= time_s]
+        since_s, p_W = places[-1] if places else (self.rested_s[0], self.rests_W[0])
+        gone = any(since_s < lift.time_s <= time_s for lift in self.lifts)
+        return None if gone else p_W
+
     def take(self, sample: ObjectSample) -> None:
         """Take in one more sample."""
         with_hand = self._moves_with_hand(sample)
@@ -130,7 +141,7 @@ class ObjectHistory:
             self._tray_s, self._tray_of = sample.time_s, sample.tray_of
         self._last = sample
         if not self.rests_W:
-            self.rests_W.append(sample.p_WO)
+            self._rests(sample)
         self._note_lift(sample, with_hand)
         self._note_leaving(sample, with_hand)
         self._note_fall(sample)
@@ -141,6 +152,7 @@ class ObjectHistory:
         return {
             "lifts": [[lift.time_s, lift.robot, lift.from_W.tolist()] for lift in self.lifts],
             "rests_W": [p_W.tolist() for p_W in self.rests_W],
+            "rested_s": list(self.rested_s),
             "last": None if self._last is None else self._last.state(),
             **{name: getattr(self, name) for name in _PLAIN},
         }
@@ -149,6 +161,7 @@ class ObjectHistory:
         """Go on from such a state."""
         self.lifts = [Lift(time_s, robot, array_of(from_W)) for time_s, robot, from_W in state["lifts"]]
         self.rests_W = [array_of(p_W) for p_W in state["rests_W"]]
+        self.rested_s = list(state["rested_s"])
         self._last = None if state["last"] is None else ObjectSample.of(state["last"])
         for name in _PLAIN:
             setattr(self, name, state[name])
@@ -156,7 +169,8 @@ class ObjectHistory:
     def forget_past(self) -> None:
         """Start over for another mission: what is held keeps how it came there, all else counts from where it is."""
         if self._last is not None and self.held_by is None:
-            self.lifts, self.rests_W = [], [self._last.p_WO]
+            self.lifts, self.rests_W, self.rested_s = [], [], []
+            self._rests(self._last)
         self.events, self.drops, self.touches = [], 0, 0
 
     def _measure_speed(self, sample: ObjectSample) -> None:
@@ -212,8 +226,12 @@ class ObjectHistory:
             return
         self._note_knock(sample)
         if self._carried or float(np.linalg.norm(sample.p_WO - self.rests_W[-1])) > 0.02:
-            self.rests_W.append(sample.p_WO)
+            self._rests(sample)
         self._carried, self._left_z_m, self._dropped = False, None, False
+
+    def _rests(self, sample: ObjectSample) -> None:
+        self.rests_W.append(sample.p_WO)
+        self.rested_s.append(sample.time_s)
 
     def _note_knock(self, sample: ObjectSample) -> None:
         """Tell of an object that came to lie lower without having been carried."""

@@ -1,5 +1,7 @@
 """Parameters of mission files: `${name}` in a value stands for what the parameter holds; `$${` is a plain `${`.
 
+A parameter is declared by its default, whose type it keeps, or as {type: .., default: .., choices: [..]}.
+
 A value that is nothing but `${name}` takes the parameter's own type, so that `timeout: ${limit}` can be a number;
 within a longer text the parameter's text is put in.
 """
@@ -8,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import yaml
@@ -24,6 +26,15 @@ _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _SCALARS: Final = (str, bool, int, float)
 DECLARED: Final = "parameters"
+_TYPES: Final[Mapping[str, tuple[type, ...]]] = {
+    "text": (str,),
+    "number": (int, float),
+    "truth": (bool,),
+    "place": (str,),
+    "object": (str,),
+    "person": (str,),
+}
+_TEXTS: Final = frozenset(name for name, kinds in _TYPES.items() if str in kinds)
 
 Given = Mapping[str, Any]
 
@@ -58,15 +69,50 @@ def with_parameters(source: YamlSource, given: Given) -> YamlSource:
         known = f"it has {listing(declared)}" if declared else "it declares none"
         hint = suggestion(unknown[0], declared, known)
         raise InputError(f"{source.path.name} has no parameter '{unknown[0]}'", hint=hint)
-    values = {**declared, **given}
-    for name, value in values.items():
+    values: dict[str, Any] = {}
+    for name, parameter in declared.items():
+        value = _fitting(parameter, given.get(name, parameter.default), name, source, is_given=name in given)
         if value is None:
             hint = f"give it a default, or 'with: {{{name}: ...}}' where the file is used"
             raise source.error((DECLARED, name), f"parameter '{name}' has no value", hint)
+        values[name] = value
+    filled = {
+        name: {**each, "default": values[name]} if isinstance(each, dict) else values[name]
+        for name, each in (source.data.get(DECLARED) or {}).items()
+        if name in values
+    }
     data = {
-        key: part if key == DECLARED else _put_in(part, values, source, (key,)) for key, part in source.data.items()
+        key: filled if key == DECLARED and declared else _put_in(part, values, source, (key,))
+        for key, part in source.data.items()
     }
     return replace(source, data=data)
+
+
+@dataclass(frozen=True)
+class _Parameter:
+    """A parameter as it is declared; without a `kind` any plain value will do."""
+
+    kind: str | None
+    default: Any
+    choices: tuple[Any, ...] = ()
+
+
+def _fitting(parameter: _Parameter, value: Any, name: str, source: YamlSource, *, is_given: bool) -> Any:
+    """The value as the parameter's type. Raises InputError: it is of another type, or none of the choices."""
+    if value is None:
+        return None
+    if parameter.kind in _TEXTS and isinstance(value, int | float) and not isinstance(value, bool):
+        value = str(value)
+    here = () if is_given else (DECLARED, name)
+    kind = _TYPES.get(parameter.kind or "", _SCALARS)
+    fits = isinstance(value, kind) and (bool in kind or not isinstance(value, bool))
+    if not fits:
+        what = f"parameter '{name}' is a {parameter.kind}, and {str(value)[:60]!r} is none"
+        raise source.error(here, what, f"give it a {parameter.kind}")
+    if parameter.choices and value not in parameter.choices:
+        what = f"parameter '{name}' cannot be {str(value)[:60]!r}"
+        raise source.error(here, what, f"it is one of {listing(map(str, parameter.choices), last='or')}")
+    return value
 
 
 def round_source(source: YamlSource, steps: KeyPath, name: str, value: Value) -> YamlSource:
@@ -83,19 +129,36 @@ def round_source(source: YamlSource, steps: KeyPath, name: str, value: Value) ->
     return replace(below, data=_put_in(below.data, {name: value}, below, ()))
 
 
-def _declared(source: YamlSource) -> dict[str, Any]:
-    """The parameters with their defaults; what is no mapping is left to the schema to refuse."""
+def _declared(source: YamlSource) -> dict[str, _Parameter]:
+    """The parameters; what is no mapping is left to the schema to refuse."""
     declared = source.data.get(DECLARED)
     if not isinstance(declared, dict):
         return {}
+    found = {}
     for name, default in declared.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             hint = "use letters, digits and underscores, a letter first"
             raise source.error((DECLARED, str(name)), f"{name!r} cannot be a parameter's name", hint)
+        if isinstance(default, dict):
+            kind, choices = default.get("type"), default.get("choices")
+            if kind not in _TYPES:
+                hint = f"its type is one of {listing(_TYPES, last='or')}"
+                raise source.error((DECLARED, name), f"parameter '{name}' has no type", hint)
+            listed = tuple(choices) if isinstance(choices, list) else ()
+            found[name] = _Parameter(str(kind), default.get("default"), listed)
+            continue
         if default is not None and not isinstance(default, _SCALARS):
-            hint = "give it a text, a number, true or false"
+            hint = "give it a text, a number, true or false, or {type: .., default: ..}"
             raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {type(default).__name__}", hint)
-    return dict(declared)
+        found[name] = _Parameter(_kind(default), default)
+    return found
+
+
+def _kind(default: Any) -> str | None:
+    """The type of a parameter with this default."""
+    if default is None:
+        return None
+    return "truth" if isinstance(default, bool) else "number" if isinstance(default, int | float) else "text"
 
 
 def _put_in(

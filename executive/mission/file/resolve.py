@@ -12,9 +12,9 @@ from typing import Final
 from executive.language import DependencyParser, Status, Understanding
 from executive.language.questions import Answerer, QuestionPolicy, answer_by
 from executive.language.understand import understand_asking
-from executive.mission.command import Command
+from executive.mission.command import START, Command
 from executive.mission.condition import Condition
-from executive.mission.errors import InputError, Problems
+from executive.mission.errors import InputError, Problems, suggestion
 from executive.mission.file.block_steps import condition_of, plain_value, read_block, round_values
 from executive.mission.file.blocks import Block, Group, Handler
 from executive.mission.file.condition_schema import ConditionFile
@@ -22,7 +22,7 @@ from executive.mission.file.model import KeyPath, Mission, MissionStep, SkillCal
 from executive.mission.file.names import typed_command
 from executive.mission.file.overrides import overridden
 from executive.mission.file.parameters import Given, round_source, with_parameters
-from executive.mission.file.schema import HandlerFile, MissionFile, RoundFile, StepFile, with_source
+from executive.mission.file.schema import HandlerFile, MissionFile, ParameterFile, RoundFile, StepFile, with_source
 from executive.mission.file.scope import Scope
 from executive.mission.knowledge import Knowledge
 from executive.mission.yaml_source import read_yaml, validate
@@ -92,6 +92,9 @@ class _Resolver:
         for name, value in variables.items():
             with problems:
                 plain_value(scope, value, ("variables", name))
+        for name, parameter in (file.parameters or {}).items():
+            with problems:
+                self._refuse_unknown(scope, name, parameter)
         with problems:
             steps = self.steps(scope, file.steps, ("steps",))
         with problems:
@@ -185,6 +188,21 @@ class _Resolver:
         if meant.steps:
             return replace(made, block=Group(meant.steps, name=step.say), gives={})
         return replace(made, commands=meant.commands)
+
+    def _refuse_unknown(self, scope: Scope, name: str, parameter: ParameterFile) -> None:
+        """Refuse a parameter that names no place, object or person of the world."""
+        known = {
+            "place": (self.knowledge.place, self.knowledge.place_names()),
+            "object": (self.knowledge.thing, self.knowledge.thing_names()),
+            "person": (self.knowledge.person, tuple(self.knowledge.people)),
+        }
+        if parameter.type in known:
+            find, names = known[parameter.type]
+            said = str(parameter.default)
+            if said != START and find(said) is None:
+                what = f"parameter '{name}': unknown {parameter.type} '{said[:60]}'"
+                hint = suggestion(said, self.knowledge.spellings(names), shown=names)
+                raise scope.error(("parameters", name), what, hint)
 
     def _whole(self, scope: Scope, file: MissionFile) -> Group | None:
         """What is watched while a file's steps run, and done in the end."""

@@ -304,6 +304,25 @@ class RoundFile(Strict):
     steps: Steps
 
 
+class ParameterFile(Strict):
+    """A parameter of a mission file."""
+
+    type: Literal["text", "number", "truth", "place", "object", "person"] | None = Field(
+        None, description="What it is; a place, object or person is checked against the world."
+    )
+    default: Scalar = Field(None, description="Its value where none is given.")
+    choices: tuple[Scalar, ...] | None = Field(None, description="The values that it may have.")
+    description: Text | None = Field(None, description="What it is for.")
+
+
+def _short_parameter(value: object) -> object:
+    """A parameter may be declared by its default alone."""
+    return value if isinstance(value, dict) else {"default": value}
+
+
+Parameter = Annotated[ParameterFile, BeforeValidator(_short_parameter, json_schema_input_type=ParameterFile | Scalar)]
+
+
 class MissionFile(PolicyFile):
     """A mission for one robot in one world. The policy keys at the top are for the whole of it."""
 
@@ -325,9 +344,10 @@ class MissionFile(PolicyFile):
     objects: dict[Name, ObjectFile] | None = Field(
         None, description="Objects that lie there at the beginning besides those of the world, by name."
     )
-    parameters: dict[str, Scalar] | None = Field(
+    parameters: dict[str, Parameter] | None = Field(
         None,
-        description="Parameters with their defaults, read as ${name} in values; one without a default must be given.",
+        description="Parameters with their defaults, or {type: .., default: ..}, read as ${name} in values; one "
+        "without a default must be given.",
     )
     questions: QuestionPolicy | None = Field(
         None,

@@ -70,6 +70,9 @@ class Condition(ABC):
         """The subtree starts anew: forget for how long something was so."""
         self._since_s = self._stale_since_s = None
 
+    def called(self) -> None:  # noqa: B027 - most conditions need not know
+        """What is done about it has begun."""
+
     def violated(self, context: RunContext) -> Verdict:
         """What speaks against going on, None when nothing does. Called before each tick of the subtree."""
         now_s, fresh, policy = context.clock.now(), self.freshness, self.stale or self.freshness.policy

@@ -20,7 +20,7 @@ from executive.tree.behaviours.conditions import Condition, Verdict, Waiting
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decorators import ExplainedDecorator
 from executive.tree.behaviours.explained import ExplainedLeaf, ExplainedNode, cause_of, message_of
-from executive.tree.node import NodeKind
+from executive.tree.node import NodeKind, NodeSpec
 from skills.api import Cause, Failed
 from skills.robot import Clock
 
@@ -138,6 +138,23 @@ class DoesNotHold:
         """The opposite, where it is known."""
         found = self.part.holds(view)
         return None if found is None else not found
+
+
+def buttons_of(node: NodeSpec) -> Iterator[str]:
+    """The buttons that a node decides by."""
+    condition = node.options.get("condition")
+    yield from _buttons(condition.decision if isinstance(condition, MustHold) else node.options.get("decision"))
+
+
+def _buttons(decision: Any) -> Iterator[str]:
+    match decision:
+        case Pressed(button):
+            yield button
+        case AllHold(parts) | AnyHolds(parts):
+            for part in parts:
+                yield from _buttons(part)
+        case DoesNotHold(part):
+            yield from _buttons(part)
 
 
 @dataclass

@@ -108,6 +108,7 @@ class Interrupt(ExplainedDecorator):
     def initialise(self) -> None:
         """It begins."""
         self.count += 1
+        self.condition.called()
 
     def tick(self) -> Iterator[Behaviour]:
         """As the child, unless this is once too often."""

@@ -169,9 +169,12 @@ class _Assembler:
             goals = (command_goal(get, self.knowledge), command_goal(bring, self.knowledge))
         held, opening = self.flow.held, self.flow.opening
         self.flow.held, self.flow.opening = None, False
-        pairs = zip((get, bring), goals, strict=True)
-        parts = (StepPart(node.path_id, each, goal=goal, held=held, opening=opening) for each, goal in pairs)
-        return Assembled((node,), tuple(parts))
+        got = after_command(get, held, self.knowledge)
+        parts = (
+            StepPart(node.path_id, get, goal=goals[0], held=held, opening=opening),
+            StepPart(node.path_id, bring, goal=goals[1], held=got, opening=False),
+        )
+        return Assembled((node,), parts)
 
     def _item(self, item: _Item, following: Command | None, base: str) -> Assembled:
         """The subtree of one command, skill or used mission; `following` is the command right after it."""

@@ -143,7 +143,7 @@ def framed(assembler: Assembler, body: Assembled, group: Group, builder: PlanBui
         assembler.flow.join([before.copy(), assembler.flow.copy()])
         last = _row(assembler, group.always, builder.at("always"), "in the end")
         parts += last.parts
-        node = builder.node("always", "whatever happens, in the end", node, *last.nodes, part="whatever-happens")
+        node = builder.node("always", "in the end, whatever happens", node, *last.nodes, part="whatever-happens")
     return Assembled((node,), parts)
 
 
@@ -222,7 +222,7 @@ def _choose(assembler: Assembler, block: Choose, builder: PlanBuilder, policy: S
     flow.join([after_then, after_other])
     branches = {True: 1, False: 2} if block.otherwise else {True: 1}
     nodes = (decide, *then.nodes, *other.nodes)
-    node = builder.node("choose", f"if {block.condition}", *nodes, branches=MappingProxyType(branches), key=key)
+    node = builder.node("choose", f"{block.condition}?", *nodes, branches=MappingProxyType(branches), key=key)
     return Assembled((node,), (*parts, *then.parts, *other.parts))
 
 
@@ -248,7 +248,7 @@ def _repeat(assembler: Assembler, block: Repeat, builder: PlanBuilder, policy: S
     every = f", every {block.every_s:g} s" if block.every_s else ""
     node = builder.node(
         "repeat",
-        f"repeat {often}{every}",
+        f"{often}{every}",
         *nodes,
         *body.nodes,
         mode=mode,
@@ -296,7 +296,7 @@ def _try(assembler: Assembler, block: Try, builder: PlanBuilder, policy: StepPol
         midway.held, midway.opening = UNSURE, False
     other, after_other = _branch(assembler, block.otherwise, builder.at("else"), "else", midway)
     flow.join([after_tried, after_other])
-    return Assembled((builder.node("try", "try, else", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
+    return Assembled((builder.node("try", "else the other", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
 
 
 def _together(assembler: Assembler, block: Together, builder: PlanBuilder, policy: StepPolicy) -> Assembled:
@@ -314,7 +314,7 @@ def _together(assembler: Assembler, block: Together, builder: PlanBuilder, polic
     if moved:
         flow.held, flow.opening = (moved[0] if everything else UNSURE), False
     needed = block.needed or len(block.steps)
-    name = "together" if everything else f"together, until {needed} of {len(block.steps)} are done"
+    name = "side by side" if everything else f"side by side, until {needed} of {len(block.steps)} are done"
     node = builder.node("together", name, *(each.nodes[0] for each in made), needed=needed)
     return Assembled((node,), tuple(part for each in made for part in each.parts))
 
@@ -421,7 +421,7 @@ def _ask(assembler: Assembler, block: Ask, builder: PlanBuilder, policy: StepPol
             branches[choice] = len(nodes)
             nodes += branch.nodes
     flow.join(afters)
-    node = builder.node("choose", "ask, and act on it", *nodes, branches=MappingProxyType(branches), key=key)
+    node = builder.node("choose", "by the answer", *nodes, branches=MappingProxyType(branches), key=key)
     return Assembled((node,), parts)
 
 

@@ -65,8 +65,23 @@
       this.saying = false;
     }
 
+    drawButtons(names) {
+      const key = JSON.stringify(names);
+      if (key === this.shown) return;
+      this.shown = key;
+      byId("buttons").replaceChildren(...names.map((name) => {
+        const button = document.createElement("button");
+        button.type = "button";
+        button.textContent = name;
+        button.title = `The mission waits for this button, or decides by it`;
+        button.addEventListener("click", () => this.do("press", { name }));
+        return button;
+      }));
+    }
+
     draw(state, ended) {
       this.state = state;
+      this.drawButtons(state ? state.buttons || [] : []);
       const mode = state ? state.mode : "ready", over = ended || mode === "ended";
       const paused = mode === "paused", stopped = mode === "stopped";
       byId("pause").querySelector("span").textContent = paused ? "Go on" : "Pause";
@@ -75,6 +90,7 @@
       byId("stop").querySelector("span").textContent = stopped ? "Release" : "Stop";
       byId("stop").setAttribute("aria-pressed", stopped);
       for (const id of ["pause", "step", "cancel", "stop"]) byId(id).disabled = over;
+      for (const button of byId("buttons").children) button.disabled = over;
       byId("say").querySelector("[type=submit]").disabled = over;
     }
 

@@ -258,7 +258,7 @@
       }
       [...this.box.querySelectorAll(".limit")].forEach((limit, n) => {
         const left = Math.max(0, Math.ceil(questions[n].until_s - now));
-        limit.textContent = questions[n].default === null ? `${left} s` : `${left} s, then “${questions[n].default}”`;
+        limit.textContent = !questions[n].default ? `${left} s` : `${left} s, then “${questions[n].default}”`;
       });
     }
 

@@ -202,6 +202,15 @@ def test_decide(decide, run_context, decision, one, two, expected, answer, taken
         assert (root.cause, root.message) == (None, f"{'yes' if answer else 'no'}: it is so")
 
 
+def test_decide_lets_a_look_end_that_has_left_its_answer(decide, run_context):
+    log = []
+    root = decide(AnswerIs(FIRST), one=("RRS", True), log=log)
+    tick(root)
+    run_context.board.put(FIRST, True)
+    assert letters(root, 2) == "RS"
+    assert (log, root.children[0].status) == (["+one"], S)
+
+
 def test_decide_looks_anew_when_it_starts_anew(decide):
     log = []
     root = decide(BOTH, log=log)

@@ -102,7 +102,7 @@ class TreeRun:
             return
         if not self._suspended:
             self._suspended = True
-            suspend(self.root)
+            suspend(self.root, sparing=due)
         for _ in due.tick():
             pass
         if due.status != Status.RUNNING:

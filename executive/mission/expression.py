@@ -10,7 +10,6 @@ from __future__ import annotations
 import ast
 import enum
 import functools
-import math
 import operator
 import re
 from collections.abc import Callable, Mapping
@@ -70,8 +69,8 @@ class _Function:
 FUNCTIONS: Final[Mapping[str, _Function]] = MappingProxyType(
     {
         "abs": _Function((Kind.NUMBER,), Kind.NUMBER, abs),
-        "min": _Function(None, Kind.NUMBER, min),
-        "max": _Function(None, Kind.NUMBER, max),
+        "min": _Function(None, Kind.NUMBER, lambda *numbers: min(numbers)),
+        "max": _Function(None, Kind.NUMBER, lambda *numbers: max(numbers)),
         "round": _Function((Kind.NUMBER,), Kind.NUMBER, round),
         "length": _Function((Kind.TEXT,), Kind.NUMBER, len),
         "lower": _Function((Kind.TEXT,), Kind.TEXT, str.lower),
@@ -135,7 +134,8 @@ class Template:
 
 
 def literal(value: Value) -> Expression:
-    """The expression of a plain value."""
+    """The expression of a plain value. Raises ExpressionError: it is too long or too large."""
+    _checked(value)
     return Expression(repr(value) if not isinstance(value, bool) else str(value).lower())
 
 
@@ -178,7 +178,7 @@ def _refuse_others(node: ast.expr, depth: int) -> None:
         raise ExpressionError("the expression is nested too deeply", "use 'set' to name a part of it")
     if isinstance(node, ast.Constant):
         if not isinstance(node.value, bool | int | float | str):
-            raise ExpressionError(f"{ast.unparse(node)[:40]} is no value", _HINT)
+            raise ExpressionError(f"{_told(node, 40)} is no value", _HINT)
         _checked(node.value)
         return
     if isinstance(node, ast.Name):
@@ -204,7 +204,7 @@ def _parts(node: ast.expr) -> tuple[ast.expr, ...]:
             if name not in FUNCTIONS:
                 raise ExpressionError(f"there is no function '{name}'", suggestion(name, FUNCTIONS))
             return tuple(arguments)
-    raise ExpressionError(f"'{ast.unparse(node)[:40]}' cannot stand in an expression", _HINT)
+    raise ExpressionError(f"'{_told(node, 40)}' cannot stand in an expression", _HINT)
 
 
 def _kind(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
@@ -244,21 +244,21 @@ def _kind(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
             return first
         case ast.Call(ast.Name(name), arguments):
             return _call(node, FUNCTIONS[name], [_kind(each, kinds) for each in arguments])
-    raise ExpressionError(f"'{ast.unparse(node)[:40]}' cannot stand in an expression", _HINT)
+    raise ExpressionError(f"'{_told(node, 40)}' cannot stand in an expression", _HINT)
 
 
 def _want(found: set[Kind], wanted: Kind, node: ast.expr) -> None:
     if found - {wanted}:
         other = next(iter(found - {wanted}))
-        raise ExpressionError(f"'{ast.unparse(node)[:60]}' mixes {wanted} with {other}", f"every part must be {wanted}")
+        raise ExpressionError(f"'{_told(node, 60)}' mixes {wanted} with {other}", f"every part must be {wanted}")
 
 
 def _comparison(node: ast.Compare, kinds: list[Kind], ops: list[ast.cmpop]) -> None:
     for first, op, second in zip(kinds, ops, kinds[1:], strict=False):
         if first is not second:
-            raise ExpressionError(f"'{ast.unparse(node)[:60]}' compares {first} with {second}", "compare one type")
+            raise ExpressionError(f"'{_told(node, 60)}' compares {first} with {second}", "compare one type")
         if first is Kind.TRUTH and not isinstance(op, ast.Eq | ast.NotEq):
-            raise ExpressionError(f"'{ast.unparse(node)[:60]}' orders true and false", "use == or !=")
+            raise ExpressionError(f"'{_told(node, 60)}' orders true and false", "use == or !=")
     sides = (node.left, *node.comparators)
     if any(isinstance(each, ast.Name) and each.id == CLOCK for each in sides):
         for each in sides:
@@ -270,7 +270,7 @@ def _call(node: ast.expr, function: _Function, kinds: list[Kind]) -> Kind:
     wanted = [Kind.NUMBER] * max(1, len(kinds)) if function.takes is None else list(function.takes)
     if kinds != wanted:
         told = "one or more numbers" if function.takes is None else " and ".join(map(str, wanted))
-        raise ExpressionError(f"'{ast.unparse(node)[:60]}' takes {told}", "give it what it takes")
+        raise ExpressionError(f"'{_told(node, 60)}' takes {told}", "give it what it takes")
     return function.gives
 
 
@@ -301,16 +301,24 @@ def _value(node: ast.expr, values: Mapping[str, Value]) -> Any:
             return _value(body if _value(test, values) else orelse, values)
         case ast.Call(ast.Name(name), arguments):
             return FUNCTIONS[name].work(*(_value(each, values) for each in arguments))
-    raise ExpressionError(f"'{ast.unparse(node)[:40]}' has no value", _HINT)
+    raise ExpressionError(f"'{_told(node, 40)}' has no value", _HINT)
+
+
+def _told(node: ast.AST, letters: int) -> str:
+    """A part of an expression as messages repeat it, cut off after so many letters."""
+    try:
+        return ast.unparse(node)[:letters]
+    except RecursionError:
+        return "..."
 
 
 def _worked_out(node: ast.expr, work: Callable[[Any, Any], Any], left: Any, right: Any) -> Any:
     try:
         return _checked(work(left, right))
     except ZeroDivisionError:
-        raise ExpressionError(f"'{ast.unparse(node)[:60]}' divides by zero", "ask for zero first, with 'if'") from None
+        raise ExpressionError(f"'{_told(node, 60)}' divides by zero", "ask for zero first, with 'if'") from None
     except OverflowError:
-        raise ExpressionError(f"'{ast.unparse(node)[:60]}' is too large a number", "use smaller numbers") from None
+        raise ExpressionError(f"'{_told(node, 60)}' is too large a number", "use smaller numbers") from None
 
 
 def _checked(value: Any) -> Value:
@@ -318,7 +326,9 @@ def _checked(value: Any) -> Value:
     if isinstance(value, str):
         if len(value) > MOST_TEXT:
             raise ExpressionError(f"a text of {len(value)} letters", f"keep it below {MOST_TEXT}")
-    elif not isinstance(value, bool) and not (math.isfinite(value) and abs(value) <= LARGEST):
+        if any("\ud800" <= letter <= "\udfff" for letter in value):
+            raise ExpressionError("a text with half a character", "leave out what \\ud800 to \\udfff stand for")
+    elif not isinstance(value, bool) and not abs(value) <= LARGEST:
         raise ExpressionError("a number that is too large", "use smaller numbers")
     return value  # type: ignore[no-any-return]
 

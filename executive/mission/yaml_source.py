@@ -29,6 +29,7 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 KeyPath = tuple[str | int, ...]
 MAX_BYTES: Final = 1_000_000
 MOST_DIGITS: Final = 100
+MOST_NESTED: Final = 80
 _NUMBERS: Final = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 _WORD: Final = re.compile(r"[\w -]{1,40}")
 
@@ -133,7 +134,10 @@ def _plain(root: yaml.Node) -> Any:
 
 
 def _walk(node: yaml.Node | None, path: KeyPath, file: Path) -> Iterator[tuple[KeyPath, int]]:
-    """Every key and list item below `node` with its line. Raises InputError: a number that nobody would write."""
+    """Every key and list item below `node` with its line. Raises InputError: what nobody would write or read."""
+    if len(path) > MOST_NESTED:
+        what = f"it is nested more than {MOST_NESTED} deep"
+        raise InputError(what, hint="write it flatter", file=file, line=1 if node is None else node.start_mark.line + 1)
     if isinstance(node, yaml.ScalarNode) and node.tag in _NUMBERS and len(node.value) > MOST_DIGITS:
         what = f"a number of {len(node.value)} digits (at most {MOST_DIGITS} are read)"
         raise InputError(what, hint="write a shorter one", file=file, line=node.start_mark.line + 1)
@@ -164,32 +168,54 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
     try:
         return model.model_validate(source.data)
     except ValidationError as error:
-        first, *others = [_input_error(model, source, fault) for fault in _telling(error.errors(), source)]
+        first, *others = [_input_error(model, source, faults) for faults in _telling(error.errors(), source)]
         raise InputError(first.message, hint=first.hint, file=first.file, line=first.line, others=others) from error
 
 
-def _telling(errors: list[ErrorDetails], source: YamlSource) -> list[ErrorDetails]:
-    """The errors that tell most, one for each place; what an unknown key has brought about is left out."""
-    misspelled = {_path(error)[:-1] for error in errors if error["type"] == "extra_forbidden"}
-    above = {_path(error)[:n] for error in errors for n in range(len(_path(error)))}
-    own = [error for error in errors if not (error["type"] == "too_short" and _path(error) in above)]
-    causes = (e for e in own if e["type"] == "extra_forbidden" or _parent(e) not in misspelled)
-    ordered = sorted(causes, key=lambda e: (e["type"] != "extra_forbidden", source.line(_path(e))))
-    return list({_path(error): error for error in reversed(ordered)}.values())[::-1]
+def _telling(errors: list[ErrorDetails], source: YamlSource) -> list[list[ErrorDetails]]:
+    """The errors that tell most, by place: one, or what is wrong with each kind of value that could stand there.
+
+    What an unknown key has brought about is left out.
+    """
+    paths = {id(error): _path(error, source) for error in errors}
+    misspelled = {paths[id(error)][:-1] for error in errors if error["type"] == "extra_forbidden"}
+    above = {path[:n] for path in paths.values() for n in range(len(path))}
+    own = [error for error in errors if not (error["type"] == "too_short" and paths[id(error)] in above)]
+    causes = (e for e in own if e["type"] == "extra_forbidden" or _parent(e, paths[id(e)]) not in misspelled)
+    ordered = sorted(causes, key=lambda e: (e["type"] != "extra_forbidden", source.line(paths[id(e)])))
+    places: dict[KeyPath, list[ErrorDetails]] = {}
+    for error in ordered:
+        places.setdefault(paths[id(error)], []).append(error)
+    return [those if len(those[0]["loc"]) > len(place) else those[:1] for place, those in places.items()]
 
 
-def _parent(error: ErrorDetails) -> KeyPath:
+def _parent(error: ErrorDetails, path: KeyPath) -> KeyPath:
     """Where a key is missing or several do not go together."""
-    return _path(error)[:-1] if error["type"] == "missing" else _path(error)
+    return path[:-1] if error["type"] == "missing" else path
 
 
-def _path(error: ErrorDetails) -> KeyPath:
-    return tuple(part for part in error["loc"] if part != "[key]")
+def _path(error: ErrorDetails, source: YamlSource) -> KeyPath:
+    """Where an error is, without the names of the kinds of values that could stand there."""
+    *parts, last = (part for part in error["loc"] if part != "[key]") if error["loc"] else ("",)
+    path: list[str | int] = []
+    data = source.data
+    for part in parts:
+        if _is_in(part, data):
+            path.append(part)
+            data = data[part]
+    if error["type"] in ("missing", "extra_forbidden") or _is_in(last, data):
+        path.append(last)
+    return tuple(path)
 
 
-def _input_error(model: type[BaseModel], source: YamlSource, error: ErrorDetails) -> InputError:
-    """A pydantic error, told with its place and its hint."""
-    path = _path(error)
+def _is_in(part: str | int, data: Any) -> bool:
+    return part in data if isinstance(data, dict) else isinstance(data, list) and part in range(len(data))
+
+
+def _input_error(model: type[BaseModel], source: YamlSource, errors: list[ErrorDetails]) -> InputError:
+    """What pydantic says of one place, told with the place and a hint."""
+    error = errors[0]
+    path = _path(error, source)
     where = ".".join(str(part) for part in path)
     known = _field_names(_model_at(model, path[:-1]))
     if error["type"] == "extra_forbidden":
@@ -198,11 +224,22 @@ def _input_error(model: type[BaseModel], source: YamlSource, error: ErrorDetails
     if error["type"] == "missing":
         parent = ".".join(str(part) for part in path[:-1]) or "the file"
         return source.error(path[:-1], f"key {path[-1]!r} is missing in {parent}", f"add {path[-1]!r}")
-    what = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
-    if error["type"] in _OUT_OF_RANGE:
+    what = " or ".join(dict.fromkeys(_plainly(each) for each in errors)).replace(" or should be ", " or ")
+    if error["type"] in _OUT_OF_RANGE and len(errors) == 1:
         what = f"should be {range_text(_kind_at(model, path))}"
     hint = _nearest_word(error) or f"it reads {error['input']!r} now"[:120]
     return source.error(path, f"{where or 'the file'}: {what[:1].lower()}{what[1:]}", hint)
+
+
+def _plainly(error: ErrorDetails) -> str:
+    """What is wrong, in plain words."""
+    context = error.get("ctx", {})
+    if error["type"] == "string_pattern_mismatch" and _FIRST not in context["pattern"]:
+        return f"should be as {context['pattern']} says"
+    if error["type"] == "too_short" and context["min_length"] > 1:
+        return f"should have {context['min_length']} parts or more"
+    said = _PLAINER.get(error["type"], error["msg"].removeprefix("Value error, "))
+    return f"should be {said.removeprefix('Input should be ')}" if said.startswith("Input should be ") else said
 
 
 def _quoted(key: str | int) -> str:
@@ -230,6 +267,7 @@ _PLAINER: Final[Mapping[str, str]] = MappingProxyType(
         "bool_type": "should be true or false",
         "string_too_short": "should not be empty",
         "too_short": "should not be empty",
+        "too_long": "has too many parts",
         "string_pattern_mismatch": "should hold something that can be seen, and no control characters",
         "finite_number": "should be a finite number",
     }

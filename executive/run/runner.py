@@ -198,7 +198,9 @@ class _Run:
                 for session in self._sessions:
                     if session.ends:
                         session.sense()
-                        if session.may_move() and requests.hold is None:
+                        if requests.hold is not None:
+                            session.hold()
+                        elif session.may_move():
                             session.tick_end()
                 self._ticks += 1
                 if self.observer is not None:

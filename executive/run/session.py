@@ -163,6 +163,7 @@ class Session:
 
     def tick_end(self) -> None:
         """Tick once what is always done in the end, of the latest mission first."""
+        self._held = False
         run = next((run for run in reversed(self._stack) if run.ends), None)
         if run is not None:
             run.tick(frozenset())
@@ -171,7 +172,8 @@ class Session:
         """Suspend the mission and stop the robot; done once until the next tick."""
         if not self._held:
             self._held = True
-            self._top.suspend()
+            for run in self._stack:
+                run.suspend()
             if self._lost_since_s is None:
                 self.context.robot.stop(lease=self.context.lease)
 

@@ -107,7 +107,7 @@ class TreeRun:
             return
         if not self._suspended:
             self._suspended = True
-            suspend(self.root)
+            suspend(self.root, sparing=due)
         for _ in due.tick():
             pass
         if due.status != Status.RUNNING:
@@ -147,6 +147,7 @@ class TreeRun:
         Each part is done through `attempt`, so that a defect in one does not keep the others from being done.
         """
         for node in self.context.endings.close():
+            self._endings.append(f"in the end, broken off: {message_of(node)}")
             attempt("stop what is done in the end", lambda node=node: node.stop(Status.INVALID))  # type: ignore[misc]
         if not self.finished and not self._ended_early:
             attempt("stop the tree", lambda: self.root.stop(Status.INVALID))

@@ -30,9 +30,9 @@ from executive.mission.file.condition_schema import ConditionFile, RepeatFile
 from executive.mission.file.model import KeyPath, MissionStep
 from executive.mission.file.schema import HandlerFile, StepFile
 from executive.mission.file.scope import Scope
-from executive.mission.knowledge import Knowledge
+from executive.mission.knowledge import ANYBODY, Knowledge
 
-__all__ = ["Reader", "condition_of", "read_block", "round_values"]
+__all__ = ["Reader", "condition_of", "plain_value", "read_block", "round_values"]
 
 MOST_ROUNDS: Final = 1000
 
@@ -89,8 +89,7 @@ def condition_of(reader: Reader, scope: Scope, condition: ConditionFile, path: K
         return _door(scope, condition.door, (*path, "door"), reader.knowledge)
     if condition.button is not None:
         return ButtonPressed(condition.button)
-    found = condition.object or condition.person
-    assert found is not None
+    found = condition.object or _person(scope, condition.person or "", (*path, "person"), reader.knowledge)
     return Look(reader.find_command(scope, path, found, condition.at))
 
 
@@ -151,14 +150,32 @@ def _door(scope: Scope, rooms: tuple[str, ...], path: KeyPath, knowledge: Knowle
     if len(doors) == 1:
         return DoorOpen(doors[0])
     told = " and ".join(named)
-    known = listing(" and ".join(door.between) for door in knowledge.doors) if knowledge.doors else "none"
-    what = f"there are {len(doors)} doors of {told}" if doors else f"no door of {told} is known"
-    raise scope.error(path, what, "name the two rooms that it joins" if doors else f"known are the doors of {known}")
+    if doors:
+        raise scope.error(path, f"there are {len(doors)} doors of {told}", "name the two rooms that it joins")
+    known = listing(" and ".join(door.between) for door in knowledge.doors)
+    hint = f"known are the doors of {known}" if knowledge.doors else "add it under 'doors' in the knowledge file"
+    raise scope.error(path, f"no door of {told} is known", hint)
+
+
+def _person(scope: Scope, name: str, path: KeyPath, knowledge: Knowledge) -> str:
+    """The person who is meant, perhaps anybody."""
+    known = knowledge.somebody(ANYBODY if name.strip().lower() == "anybody" else name)
+    if known is None:
+        raise scope.error(path, f"unknown person '{name[:60]}'", suggestion(name, ("anybody", *knowledge.people)))
+    return known
 
 
 def _expression(scope: Scope, text: str, path: KeyPath) -> Expression:
     try:
         return Expression(text)
+    except ExpressionError as error:
+        raise scope.error(path, error.message, error.hint) from error
+
+
+def plain_value(scope: Scope, value: Value, path: KeyPath) -> Expression:
+    """The expression of a plain value at `path`. Raises InputError: it is too long or too large."""
+    try:
+        return literal(value)
     except ExpressionError as error:
         raise scope.error(path, error.message, error.hint) from error
 
@@ -262,6 +279,11 @@ def _ask(reader: Reader, scope: Scope, step: StepFile, path: KeyPath) -> Block:
     if choices and default is not None and default not in choices:
         known = listing(choices)
         raise scope.error((*above, "default"), f"'{default}' is none of the choices", f"they are {known}")
+    alike = {choice.lower(): choice for choice in reversed(choices)}
+    wrong = next((choice for choice in choices if alike[choice.lower()] != choice), None)
+    if wrong is not None:
+        what = f"the choices '{alike[wrong.lower()]}' and '{wrong}' are the same to one who answers"
+        raise scope.error((*above, "choices", wrong), what, "give them different names")
     text = _template(scope, step.ask, path)
     return Ask(text, choices, step.match, step.limit, default, _answer_name(scope, step, path))
 
@@ -272,7 +294,8 @@ def _set(reader: Reader, scope: Scope, step: StepFile, path: KeyPath) -> Block:
     for name, value in step.set.items():
         if value is None:
             raise scope.error((*path, name), f"'{name}' gets no value", "give a number, a truth or an expression")
-        values[name] = _expression(scope, value, (*path, name)) if isinstance(value, str) else literal(value)
+        at = (*path, name)
+        values[name] = _expression(scope, value, at) if isinstance(value, str) else plain_value(scope, value, at)
     return Set(values)
 
 

@@ -15,7 +15,7 @@ from executive.language.understand import understand_asking
 from executive.mission.command import START, Command
 from executive.mission.condition import Condition
 from executive.mission.errors import InputError, Problems, suggestion
-from executive.mission.file.block_steps import condition_of, read_block, round_values
+from executive.mission.file.block_steps import condition_of, plain_value, read_block, round_values
 from executive.mission.file.blocks import Block, Group, Handler
 from executive.mission.file.condition_schema import ConditionFile
 from executive.mission.file.model import KeyPath, Mission, MissionStep, SkillCall
@@ -31,6 +31,7 @@ __all__ = ["load_mission", "mission_from_file"]
 
 MAX_STEPS: Final = 5000
 MAX_DEPTH: Final = 20
+MAX_NESTING: Final = 25
 REASON_LETTERS: Final = 500
 _NOT_UNDERSTOOD: Final = "the sentence was not understood"
 _NONE_GIVEN: Final[Given] = MappingProxyType({})
@@ -79,6 +80,7 @@ class _Resolver:
     world: str
     answer: Answerer
     steps_so_far: int = 0
+    depth: int = 0
     understood: dict[str, Understanding] = field(default_factory=dict)
 
     def mission(self, file: MissionFile, chain: tuple[Path, ...]) -> Mission:
@@ -86,6 +88,10 @@ class _Resolver:
         scope, problems = Scope(file, file.source, chain), Problems()
         steps: tuple[MissionStep, ...] = ()
         whole: Group | None = None
+        variables = file.variables or {}
+        for name, value in variables.items():
+            with problems:
+                plain_value(scope, value, ("variables", name))
         for name, parameter in (file.parameters or {}).items():
             with problems:
                 self._refuse_unknown(scope, name, parameter)
@@ -102,16 +108,21 @@ class _Resolver:
             file.over(None),
             file.source_line(("name",)),
             self._notes(),
-            file.variables or {},
+            variables,
             whole,
         )
 
     def steps(self, scope: Scope, steps: Sequence[StepFile], path: KeyPath) -> tuple[MissionStep, ...]:
         """The steps of a list that stands at `path`. Raises InputError: all that is wrong with them."""
+        if self.depth == MAX_NESTING:
+            what = f"steps hold steps more than {MAX_NESTING} deep"
+            raise scope.error(path, what, "write some of them one after the other")
         problems, made = Problems(), []
+        self.depth += 1
         for index, step in enumerate(steps):
             with problems:
                 made.append(self._step(scope, step, (*path, index)))
+        self.depth -= 1
         problems.raise_any()
         return tuple(made)
 
@@ -255,7 +266,7 @@ def _found(scope: Scope, use: str, path: KeyPath) -> Path:
     beside = sorted(one.name for one in scope.folder.glob("*.yaml"))
     near = difflib.get_close_matches(use, beside, n=1)
     hint = f"did you mean '{near[0]}'?" if near else "give its path from this file's folder"
-    raise scope.error(path, f"there is no mission file '{use}'", hint)
+    raise scope.error(path, f"there is no mission file '{use[:60]}'", hint)
 
 
 def _is_file(path: Path) -> bool:

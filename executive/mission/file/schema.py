@@ -59,12 +59,22 @@ __all__ = [
 
 Seconds = Annotated[Duration, Field(strict=True)]
 Share = Annotated[float, Field(ge=0.0, le=1.0, strict=True)]
+
+
+def _choices(data: Any) -> Any:
+    """Choices may be a list of their names. Raises ValueError: one is true or false."""
+    names = list(data) if isinstance(data, list | dict) else []
+    if any(isinstance(name, bool) for name in names):
+        raise ValueError("yes, no, on and off mean true and false in YAML: put them in quotes")
+    return dict.fromkeys(names) if isinstance(data, list) and all(isinstance(c, str) for c in names) else data
+
+
 Steps = Annotated[tuple["StepFile", ...], Field(min_length=1)]
 Choices = Annotated[
     dict[Name, "Steps | None"],
     Field(min_length=1),
     BeforeValidator(
-        lambda data: dict.fromkeys(data) if isinstance(data, list) and all(isinstance(c, str) for c in data) else data,
+        _choices,
         json_schema_input_type=dict[Name, "Steps | None"] | tuple[Name, ...],
     ),
 ]

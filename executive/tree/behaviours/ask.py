@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
-from executive.mission.expression import ExpressionError, Template, Value
+from executive.mission.expression import LARGEST, ExpressionError, Template, Value
 from executive.tree.behaviours.answer import ANSWER_TOPIC
 from executive.tree.behaviours.context import RunContext
 from executive.tree.behaviours.decisions import Keys, View
@@ -100,14 +100,14 @@ class AskPeople(ExplainedLeaf):
         """What an answer means; None when it means nothing."""
         if self.default is not None and said == _as_text(self.default):
             return self.default
-        plain = said.strip().lower().strip(".!? ")
+        plain = said.strip().lower()
+        if plain in self.names:
+            return self.names[plain]
+        plain = " ".join(plain.replace(",", " ").split()).strip(".!? ")
         while (shorter := _FILLERS.sub("", plain)) != plain:
             plain = shorter
         if self.gives is float:
-            try:
-                return float(plain)
-            except ValueError:
-                return None
+            return _number(plain)
         if not self.names:
             return said.strip() or None
         return self.names.get(plain)
@@ -122,6 +122,15 @@ class AskPeople(ExplainedLeaf):
     def _failed(self, failure: Failed) -> Status:
         self.cause, self.message = failure.cause, failure.message
         return Status.FAILURE
+
+
+def _number(said: str) -> float | None:
+    """A number that expressions can hold."""
+    try:
+        number = float(said)
+    except ValueError:
+        return None
+    return number if abs(number) <= LARGEST else None
 
 
 def _as_text(value: Value) -> str:

@@ -252,15 +252,18 @@ class Always(Afterwards):
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
         """Stop; what is to be done in the end is handed to the run when it is stopped from outside."""
+        first, last = self.children
+        endings = self.context.endings
         interrupted = new_status == Status.INVALID and self.status == Status.RUNNING
-        last = self.children[1]
-        if not interrupted:
+        if not interrupted and not endings.has(last):
             super().stop(new_status)
             return
-        self.children[0].stop(Status.INVALID)
-        if not self.context.endings.take(last):
+        if not interrupted or first.status == Status.RUNNING:
+            first.stop(Status.INVALID)
+        if interrupted and not endings.take(last):
             last.stop(Status.INVALID)
-        self.explain_cancelled()
+        if interrupted:
+            self.explain_cancelled()
         self.status = new_status
         self.iterator = self.tick()
 

@@ -50,6 +50,10 @@ class Endings:
             self._due.append(node)
         return not self._closed
 
+    def has(self, node: Behaviour) -> bool:
+        """Whether a node was taken over, and is not done yet."""
+        return any(each is node for each in self._due)
+
     def done(self) -> None:
         """What was due has come to its end."""
         self._due.pop(0)

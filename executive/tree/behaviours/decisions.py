@@ -224,7 +224,7 @@ class MustNotBegin(MustHold):
 class Decide(ExplainedNode, Composite):
     """Decides, and takes the looks (its children) one after the other only as long as the decision needs them.
 
-    Decided: SUCCESS, the answer under `key`. A look RUNNING: RUNNING. A look FAILURE: FAILURE with its cause. An
+    A look that has begun is taken to its end. Decided: SUCCESS, the answer under `key`. A look RUNNING: RUNNING. A look FAILURE: FAILURE with its cause. An
     expression without a value: FAILURE with PRECONDITION. Without a look left and not decided: FAILURE with ERROR.
     `looks` are the blackboard keys of the looks' answers, which are forgotten when it begins.
     """
@@ -243,11 +243,13 @@ class Decide(ExplainedNode, Composite):
 
     def tick(self) -> Iterator[Behaviour]:
         """Decide, or take the next look."""
-        if self.status != Status.RUNNING:
+        looks = self.status == Status.RUNNING
+        if not looks:
             self._restart()
         while True:
-            if self._decided():
+            if not looks and self._decided():
                 break
+            looks = False
             if self._next == len(self.children):
                 self._end(Failed(Cause.ERROR, f"it cannot be told whether {self.words}"))
                 break

@@ -23,14 +23,17 @@ class Suspendable(Protocol):
         """Let go of the robot and stop counting time until the next tick. Idempotent; never raises."""
 
 
-def suspend(root: Behaviour) -> None:
+def suspend(root: Behaviour, *, sparing: Behaviour | None = None) -> None:
     """Suspend all running nodes of a tree: motion that its leaves began is stopped, their place is kept.
+
+    The node `sparing` and those below it are let go on.
 
     Tick the tree again to go on: each suspended skill is told to `resume`, which begins it anew unless it knows
     better. Stop it (`root.stop(Status.INVALID)`) to give it up. Call it again freely; what is suspended stays so.
     """
+    spared = set() if sparing is None else set(sparing.iterate())
     for node in root.iterate():
-        if node.status == Status.RUNNING and isinstance(node, Suspendable):
+        if node not in spared and node.status == Status.RUNNING and isinstance(node, Suspendable):
             node.suspend()
 
 

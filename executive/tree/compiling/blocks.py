@@ -65,19 +65,19 @@ PYTHON_TYPES: Final[Mapping[Kind, type]] = {Kind.NUMBER: float, Kind.TEXT: str, 
 class Flow:
     """What is known at one point of a mission, when all goes well up to there.
 
-    `names` are the values that surely have been given by then, `seen` all that any step may have given; `declared` are
-    those that always have one. `held` is what the gripper holds; `opening` as long as it is what it held at first.
+    `names` are the values that surely have been given by then, `kinds` the types of all that any step may have given,
+    by their blackboard keys; `declared` are those that always have one. `held` is what the gripper holds; `opening` as long as it is what it held at first.
     """
 
     names: dict[str, Named] = field(default_factory=dict)
-    seen: set[str] = field(default_factory=set)
+    kinds: dict[str, Kind] = field(default_factory=dict)
     declared: frozenset[str] = frozenset()
     held: InGripper | None = None
     opening: bool = True
 
     def copy(self) -> Flow:
         """The same, for a branch."""
-        return Flow(dict(self.names), self.seen, self.declared, self.held, self.opening)
+        return Flow(dict(self.names), self.kinds, self.declared, self.held, self.opening)
 
     def join(self, branches: Sequence[Flow]) -> None:
         """Go on after one of several branches, nobody knows which."""
@@ -308,8 +308,9 @@ def _together(assembler: Assembler, block: Together, builder: PlanBuilder, polic
     _refuse_collisions([each.nodes[0] for each in made], builder)
     everything = block.needed is None or block.needed == len(block.steps)
     if everything:
+        before = dict(flow.names)
         for after in afters:
-            flow.names.update(after.names)
+            flow.names.update({name: named for name, named in after.names.items() if before.get(name) != named})
     moved = [after.held for after in afters if after.held != flow.held]
     if moved:
         flow.held, flow.opening = (moved[0] if everything else UNSURE), False
@@ -483,18 +484,18 @@ def _give_key(assembler: Assembler, name: str | None, key: str, kind: type, buil
 def give(assembler: Assembler, name: str, key: str, kind: type, builder: PlanBuilder) -> str:
     """Let later steps read a value under `name`; the key that it goes to, that of a declared one where it is declared.
 
-    Raises InputError: the name is no word, is that of a reading, or is declared with another type.
+    Raises InputError: the name is no word, is that of a reading, or has another type elsewhere: steps may be repeated.
     """
     flow = assembler.flow
     if not name.isidentifier() or name in READINGS or name in ("true", "false"):
         hint = "use letters, digits and underscores, and no name of a reading"
         raise InputError.at(builder.source, f"'{name[:60]}' cannot be the name of a value", hint=hint)
-    if name in flow.declared and kind_of(kind) is not kind_of(flow.names[name].type):
-        what = f"'{name}' is declared as {kind_of(flow.names[name].type)}, and gets {kind_of(kind)}"
-        raise InputError.at(builder.source, what, hint="use another name")
     key = flow.names[name].key if name in flow.declared else key
+    if flow.kinds.setdefault(key, kind_of(kind)) is not kind_of(kind):
+        told = "is declared as" if name in flow.declared else "is elsewhere"
+        what = f"'{name}' {told} {flow.kinds[key]}, and gets {kind_of(kind)}"
+        raise InputError.at(builder.source, what, hint="use another name")
     flow.names[name] = Named(key, kind)
-    flow.seen.add(name)
     return key
 
 

@@ -27,6 +27,9 @@ class Switch:
     def begin(self, context):
         self.begun += 1
 
+    def called(self):
+        pass
+
     def violated(self, context):
         return self.verdict
 

@@ -1,0 +1,532 @@
+"""Random missions over all constructs and nestings, run with scripted skills to an end: what must always hold.
+
+    python -m tests.benchmarks.random_missions --trees 20000 --seed 1
+
+Failures, presses of buttons, answers, pauses, cancels and other missions in between come at random; one seed gives the
+same mission and the same run. Tells how many missions ran, how they ended, and what was found wrong, each with its
+seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import dataclasses
+import random
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from executive.mission.command import parse_command
+from executive.mission.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.mission.errors import InputError
+from executive.mission.expression import Expression, Template
+from executive.mission.file.blocks import (
+    Ask,
+    Check,
+    Choose,
+    Dock,
+    Group,
+    Handler,
+    Repeat,
+    Set,
+    Speak,
+    Together,
+    Try,
+    Wait,
+)
+from executive.mission.file.model import (
+    DEFAULT_WORLD,
+    Mission,
+    MissionStep,
+    OnFailure,
+    OperatorQuestion,
+    SkillCall,
+    StepGuards,
+    StepPolicy,
+)
+from executive.mission.knowledge import Knowledge
+from executive.run.control import Control
+from executive.run.outcome import Outcome, RunResult
+from executive.run.runner import Progress, RunEntry, RunSettings, run
+from executive.run.worker import LockStepWorker
+from executive.tree.compiler import CompiledTree, compile_mission
+from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectObservation, Part, Running, Skill, Succeeded, Thing
+from tests.executive.conftest import KNOWLEDGE, PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
+from tests.executive.conftest import default_end as usual_end
+
+TICK_S, LIMIT_S, ENDINGS_S = 0.5, 120.0, 30.0
+MOST_TICKS = 3000
+WORLD = Knowledge.model_validate(
+    {**KNOWLEDGE, "doors": [{"between": ["hall", "kitchen"], "at": [2.5, 0.0], "width": 1.0}]}
+)
+COMMANDS = (
+    "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]",
+    "Take [Nothing] to [hall] and do [Nothing] to [Nothing]",
+    "Take [Nothing] to [start] and do [Nothing] to [Nothing]",
+    "Take [Nothing] to [Sam] and do [Nothing] to [Nothing]",
+    "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
+    "Take [drink] to [bedroom] and do [Nothing] to [Nothing]",
+    "Take [drink] to [Robin] and do [Nothing] to [Nothing]",
+    "Take [Nothing] to [kitchen] and do [find] to [coke]",
+    "Take [Nothing] to [Nothing] and do [wait] to [3 second]",
+    "Take [Nothing] to [Nothing] and do [charge] to [Nothing]",
+)
+LOOKS = (
+    "Take [Nothing] to [kitchen] and do [find] to [beer]",
+    "Take [Nothing] to [hall] and do [find] to [person]",
+)
+NUMBERS = ("n", "n + 1", "n * 2 - 3", "min(n, 4)", "7 // (n + 1)", "battery * 10", "1 / n", "elapsed", "length(word)")
+TRUTHS = (
+    "n > 2", "n == 0 or flag", "not flag", "word == 'tea'", "battery < 0.3", "localised", "holding", "elapsed < 20",
+    "clock < '08:01'", "1 / n > 0", "flag",
+)  # fmt: skip
+TEXTS = ("'tea'", "word", "word + '!' if length(word) < 9 else 'tea'", "lower('NO')")
+BUTTONS = ("go", "stop")
+SKILLS = ("stow", "clear_costmap", "relocalise", "back_off")
+CAUSES = (Cause.PRECONDITION, Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION, Cause.TIMEOUT)
+INJECTED = "injected"
+
+
+class MissionMaker:
+    """Makes a random mission of about so many steps."""
+
+    def __init__(self, rng: random.Random, steps: int) -> None:
+        self.rng, self.left = rng, steps
+
+    def mission(self, name: str = "random") -> Mission:
+        """The mission."""
+        rng = self.rng
+        whole = None
+        if rng.random() < 0.4:
+            whole = self.group((), depth=2)
+        steps = self.steps(0)
+        policy = self.policy(whole=True) if rng.random() < 0.2 else StepPolicy()
+        values = {"n": rng.choice([0, 1, 2.5]), "word": "tea", "flag": False}
+        return Mission(name, DEFAULT_WORLD, "Alice", steps, policy, variables=values, whole=whole)
+
+    def steps(self, depth: int, *, still: bool = False) -> tuple[MissionStep, ...]:
+        """Some steps in a row; those that are `still` use no part of the robot."""
+        many = self.rng.choice([1, 1, 2, 2, 3]) if depth else max(1, min(self.left, self.rng.randint(1, 8)))
+        return tuple(self.step(depth, still=still) for _ in range(many))
+
+    def step(self, depth: int, *, still: bool = False) -> MissionStep:
+        """A step, perhaps under a policy."""
+        rng = self.rng
+        self.left -= 1
+        policy = self.policy(still=still) if rng.random() < 0.35 else StepPolicy()
+        if self.left > 0 and depth < 6 and rng.random() < 0.6:
+            made = rng.choice([self.choose, self.repeat, self.try_, self.together, self.framed, self.asking, self.used])
+            return dataclasses.replace(made(depth + 1, still), policy=policy)
+        return dataclasses.replace(self.small(still), policy=policy)
+
+    def small(self, still: bool) -> MissionStep:
+        """A step that holds no others."""
+        rng = self.rng
+        kind = rng.randrange(8) if not still else rng.randrange(4)
+        if kind == 0:
+            return self.set()
+        if kind == 1:
+            return MissionStep(block=rng.choice([Wait(seconds=rng.choice([0.5, 3.0])), self.wait(still)]))
+        if kind == 2:
+            gives = rng.choice([None, "flag"])
+            return MissionStep(block=Check(self.condition(instant=still), gives))
+        if kind == 3:
+            return MissionStep(block=self.question({}))
+        if kind == 4:
+            return MissionStep(block=Speak(Template(rng.choice(["hello", "I have {n} {word}", "{1 / n}"]))))
+        if kind == 5:
+            return MissionStep(block=Dock(rng.choice([None, 0.5])))
+        if kind == 6:
+            return MissionStep(skill=SkillCall(rng.choice(SKILLS)))
+        return MissionStep((parse_command(rng.choice(COMMANDS)),))
+
+    def set(self) -> MissionStep:
+        """Values that get others."""
+        choice = {"n": NUMBERS, "word": TEXTS, "flag": TRUTHS}
+        names = self.rng.sample(sorted(choice), self.rng.choice([1, 1, 2]))
+        return MissionStep(block=Set({name: Expression(self.rng.choice(choice[name])) for name in names}))
+
+    def wait(self, instant: bool) -> Wait:
+        """What is waited for may never come: a time limit stands around some."""
+        rng = self.rng
+        if rng.random() < 0.2:
+            return Wait(until_clock_s=8 * 3600.0 + rng.choice([0.0, 60.0]))
+        return Wait(self.condition(instant=instant), every_s=rng.choice([1.0, 15.0]))
+
+    def condition(self, *, instant: bool, depth: int = 0) -> Condition:
+        """A condition; an `instant` one takes no look."""
+        rng = self.rng
+        kind = rng.randrange(8)
+        if kind == 0 and depth < 3:
+            return AllOf(tuple(self.condition(instant=instant, depth=depth + 1) for _ in range(rng.randint(1, 3))))
+        if kind == 1 and depth < 3:
+            return AnyOf(tuple(self.condition(instant=instant, depth=depth + 1) for _ in range(rng.randint(1, 3))))
+        if kind == 2 and depth < 3:
+            return Not(self.condition(instant=instant, depth=depth + 1))
+        if kind == 3:
+            return ButtonPressed(rng.choice(BUTTONS))
+        if kind == 4 and not instant:
+            return Look(parse_command(rng.choice(LOOKS)))
+        if kind == 5 and not instant:
+            return DoorOpen(("hall", "kitchen"))
+        return ValueIs(Expression(rng.choice(TRUTHS)))
+
+    def choose(self, depth: int, still: bool) -> MissionStep:
+        """`if`."""
+        otherwise = self.steps(depth, still=still) if self.rng.random() < 0.6 else ()
+        return MissionStep(block=Choose(self.condition(instant=still), self.steps(depth, still=still), otherwise))
+
+    def repeat(self, depth: int, still: bool) -> MissionStep:
+        """`repeat`, always with a number of rounds at most."""
+        rng = self.rng
+        kind = rng.randrange(3)
+        until = self.condition(instant=still) if kind == 0 else None
+        while_ = self.condition(instant=still) if kind == 1 else None
+        every_s = rng.choice([None, None, 2.0])
+        return MissionStep(block=Repeat(self.steps(depth, still=still), rng.randint(1, 3), until, while_, every_s))
+
+    def try_(self, depth: int, still: bool) -> MissionStep:
+        """`try`."""
+        return MissionStep(block=Try(self.steps(depth, still=still), self.steps(depth, still=still)))
+
+    def together(self, depth: int, still: bool) -> MissionStep:
+        """`together`: one that may move, and some that use no part of the robot."""
+        rng = self.rng
+        steps = [self.step(depth, still=still), *(self.step(depth, still=True) for _ in range(rng.randint(1, 2)))]
+        rng.shuffle(steps)
+        return MissionStep(block=Together(tuple(steps), rng.choice([None, 1, 2])))
+
+    def framed(self, depth: int, still: bool) -> MissionStep:
+        """`group`."""
+        return MissionStep(block=self.group(self.steps(depth, still=still), depth, still=still))
+
+    def group(self, steps: tuple[MissionStep, ...], depth: int, *, still: bool = False) -> Group:
+        """A group of steps, with some of what it can have."""
+        rng = self.rng
+        always = self.steps(depth + 2, still=still) if rng.random() < 0.6 else ()
+        holds = self.condition(instant=True) if rng.random() < 0.2 else None
+        handlers = rng.choice([0, 0, 1, 2])
+        when = tuple(
+            Handler(self.condition(instant=True), self.steps(depth + 2, still=still), rng.randint(1, 3))
+            for _ in range(handlers)
+        )
+        return Group(steps, rng.choice([None, "a group"]), always, holds, when)
+
+    def asking(self, depth: int, still: bool) -> MissionStep:
+        """`ask` with steps for its answers."""
+        choices = {
+            choice: self.steps(depth, still=still) if self.rng.random() < 0.7 else ()
+            for choice in ("tea", "the coffee", "no!")
+        }
+        return MissionStep(block=self.question(choices))
+
+    def question(self, choices: Mapping[str, tuple[MissionStep, ...]]) -> Ask:
+        """A question, with choices or without."""
+        rng = self.rng
+        text = Template(rng.choice(["which?", "{n} {word}?", "{1 / n}?"]))
+        limit_s = rng.choice([2.0, 20.0])
+        if choices:
+            return Ask(text, choices, None, limit_s, rng.choice([None, "tea"]), rng.choice([None, "word"]))
+        match, default, gives = rng.choice(
+            [("number", 3, "n"), ("text", "milk", "word"), ("place", "kitchen", "word"), ("number", None, None)]
+        )
+        return Ask(text, {}, match, limit_s, rng.choice([None, default]), gives)
+
+    def used(self, depth: int, still: bool) -> MissionStep:
+        """Another mission."""
+        values = {"n": 1, "word": "tea", "flag": True}
+        steps = self.steps(depth, still=still)
+        whole = self.group((), depth, still=still) if self.rng.random() < 0.4 else None
+        return MissionStep(used=Mission("used", DEFAULT_WORLD, "Alice", steps, variables=values, whole=whole))
+
+    def policy(self, *, whole: bool = False, still: bool = False) -> StepPolicy:
+        """A policy; that of a whole mission skips nothing."""
+        rng = self.rng
+        ways = [OnFailure.STOP, OnFailure.STOP, OnFailure.RETRY, OnFailure.RETURN, OnFailure.ASK, OnFailure.SKIP]
+        guards = StepGuards(
+            rng.choice([None, None, None, 0.2]), rng.random() < 0.1, rng.choice([None, None, None, 60.0])
+        )
+        return StepPolicy(
+            timeout_s=rng.choice([None, 1.0, 4.0, 20.0]),
+            retries=rng.choice([0, 0, 1, 2]),
+            on_failure=rng.choice(ways[:5] if whole else [*ways[:3], *ways[4:]] if still else ways),
+            question=OperatorQuestion(limit_s=rng.choice([2.0, 10.0]), default="stop" if whole else "skip"),
+            guards=guards,
+        )
+
+
+@dataclass
+class Robotics:
+    """The robot's side of one run: which skills are under way, and how they end."""
+
+    rng: random.Random
+    robot: ScriptedRobot
+    script: Script = field(default_factory=lambda: Script(steps=2))
+    failing: float = 0.15
+    active: list[Any] = field(default_factory=list)
+    raised: int = 0
+
+    def registry(self) -> dict[str, type[Skill[Any]]]:
+        """The skills by name."""
+        ports: dict[str, tuple[type, Mapping[str, type]]] = {
+            **PORTS,
+            "speak": (dataclasses.make_dataclass("SpeakInputs", [("text", str)], frozen=True), {}),
+            "check_door": (DoorInputs, {"open": bool}),
+        }
+        return {name: self._skill(name, *both) for name, both in ports.items()}
+
+    def _skill(self, skill_name: str, inputs: type, outputs_: Mapping[str, type]) -> type[Skill[Any]]:
+        mine = self
+        before, after = {"grasp": (False, True), "place": (True, False), "hand_over": (True, None)}.get(
+            skill_name, (None, None)
+        )
+
+        class Scripted(Skill[Any]):
+            name = skill_name
+            Inputs = inputs
+            outputs = outputs_
+            gripper_before, gripper_after = before, after
+            uses = {"speak": frozenset({Part.VOICE})}.get(skill_name, WHOLE_ROBOT)
+            default_timeout_s = 30.0
+
+            def begin(self, inputs: Any) -> None:
+                self.inputs, self.left = inputs, mine.rng.choice([1, 2, 3])
+                mine.active.append(self)
+
+            def step(self) -> Running | Succeeded | Failed:
+                robot, lease = self.context.robot, self.context.lease
+                robot.drive(0.1, 0.0, 0.0, until_s=self.context.clock.now() + 1.0, lease=lease)
+                self.left -= 1
+                if self.left > 0:
+                    return Running(f"{skill_name} goes on")
+                return mine.end_of(self, skill_name)
+
+            def end(self) -> None:
+                if self in mine.active:
+                    mine.active.remove(self)
+                    self.context.robot.stop(lease=self.context.lease)
+
+        return Scripted
+
+    def end_of(self, skill: Any, name: str) -> Succeeded | Failed:
+        """How an attempt ends."""
+        if self.rng.random() < self.failing:
+            if self.rng.random() < 0.05:
+                self.raised += 1
+                raise RuntimeError(INJECTED)
+            return Failed(self.rng.choice(CAUSES), f"{name} does not work")
+        if name == "check_door":
+            return Succeeded("seen", {"open": self.rng.random() < 0.5})
+        if name == "find_people":
+            seen = ObjectObservation(0.0, Thing("person"), (0.5, 4.5, 0.9), (0.5, 0.5, 1.7), 0.0, 0.9)
+            some = Succeeded("seen", {"observation": seen, "observations": (seen,)})
+            return some if self.rng.random() < 0.5 else Failed(Cause.POSTCONDITION, "nobody is there")
+        if name in ("place", "hand_over"):
+            self.robot.holding = False
+        found: Any = usual_end(self.script, name)(skill)
+        return found  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True)
+class DoorInputs:
+    """Where a door is."""
+
+    middle_W: tuple[float, float]
+    width_m: float
+
+
+class Operator:
+    """Does things at random while a mission runs; every pause ends, and every button is released."""
+
+    def __init__(self, rng: random.Random, control: Control, robot: ScriptedRobot, other: CompiledTree) -> None:
+        self.rng, self.control, self.robot, self.other = rng, control, robot, other
+        self.cancel_at = rng.choice([None, None, None, rng.randint(0, 10), rng.randint(0, 80)])
+        self.insist_after = rng.choice([None, None, rng.randint(0, 6)])
+        self.busy = rng.choice([0.0, 0.02, 0.1])
+        self.cancelled = self.insisted = self.preempted = False
+        self.asked: list[Any] = []
+        asking = control.ask
+
+        def ask(question: Any, clock: Any) -> Any:
+            self.asked.append(asking(question, clock))
+            return self.asked[-1]
+
+        control.ask = ask  # type: ignore[method-assign]
+
+    def __call__(self, progress: Progress) -> None:
+        """Look at the run after a tick, and perhaps do something."""
+        rng, control, ticks = self.rng, self.control, progress.ticks
+        if ticks > MOST_TICKS:
+            raise RuntimeError("the run does not end")
+        if self.cancel_at is not None and ticks >= self.cancel_at:
+            if not self.cancelled:
+                self.cancelled = True
+                control.cancel("enough")
+            elif self.insist_after is not None and ticks > self.cancel_at + self.insist_after:
+                self.insisted = True
+                control.cancel("at once")
+        for question in control.state.questions:
+            if rng.random() < 0.3:
+                said = question.options or ("3", "kitchen", "what?", "nan")
+                control.answer(question.id, rng.choice(said))
+        if rng.random() < self.busy:
+            self._interfere()
+        elif rng.random() < 0.3:
+            control.resume()
+            control.release_stop_button()
+
+    def _interfere(self) -> None:
+        rng, control, robot = self.rng, self.control, self.robot
+        what = rng.randrange(8)
+        if what < 3:
+            with contextlib.suppress(ValueError):  # no node decides by it
+                control.press(rng.choice(BUTTONS))
+        elif what == 3:
+            control.pause()
+        elif what == 4:
+            control.stop_button()
+        elif what == 5:
+            robot.charge = rng.choice([0.05, 0.5, 0.9])
+        elif what == 6:
+            robot.holding = not robot.holding
+        elif not self.preempted and self.control.state.mode.value != "ended":
+            self.preempted = True
+            control.preempt(self.other)
+
+
+@dataclass(frozen=True)
+class Ran:
+    """One run: how it ended, what it logged, what is wrong with it."""
+
+    result: RunResult
+    log: tuple[tuple[str, str], ...]
+    wrong: tuple[str, ...]
+    nodes: int
+
+
+def made_mission(seed: int) -> Mission:
+    """The mission of a seed: of 1 to 60 steps, small ones more often."""
+    rng = random.Random(f"mission {seed}")
+    return MissionMaker(rng, int(60 ** rng.random())).mission()
+
+
+def ran(seed: int) -> Ran:
+    """Make the mission of a seed and run it to its end. Raises InputError: it cannot be compiled."""
+    clock = ManualClock()
+    robot = ScriptedRobot(clock)
+    rng = random.Random(f"run {seed}")
+    robotics = Robotics(rng, robot, failing=rng.choice([0.0, 0.1, 0.4]))
+    registry = robotics.registry()
+    tree = compile_mission(made_mission(seed), knowledge=WORLD, registry=registry)
+    between = Mission("between", DEFAULT_WORLD, "Alice", (MissionStep(skill=SkillCall("stow")),))
+    other = compile_mission(between, knowledge=WORLD, registry=registry)
+    control = Control(pace=None)
+    operator = Operator(rng, control, robot, other)
+    log: list[tuple[str, str]] = []
+    with LockStepWorker(clock) as worker:
+        result = run(
+            [RunEntry(tree, robot, StillLocaliser(), EmptyCostmap())],  # type: ignore[arg-type]
+            clock=clock,
+            worker=worker,
+            publish=lambda topic, message: log.append((topic, repr(message))),
+            settings=RunSettings(
+                seed=seed,
+                tick_period_s=TICK_S,
+                time_limit_s=LIMIT_S,
+                endings_limit_s=ENDINGS_S,
+                time_of_day_s=8 * 3600.0,
+            ),
+            control=control,
+            observer=operator,
+        )
+    told = tuple(entry for entry in log if entry[0] != "wall")
+    wrong = tuple(_wrong(result, told, robotics, operator, tree))
+    return Ran(result, told, wrong, len(tree.path_ids))
+
+
+def _wrong(
+    result: RunResult, log: tuple[tuple[str, str], ...], robotics: Robotics, operator: Operator, tree: CompiledTree
+) -> list[str]:
+    """What must not be so at the end of a run."""
+    robot, worst = robotics.robot, result.worst
+    errors = [message for topic, message in log if topic == "errors" and INJECTED not in message]
+    running = [path for path, state in worst.states.items() if state.status.value == "RUNNING"]
+    found = {
+        f"an exception: {errors[:1]}": bool(errors),
+        f"ended as {worst.outcome}: {worst.message}": worst.outcome is Outcome.ERROR
+        and not robotics.raised
+        and "divides by zero" not in worst.message,  # in what is watched, that is a defect of the mission
+        "a lease is held": robot.lease is not None,
+        "the robot drives": robot.driving,
+        f"skills are left: {[skill.name for skill in robotics.active]}": bool(robotics.active),
+        f"nodes still run: {running[:3]}": bool(running),
+        "a question is open": any(asked._answer is None for asked in operator.asked),
+        "no cause": worst.outcome is not Outcome.SUCCESS and worst.cause is None,
+        "no sentence": not worst.message,
+    }
+    return [what for what, so in found.items() if so] + list(_not_done(log, operator, tree, worst.message))
+
+
+def _not_done(log: tuple[tuple[str, str], ...], operator: Operator, tree: CompiledTree, message: str) -> list[str]:
+    """What is always to be done in the end, and was not begun although its steps were."""
+    began = {topic_path(text) for topic, text in log if topic == "transitions" and "'to': 'INVALID'" not in text}
+    if operator.insisted or "in the end, broken off" in message:
+        return []
+    lasts = [
+        (node.path_id, *(child.path_id for child in node.children))
+        for node in tree.root.walk()
+        if node.kind == "always"
+    ]
+    return [f"not done in the end: {path}" for path, first, last in lasts if first in began and last not in began]
+
+
+def topic_path(text: str) -> str:
+    """The path id in a logged transition."""
+    return text.split("'node': '", 1)[1].split("'", 1)[0]
+
+
+def benchmark(trees: int, seed: int, limit_s: float, tell: Callable[[str], None]) -> int:
+    """Run so many, or as many as the time (s) allows; the number of those with something wrong."""
+    begun, outcomes, bad, nodes, ticks, done = time.perf_counter(), Counter[str](), 0, 0, 0, 0
+    for number in range(seed * 1_000_000, seed * 1_000_000 + trees):
+        if time.perf_counter() - begun > limit_s:
+            break
+        done += 1
+        try:
+            one = ran(number)
+        except InputError as error:
+            outcomes["not compiled: " + error.message.split("'")[0]] += 1
+            continue
+        except Exception as defect:
+            bad += 1
+            tell(f"seed {number}: {type(defect).__name__}: {defect}"[:300])
+            continue
+        outcomes[one.result.outcome.value] += 1
+        nodes, ticks = nodes + one.nodes, ticks + one.result.ticks
+        if one.wrong:
+            bad += 1
+            tell(f"seed {number}: {'; '.join(one.wrong)}"[:600])
+        elif number % 10 == 0 and ran(number).log != one.log:
+            bad += 1
+            tell(f"seed {number}: its log differs the second time")
+    tell(f"{done} missions in {time.perf_counter() - begun:.0f} s: {nodes} nodes, {ticks} ticks, {bad} with a defect")
+    tell(", ".join(f"{name} {count}" for name, count in outcomes.most_common()))
+    return bad
+
+
+def main() -> int:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--trees", type=int, default=20_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--limit", type=float, default=480.0, help="seconds at most")
+    options = parser.parse_args()
+    return int(benchmark(options.trees, options.seed, options.limit, lambda text: print(text, flush=True)) > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,414 @@
+"""What a mission decides by: values, looks, buttons and their combinations; decide, check, wait and set."""
+
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from py_trees.common import Status
+
+from executive.mission.expression import Expression, Template
+from executive.tree.behaviours.answer import ANSWER_TOPIC
+from executive.tree.behaviours.conditions import Waiting
+from executive.tree.behaviours.decisions import (
+    AllHold,
+    AnswerIs,
+    AnyHolds,
+    Check,
+    Decide,
+    DoesNotHold,
+    MustHold,
+    MustNotBegin,
+    Pressed,
+    SetValues,
+    ValueHolds,
+    View,
+    WaitFor,
+    WaitUntilClock,
+)
+from executive.tree.behaviours.suspension import suspend
+from skills.api import Cause, Failed
+
+_spec = importlib.util.spec_from_file_location("scripted_leaf", Path(__file__).with_name("scripted.py"))
+scripted = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(scripted)
+Leaf, tick, letters = scripted.Leaf, scripted.tick, scripted.letters
+R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
+KEY, FIRST, SECOND = "alice/decided", "alice/look-1/answer", "alice/look-2/answer"
+
+
+@pytest.fixture
+def pressed():
+    """How often each button was pressed."""
+    return {}
+
+
+@pytest.fixture
+def run_context(context, pressed):
+    return replace(context, presses=lambda: dict(pressed), day_began_s=8 * 3600.0)
+
+
+@pytest.fixture
+def view(run_context):
+    return View(run_context)
+
+
+def value(text, **keys):
+    return ValueHolds(Expression(text), keys)
+
+
+# Decisions: true, false, or not known yet.
+
+
+@pytest.mark.parametrize(
+    ("text", "holds"),
+    [
+        ("battery > 0.8", True),
+        ("localised and not holding", True),
+        ("elapsed == 0", True),
+        ("clock == '08:00'", True),
+        ("clock > '08:30'", False),
+    ],
+)
+def test_readings(view, text, holds):
+    assert value(text).holds(view) is holds
+
+
+def test_readings_are_those_of_the_moment(view, clock, robot):
+    clock.advance(1800.0)
+    robot.holding, robot.charge = True, 0.1
+    assert value("elapsed == 1800 and clock == '08:30' and holding and battery < 0.2").holds(view)
+
+
+def test_the_clock_goes_over_midnight(view, clock):
+    clock.advance(17 * 3600.0)
+    assert value("clock == '01:00'").holds(view)
+
+
+def test_values_are_read_from_the_blackboard(view, run_context):
+    run_context.board.put("alice/n", 3.0)
+    assert value("n > 2", n="alice/n").holds(view)
+
+
+def test_a_button_counts_from_when_the_tree_was_made(run_context, pressed):
+    pressed["go"] = 2
+    view = View(run_context)
+    assert not Pressed("go").holds(view)
+    pressed["go"] = 3
+    assert Pressed("go").holds(view)
+    view.forget_presses()
+    assert not Pressed("go").holds(view)
+    assert not Pressed("other").holds(view)
+
+
+class Is:
+    """A decision with a fixed answer."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def holds(self, view):
+        return self.answer
+
+
+# all of      any of      (None: not known yet)
+TABLE = [
+    ((True, True), True, True),
+    ((True, False), False, True),
+    ((False, False), False, False),
+    ((True, None), None, True),
+    ((None, True), None, True),
+    ((False, None), False, None),
+    ((None, False), False, None),
+    ((None, None), None, None),
+]
+
+
+@pytest.mark.parametrize(("parts", "every", "some"), TABLE)
+def test_combinations(view, parts, every, some):
+    decisions = tuple(map(Is, parts))
+    assert (AllHold(decisions).holds(view), AnyHolds(decisions).holds(view)) == (every, some)
+
+
+@pytest.mark.parametrize(("part", "whole"), [(True, False), (False, True), (None, None)])
+def test_not(view, part, whole):
+    assert DoesNotHold(Is(part)).holds(view) is whole
+
+
+def test_an_answer_is_not_known_before_the_look(view, run_context):
+    assert AnswerIs(FIRST).holds(view) is None
+    run_context.board.put(FIRST, False)
+    assert AnswerIs(FIRST).holds(view) is False
+
+
+# Decide: takes the looks only as long as it needs them.
+#
+#   decision     look 1     look 2    status   answer  looks taken
+#   value        -          -         S        true    -
+#   all          S false    -         S        false   1
+#   all          S true     RS true   R S      true    1, 2
+#   any          S true     -         S        true    1
+#   any          RS false   S false   R S      false   1, 2
+#   any+value    -          -         S        true    -        (the value is true already)
+#   all          F          -         F        -       1
+#   all          S true     E         F ERROR  -       1, 2
+BOTH, EITHER = AllHold((AnswerIs(FIRST), AnswerIs(SECOND))), AnyHolds((AnswerIs(FIRST), AnswerIs(SECOND)))
+DECIDE = [
+    (value("battery > 0.1"), ("S", True), ("S", True), "S", True, []),
+    (BOTH, ("S", False), ("S", True), "S", False, ["+one"]),
+    (BOTH, ("S", True), ("RS", True), "RS", True, ["+one", "+two"]),
+    (EITHER, ("S", True), ("S", True), "S", True, ["+one"]),
+    (EITHER, ("RS", False), ("S", False), "RS", False, ["+one", "+two"]),
+    (AnyHolds((EITHER, value("battery > 0.1"))), ("S", True), ("S", True), "S", True, []),
+    (BOTH, ("F", True), ("S", True), "F", None, ["+one"]),
+    (BOTH, ("S", True), ("E", True), "F", None, ["+one", "+two"]),
+]
+
+
+@pytest.fixture
+def decide(run_context):
+    """The node, and what was done to its looks."""
+
+    def make(decision, one=("S", True), two=("S", True), log=None):
+        log = [] if log is None else log
+        looks = [
+            Leaf(script, name, log, put=lambda key=key, answer=answer: run_context.board.put(key, answer))
+            for name, key, (script, answer) in (("one", FIRST, one), ("two", SECOND, two))
+        ]
+        return Decide(
+            path_id="alice/decide",
+            name="decide",
+            decision=decision,
+            words="it is so",
+            key=KEY,
+            looks=(FIRST, SECOND),
+            context=run_context,
+            children=looks,
+        )
+
+    return make
+
+
+@pytest.mark.parametrize(("decision", "one", "two", "expected", "answer", "taken"), DECIDE)
+def test_decide(decide, run_context, decision, one, two, expected, answer, taken):
+    log = []
+    root = decide(decision, one, two, log)
+    assert letters(root, len(expected)) == expected
+    assert (run_context.board.values().get(KEY), log) == (answer, taken)
+    if answer is None:
+        assert root.message.startswith("cannot tell whether it is so")
+        assert root.cause is (Cause.ERROR if two[0] == "E" else Cause.EXECUTION)
+    else:
+        assert (root.cause, root.message) == (None, f"{'yes' if answer else 'no'}: it is so")
+
+
+def test_decide_lets_a_look_end_that_has_left_its_answer(decide, run_context):
+    log = []
+    root = decide(AnswerIs(FIRST), one=("RRS", True), log=log)
+    tick(root)
+    run_context.board.put(FIRST, True)
+    assert letters(root, 2) == "RS"
+    assert (log, root.children[0].status) == (["+one"], S)
+
+
+def test_decide_looks_anew_when_it_starts_anew(decide):
+    log = []
+    root = decide(BOTH, log=log)
+    assert letters(root, 2) == "SS"
+    assert log == ["+one", "+two"] * 2
+
+
+def test_decide_with_a_value_that_nothing_has_given(decide):
+    root = decide(value("n > 2", n="alice/n"))
+    assert letters(root, 1) == "F"
+    assert (root.cause, root.message) == (Cause.PRECONDITION, "it is so: 'n' has no value yet")
+
+
+def test_decide_with_looks_that_leave_no_answer_is_an_error(decide, run_context):
+    root = decide(AnswerIs("alice/never"))
+    assert letters(root, 1) == "F"
+    assert root.cause is Cause.ERROR
+
+
+def test_decide_cancelled_stops_the_look(decide):
+    log = []
+    root = decide(BOTH, two=("RR", True), log=log)
+    tick(root)
+    root.stop(N)
+    assert (root.status, root.cause, log[-1]) == (N, Cause.CANCELLED, "-two")
+    assert [child.status for child in root.children] == [S, N]
+
+
+def test_decide_goes_on_with_its_look_after_a_suspension(decide):
+    log = []
+    root = decide(BOTH, one=("RRS", True), log=log)
+    tick(root)
+    suspend(root)
+    assert letters(root, 2) == "RS"
+    assert log == ["+one", "+two"]
+
+
+# Check: the decision is an answer of the mission.
+
+
+@pytest.mark.parametrize(("script", "answer", "expected"), [("RS", True, "RS"), ("S", False, "S"), ("F", None, "F")])
+def test_check(run_context, published, script, answer, expected):
+    child = Leaf(script, put=lambda: run_context.board.put(KEY, answer))
+    root = Check(path_id="alice/check", name="check", child=child, question="so?", key=KEY, context=run_context)
+    assert letters(root, len(expected)) == expected
+    told = [(message["question"], message["answer"]) for topic, message in published if topic == ANSWER_TOPIC]
+    assert told == ([] if expected == "F" else [("so?", answer)])
+    assert root.cause is (Cause.EXECUTION if expected == "F" else None)
+
+
+# Wait: for a decision, asked anew `every_s` after it was false.
+
+
+@pytest.fixture
+def wait(run_context):
+    def make(child, every_s=0.0):
+        return WaitFor(
+            path_id="alice/wait",
+            name="wait",
+            child=child,
+            key=KEY,
+            words="it is so",
+            every_s=every_s,
+            board=run_context.board,
+            clock=run_context.clock,
+        )
+
+    return make
+
+
+def answering(run_context, script, *answers, log=None):
+    left = list(answers)
+    return Leaf(script, "decide", log, put=lambda: run_context.board.put(KEY, left.pop(0)))
+
+
+def test_wait_until_the_answer_is_true(wait, run_context):
+    root = wait(answering(run_context, "S", False, False, True))
+    assert letters(root, 3) == "RRS"
+
+
+def test_wait_asks_again_when_it_is_time(wait, run_context, clock):
+    child = answering(run_context, "RSS", False, True)
+    root = wait(child, every_s=3.0)
+    found = []
+    for _ in range(5):
+        found += tick(root)
+        clock.advance(1.0)
+    assert found == [R, R, R, R, S]
+    assert child.ticks == 3
+
+
+def test_wait_fails_with_its_decision(wait):
+    root = wait(Leaf("RE"))
+    assert letters(root, 2) == "RF"
+    assert root.cause is Cause.ERROR
+
+
+def test_wait_cancelled_stops_the_decision(wait):
+    log = []
+    root = wait(Leaf("RR", "decide", log))
+    tick(root)
+    root.stop(N)
+    assert (root.status, root.cause, log[-1]) == (N, Cause.CANCELLED, "-decide")
+
+
+def test_wait_for_a_button_counts_presses_from_when_it_begins(wait, run_context, pressed):
+    decide = Decide(
+        path_id="alice/d", name="d", decision=Pressed("go"), words="go", key=KEY, context=run_context, children=[]
+    )
+    root = wait(decide)
+    pressed["go"] = 1
+    assert letters(root, 2) == "RR"
+    pressed["go"] = 2
+    assert letters(root, 2) == "SR"
+
+
+@pytest.mark.parametrize(
+    ("until_s", "after_s"),
+    [(8.5 * 3600, 1800.0), (8 * 3600, 0.0), (7 * 3600, 0.0), (20 * 3600, 12 * 3600.0), (20.1 * 3600, 0.0)],
+)
+def test_wait_until_a_time_of_day(run_context, clock, until_s, after_s):
+    root = WaitUntilClock(path_id="alice/w", name="w", time_s=until_s, words="then", context=run_context)
+    tick(root)
+    waited = 0.0
+    while root.status == R:
+        clock.advance(600.0)
+        waited += 600.0
+        tick(root)
+    assert (root.status, waited) == (S, after_s)
+
+
+# Set.
+
+
+def set_values(run_context, values, kinds, **keys):
+    return SetValues(path_id="alice/set", name="set", values=values, kinds=kinds, keys=keys, context=run_context)
+
+
+def test_set_works_values_out_in_order(run_context):
+    values = {"alice/a": Expression("1 + 1"), "alice/b": Expression("a * 2"), "alice/t": Template("{a} of {b}")}
+    kinds = {"alice/a": float, "alice/b": float, "alice/t": str}
+    root = set_values(run_context, values, kinds, a="alice/a", b="alice/b")
+    assert letters(root, 1) == "S"
+    assert run_context.board.values() == {"alice/a": 2.0, "alice/b": 4.0, "alice/t": "2 of 4"}
+    assert isinstance(run_context.board.get("alice/a"), float)
+
+
+def test_set_fails_at_the_first_without_a_value_and_keeps_those_before(run_context):
+    values = {"alice/a": Expression("1"), "alice/b": Expression("1 / (a - 1)"), "alice/c": Expression("3")}
+    root = set_values(run_context, values, dict.fromkeys(values, float), a="alice/a")
+    assert letters(root, 1) == "F"
+    assert root.cause is Cause.PRECONDITION
+    assert "divides by zero" in root.message
+    assert run_context.board.values() == {"alice/a": 1.0}
+
+
+# Watches.
+
+
+def test_must_hold(run_context, robot):
+    watch = MustHold(value("battery > 0.5"), "it is full").for_run(run_context)
+    watch.begin(run_context)
+    assert watch.violated(run_context) is None
+    robot.charge = 0.4
+    verdict = watch.violated(run_context)
+    assert isinstance(verdict, Failed)
+    assert (verdict.cause, verdict.message) == (Cause.PRECONDITION, "it does not hold any more that it is full")
+
+
+def test_must_hold_without_a_value(run_context):
+    verdict = MustHold(value("n > 1", n="alice/n"), "n").for_run(run_context).violated(run_context)
+    assert isinstance(verdict, Failed)
+    assert verdict.cause is Cause.ERROR
+
+
+def test_must_hold_waits_for_what_is_not_known_yet(run_context):
+    assert isinstance(MustHold(Is(None), "so").for_run(run_context).violated(run_context), Waiting)
+
+
+def test_must_not_begin_calls_once_until_it_was_false_in_between(run_context, robot):
+    watch = MustNotBegin(value("holding"), "it holds").for_run(run_context)
+    watch.begin(run_context)
+    found = []
+    for holding in (False, True, True, False, True):
+        robot.holding = holding
+        found.append(isinstance(watch.violated(run_context), Failed))
+        if found[-1]:
+            watch.called()
+    assert found == [False, True, False, False, True]
+
+
+def test_must_not_begin_is_called_once_by_each_press(run_context, pressed):
+    watch = MustNotBegin(Pressed("go"), "go").for_run(run_context)
+    watch.begin(run_context)
+    found = []
+    for presses in (0, 1, 1, 2, 2):
+        pressed["go"] = presses
+        found.append(isinstance(watch.violated(run_context), Failed))
+        if found[-1]:
+            watch.called()
+    assert found == [False, True, False, True, False]

@@ -66,7 +66,8 @@ class Flow:
     """What is known at one point of a mission, when all goes well up to there.
 
     `names` are the values that surely have been given by then, `kinds` the types of all that any step may have given,
-    by their blackboard keys; `declared` are those that always have one. `held` is what the gripper holds; `opening` as long as it is what it held at first.
+    by their blackboard keys; `declared` are those that always have one. `held` is what the gripper holds; `opening` as
+    long as it is what it held at first.
     """
 
     names: dict[str, Named] = field(default_factory=dict)
